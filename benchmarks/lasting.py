@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import noisemodel as nm
-from inspector.analysis.analyse import analyse
+from inspector.analysis import analyse
 from inspector.library import Library, load_library
 from noiseclassifier import Event
 from noisemodel.types import Array

@@ -3,14 +3,14 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from inspector.analysis.analyse import Analysis, analyse
-    from inspector.analysis.status import Status, Unknown
+    from inspector.analysis import Analysis, analyse  # type: ignore[no-redef] # of a cycle
     from inspector.library import load_library
     from inspector.live import LiveSession
     from inspector.logs.motion import Imported
     from inspector.logs.read import read_log, read_logs
     from inspector.recording.notebook import show
     from inspector.reference.store import Reference
+    from inspector.status import Status, Unknown
 
 __all__ = [
     "Analysis",
@@ -27,13 +27,13 @@ __all__ = [
 ]
 
 _MODULES = {
-    "Analysis": "inspector.analysis.analyse",
+    "Analysis": "inspector.analysis",
     "Imported": "inspector.logs.motion",
     "LiveSession": "inspector.live",
     "Reference": "inspector.reference.store",
-    "Status": "inspector.analysis.status",
-    "Unknown": "inspector.analysis.status",
-    "analyse": "inspector.analysis.analyse",
+    "Status": "inspector.status",
+    "Unknown": "inspector.status",
+    "analyse": "inspector.analysis",
     "load_library": "inspector.library",
     "read_log": "inspector.logs.read",
     "read_logs": "inspector.logs.read",

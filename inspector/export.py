@@ -28,8 +28,7 @@ import numpy as np
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector import colors
-from inspector.analysis.analyse import Analysis, analyse, robot_known
-from inspector.analysis.level import estimate
+from inspector.analysis import Analysis, analyse, estimate, robot_known
 from inspector.audit import summary
 from inspector.errors import InspectorError, OptionError
 from inspector.library import Library

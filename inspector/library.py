@@ -60,10 +60,6 @@ def for_robot(library: Library, robot: str | None) -> Library:
 
     Signals of single joints generalise to new robots less than norms. A model whose runs name no
     robot stays, and so do all if none would be left.
-
-    Args:
-        library: Models to choose from.
-        robot: The robot of the run, if it has a name.
     """
     kept = {name: model for name, model in library.items() if _fits(model, robot)}
     return kept or library
@@ -85,19 +81,6 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
 
     Where each value of a slower log is there several times (`hold.without_hold`), it is labelled as
     that slower log.
-
-    Args:
-        run: The run.
-        library: Models to choose from.
-        slower: The run without the hold, if that is known.
-
-    Returns:
-        Labels on the time axis of the run.
-
-    Raises:
-        CannotTellError: If the run's rate is below that of every model, it has the signals of none,
-            or has no frame without a gap.
-        SignalError: If the run is too short for a frame.
     """
     slower = without_hold(run) if slower is None else slower
     try:
@@ -143,18 +126,9 @@ def nearest(
     """Model of the nearest rate at or below that of a log's values, bound to them.
 
     Args:
-        library: Models to choose from.
         rate: Rate of the log's values, in [Hz].
-        signals: Names of the signals that there are.
         logged: Rate of the log, in [Hz]: higher where values are held. If no model takes the rate
             of the values, it is one of a single rate that takes this one.
-
-    Returns:
-        Its name, and the model at its rate.
-
-    Raises:
-        MissingSignalError: If each model needs a signal that is missing.
-        RateError: If all others are of higher rates, or there are no models.
     """
     try:
         return nc.nearest(library, rate, signals)
@@ -168,9 +142,6 @@ def nearest(
 def signals_of(run: nm.Run) -> dict[str, Real]:
     """Signals that models take, without the error where the desired motion is the measured one.
 
-    Args:
-        run: The run.
-
     Returns:
         Norms by name, each of shape (samples,), and velocities joint by joint, shape
         (joints, samples), in [rad/s].
@@ -179,11 +150,7 @@ def signals_of(run: nm.Run) -> dict[str, Real]:
 
 
 def signal_names(run: nm.Run) -> tuple[str, ...]:
-    """Names of the signals of a run, as `signals_of` has them.
-
-    Args:
-        run: The run.
-    """
+    """Names of the signals of a run, as `signals_of` has them."""
     one = next(pieces_of(run, samples=1))
     errors = any(_differs(piece) for piece in pieces_of(run))
     return tuple(name for name in _signals(one) if errors or not name.startswith("error"))
@@ -224,15 +191,6 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
     Args:
         time: Uniform, shape (samples,), in [s].
         noise: Shape (samples,), in [rad/s].
-        library: Models to choose from.
-
-    Returns:
-        Labels on the time axis of the log.
-
-    Raises:
-        CannotTellError: If no model has the rate of the noise; it cannot be decimated, since the
-            joint velocities are not there.
-        SignalError: If the noise is too short for a frame.
     """
     rate = nc.nominal_rate(time)
     try:

@@ -6,7 +6,7 @@ Each window is resampled to equal steps of the joint's angle (Fyfe & Munck 1997,
 
 import numpy as np
 
-from inspector.analysis.analyse import Analysis
+from inspector.analysis import Analysis
 from inspector.localisation.order import SLOWEST
 from inspector.spectrogram import Spectrogram, amplitudes, in_bands
 from noisemodel.extended import vibrating

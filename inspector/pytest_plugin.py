@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import pytest
 
 if TYPE_CHECKING:
-    from inspector.analysis.analyse import Analysis
+    from inspector.analysis import Analysis
     from inspector.library import Library
     from inspector.reference.judging import Comparison
     from inspector.reference.store import Reference
@@ -96,7 +96,7 @@ class Noise:
             The verdicts; none with ``--noise-accept``, which accepts the runs.
         """
         __tracebackhide__ = True
-        from inspector.analysis.status import Status
+        from inspector.status import Status
         from noisemodel import Run
 
         allowed = self._allowed(allow)
@@ -131,7 +131,7 @@ class Noise:
         """Analysis of a run, the verdict on it, and how it compares; None without a reference."""
         from datetime import date
 
-        from inspector.analysis.analyse import analyse, with_links
+        from inspector.analysis import analyse, with_links
         from inspector.reference.judging import compare
         from inspector.reference.levels import levels
         from inspector.reference.verdicts import beside, judge
@@ -185,8 +185,8 @@ class Noise:
     def _allowed(self, allow: "str | Iterable[Allowed]") -> tuple[Allowed, ...]:
         """What may be there, of classes that there are."""
         __tracebackhide__ = True
-        from inspector.analysis.status import Status
         from inspector.reference.verdicts import classes_found
+        from inspector.status import Status
         from noisemodel.errors import hint
 
         known = (*classes_found(self._library), Status.CANNOT_TELL.value)

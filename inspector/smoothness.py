@@ -25,14 +25,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inspector.analysis.analyse import analyse
-from inspector.analysis.status import Status
+from inspector.analysis import analyse
 from inspector.audit_signals import without_placeholder
 from inspector.compare.picture import require
 from inspector.errors import InspectorError, without_path
 from inspector.hold import hold_length, without_hold
 from inspector.library import Library
 from inspector.logs.read import Reading, Source, open_source, sources
+from inspector.status import Status
 from inspector.text import cell, counted
 from inspector.verdict import EXPECTED
 from noisemodel import Run

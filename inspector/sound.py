@@ -26,8 +26,7 @@ import numpy as np
 from numpy import fft
 
 import noisemodel as nm
-from inspector.analysis.analyse import Analysis, robot_known
-from inspector.analysis.moments import worst
+from inspector.analysis import Analysis, robot_known, worst
 from inspector.errors import InspectorError, OptionError
 from inspector.text import plain
 from noisemodel.files import refuse_existing, replacing

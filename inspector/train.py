@@ -11,7 +11,7 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector.analysis.analyse import extents
+from inspector.analysis import extents
 from inspector.audit_signals import without_placeholder
 from inspector.colors import SERIES, Color, of_classes
 from inspector.compare import picture

@@ -14,8 +14,7 @@ from generalmodel import fixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspector.analysis.analyse import Analysis, analyse, analyse_noise, with_links
-from inspector.analysis.status import Status, Unknown
+from inspector.analysis import Analysis, analyse, analyse_noise, with_links
 from inspector.assets import demo_run, model_files
 from inspector.audit import audit
 from inspector.audit_signals import without_placeholder
@@ -23,6 +22,7 @@ from inspector.library import load_library
 from inspector.report import html, markdown
 from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
+from inspector.status import Status, Unknown
 from inspector.verdict import Verdict, classify_file, exit_status
 from noiseclassifier import Event, Labels
 from noisemodel import Robot, Run
@@ -205,7 +205,7 @@ def test_unknown_frames_that_are_ignored_raise_nothing_and_are_a_remark():
 
 
 def test_a_run_of_unknown_frames_alone_is_not_ok_when_they_are_ignored(monkeypatch):
-    from inspector.analysis import analyse as module
+    import inspector.analysis as module
 
     def unknown(run, library, **_):
         labels = analysed("uuuu").labels
@@ -320,7 +320,7 @@ def test_an_object_that_reads_arrays_on_demand_stands_in_for_a_run(tmp_path):
 
 
 def test_a_run_is_labelled_and_audited_once(monkeypatch):
-    from inspector.analysis import analyse as module
+    import inspector.analysis as module
 
     counts = {"audit": 0, "label_run": 0}
 
@@ -345,7 +345,7 @@ def test_a_run_is_labelled_and_audited_once(monkeypatch):
 @given(st.text(alphabet="..iIoOu", min_size=1, max_size=30))
 @settings(deadline=None, max_examples=60)
 def test_a_finding_lies_within_its_frames(text):
-    from inspector.analysis.analyse import extents
+    from inspector.analysis import extents
 
     labels = analysed(text).labels
     spans, findings = extents(moving(), labels)
@@ -418,7 +418,7 @@ def test_a_verdict_has_localisations_where_they_are_asked_for():
 
 
 def test_a_file_is_analysed_with_its_links_unless_told():
-    from inspector.analysis.analyse import analyse_file
+    from inspector.analysis import analyse_file
 
     found = analyse_file(demo_run(), {})
     assert found.links is not None
@@ -470,7 +470,7 @@ def still_and_fast(**changes):
 
 
 def test_the_level_of_a_run_is_that_of_its_samples():
-    from inspector.analysis.level import estimate, noise_level
+    from inspector.analysis import estimate, noise_level
 
     run = still_and_fast()
     found = noise_level(run, estimate(run, "simplified"))
@@ -489,7 +489,7 @@ def test_the_level_of_a_run_is_that_of_its_samples():
 
 
 def test_parts_of_a_thousandth_are_listed_and_remarks_after_them():
-    from inspector.analysis.level import NoiseLevel
+    from inspector.analysis import NoiseLevel
 
     shares = (("a", 0.998), ("b", 0.001), ("c", 0.0009))
     found = NoiseLevel("paper", "√W", 0.12345, 1.5, 0.0, shares, ("links without geometry: d",))
@@ -502,7 +502,7 @@ def test_parts_of_a_thousandth_are_listed_and_remarks_after_them():
 
 
 def test_the_simplified_noise_has_what_is_measured_what_is_desired_and_the_base(tmp_path):
-    from inspector.analysis.level import estimate, write_csv
+    from inspector.analysis import estimate, write_csv
 
     base = np.tile([1.0, 2.0, 2.0, 0.0, 4.0, 0.0], (10, 1))
     run = still_and_fast(
@@ -524,7 +524,7 @@ def test_the_simplified_noise_has_what_is_measured_what_is_desired_and_the_base(
 
 
 def test_noise_that_is_not_finite_names_its_time():
-    from inspector.analysis.level import Estimate, noise_level
+    from inspector.analysis import Estimate, noise_level
     from inspector.errors import InspectorError
 
     power = np.ones((10, 1))
@@ -547,7 +547,7 @@ def test_noise_that_is_not_finite_names_its_time():
     ],
 )
 def test_a_noise_that_a_run_cannot_have_is_refused(robot, kind, text):
-    from inspector.analysis.level import estimate
+    from inspector.analysis import estimate
     from noisemodel import NoiseModelError
 
     with pytest.raises(NoiseModelError, match=text):
@@ -555,7 +555,7 @@ def test_a_noise_that_a_run_cannot_have_is_refused(robot, kind, text):
 
 
 def test_noises_are_not_written_over_a_file_unasked(tmp_path):
-    from inspector.analysis.level import write_csv
+    from inspector.analysis import write_csv
     from noisemodel import OutputError
 
     write_csv(moving(), (), tmp_path / "noise.csv")
@@ -575,7 +575,7 @@ def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
 
 
 def test_a_base_that_floats_makes_noise_by_its_own_motion():
-    from inspector.analysis.level import estimate
+    from inspector.analysis import estimate
 
     robot = Robot.load("solo12")
     time = np.arange(200) / 1000
@@ -595,7 +595,7 @@ def test_a_base_that_floats_makes_noise_by_its_own_motion():
 
 
 def test_the_papers_sum_is_given_where_a_robot_and_its_positions_are_known():
-    from inspector.analysis.level import default_kinds
+    from inspector.analysis import default_kinds
 
     whole = replace(moving(), robot="panda", position=np.zeros_like(moving().velocity))
     assert default_kinds(whole) == ("simplified", "paper")

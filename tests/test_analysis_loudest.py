@@ -1,7 +1,6 @@
 import numpy as np
 
-from inspector.analysis.analyse import Analysis, Status
-from inspector.analysis.loudest import SHOWN, chosen
+from inspector.analysis import SHOWN, Analysis, Status, chosen
 from inspector.levels import STEP
 from noiseclassifier import Event
 from noisemodel import Run

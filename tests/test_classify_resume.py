@@ -15,7 +15,6 @@ import workers
 from commandline import call
 
 from inspector import assets, verdict
-from inspector.analysis.status import Status, Unknown
 from inspector.assets import demo_run, model_files
 from inspector.errors import InspectorError
 from inspector.library import load_library
@@ -23,6 +22,7 @@ from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.read import Reading, Source, open_source
+from inspector.status import Status, Unknown
 from inspector.verdict import Evidence, StateError, Verdict, classify_files, digest, kept
 from inspector.version import program_version
 from noiseclassifier import Event

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from inspector.analysis.analyse import analyse
-from inspector.analysis.status import Status
+from inspector.analysis import analyse
 from inspector.library import load_library
+from inspector.status import Status
 from noiseclassifier.lasting import SHORTEST
 from noisemodel import Run, decimated
 

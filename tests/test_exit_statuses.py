@@ -13,9 +13,9 @@ from commandline import call
 from generalmodel import run_at
 
 from inspector import cli
-from inspector.analysis.status import Status
 from inspector.assets import demo_run
 from inspector.report.formats import as_json
+from inspector.status import Status
 from inspector.verdict import Verdict
 from noisemodel import Block
 

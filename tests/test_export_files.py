@@ -10,7 +10,7 @@ import pytest
 from commandline import call
 from mcap.reader import make_reader
 
-from inspector.analysis.level import estimate
+from inspector.analysis import estimate
 from inspector.assets import demo_run, model_files
 from inspector.export import collect, export
 from inspector.library import load_library

@@ -128,7 +128,7 @@ def test_runs_of_several_domains_have_a_row_each_with_all_their_injected_faults(
 
 
 def test_findings_are_those_that_classify_reports(folder, tmp_path):
-    from inspector.analysis.analyse import analyse
+    from inspector.analysis import analyse
     from inspector.library import load_library
 
     path = simulated(tmp_path / "fast.npz", 30, robot="panda")

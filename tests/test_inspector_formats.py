@@ -6,7 +6,6 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from inspector.analysis.status import Status, Unknown
 from inspector.localisation.localise import Localisation
 from inspector.report.cases import ANNOTATIONS, COMMENT, MARKER
 from inspector.report.formats import (
@@ -18,6 +17,7 @@ from inspector.report.formats import (
     sarif,
     text,
 )
+from inspector.status import Status, Unknown
 from inspector.verdict import Evidence, Missing, Ruled, Ruling, Verdict, exit_status
 from noiseclassifier import Event
 

@@ -11,12 +11,12 @@ from scipy.signal import butter, sosfilt
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector.analysis.analyse import analyse
-from inspector.analysis.status import Status
+from inspector.analysis import analyse
 from inspector.audit import Observability, audit
 from inspector.hold import without_hold
 from inspector.library import CannotTellError, label_run, signals_of
 from inspector.report.markdown import report
+from inspector.status import Status
 from inspector.train import classified
 
 LIBRARY = {"general": trained()}

@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from inspector.analysis.analyse import analyse_file
+from inspector.analysis import analyse_file
 from inspector.assets import demo_run, model_files
 from inspector.cli import main
 from inspector.errors import InspectorError

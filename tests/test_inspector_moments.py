@@ -3,8 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inspector.analysis.analyse import analyse_file
-from inspector.analysis.moments import gaps, worst
+from inspector.analysis import analyse_file, gaps, worst
 from noiseclassifier import Event
 from noisemodel import Block, Run
 

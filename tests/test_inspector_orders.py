@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inspector.analysis.analyse import analyse
+from inspector.analysis import analyse
 from inspector.orders import orders
 from noisemodel import Run
 

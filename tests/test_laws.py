@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 from simulated import simulated
 
 import noisemodel as nm
-from inspector.analysis.analyse import analyse
-from inspector.analysis.status import Status, Unknown
+from inspector.analysis import analyse
 from inspector.assets import demo_run
 from inspector.library import load_library, signals_of
+from inspector.status import Status, Unknown
 from noiseclassifier.faults import KINDS, fault
 from noiseclassifier.scenarios.logs import LEVELS
 

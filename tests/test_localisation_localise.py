@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inspector.analysis.analyse import analyse_file
+from inspector.analysis import analyse_file
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
 from inspector.localisation.band import band

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inspector.analysis.analyse import Analysis
-from inspector.analysis.status import Status
+from inspector.analysis import Analysis
 from inspector.audit import audit
 from inspector.localisation.order import Order, best_lines, order
 from inspector.report.formats import as_json, github, junit, text
 from inspector.report.html import found
 from inspector.report.markdown import report, sentence
 from inspector.report.picture import picture
+from inspector.status import Status
 from inspector.verdict import Verdict
 from noiseclassifier import Event
 from noisemodel import Run

@@ -73,6 +73,11 @@ def test_a_line_of_the_desired_motion_alone_is_no_finding():
     assert found(velocity, error=steps - 0.01 * velocity) == ()
 
 
+def test_an_error_of_zero_changes_nothing():
+    velocity = shaken(60.0, 0.3)
+    assert found(velocity, error=np.zeros_like(velocity)) == found(velocity) != ()
+
+
 def test_a_loud_half_second_is_found_near_its_time():
     (event,) = found(shaken(70.0, 1.0, start=1.6, stop=2.1))
     assert 1.0 < event.start < 1.8

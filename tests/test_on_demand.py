@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.lib import format as npy
 
 import noiseclassifier as nc
-from inspector.analysis.analyse import analyse
+from inspector.analysis import analyse
 from inspector.hold import hold_length, without_hold
 from inspector.library import load_library, signal_names, signals_of
 from inspector.logs.read import open_run

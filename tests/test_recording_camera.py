@@ -11,7 +11,7 @@ from recordings import read
 from rerun.chunk import RrdReader
 from test_noisemodel_mjcf import ARM, LEGS, written
 
-from inspector.analysis.analyse import analyse_file
+from inspector.analysis import analyse_file
 from inspector.recording import framing
 from inspector.recording import robot as scene
 from inspector.recording.camera import FIELD_OF_VIEW, fitted

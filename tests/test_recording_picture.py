@@ -2,7 +2,7 @@ import struct
 
 import pytest
 
-from inspector.analysis.analyse import analyse_file
+from inspector.analysis import analyse_file
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
 from inspector.recording.run import write

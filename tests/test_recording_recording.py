@@ -20,7 +20,7 @@ from recordings import (
 from rerun.chunk import RrdReader
 
 from inspector import colors
-from inspector.analysis.analyse import Analysis, Status, analyse_file
+from inspector.analysis import Analysis, Status, analyse_file
 from inspector.errors import InspectorError
 from inspector.levels import velocity_levels
 from inspector.recording import axes, layout, panels

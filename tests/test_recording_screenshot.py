@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-from inspector.analysis.analyse import analyse_file
+from inspector.analysis import analyse_file
 from inspector.assets import demo_run
 from inspector.cli import main
 from inspector.errors import InspectorError

@@ -15,7 +15,7 @@ import browser
 import numpy as np
 import pytest
 
-from inspector.analysis.analyse import analyse_file
+from inspector.analysis import analyse_file
 from inspector.recording import unstable, viewer
 from inspector.recording.run import write
 from inspector.recording.viewer import ViewerError

@@ -9,10 +9,10 @@ import pytest
 from commandline import call
 
 from inspector import history
-from inspector.analysis.status import Status
 from inspector.assets import demo_run
 from inspector.localisation.stage import Localisation
 from inspector.report.formats import as_json
+from inspector.status import Status
 from inspector.verdict import Beside, Verdict
 from noiseclassifier import Event
 

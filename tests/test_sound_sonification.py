@@ -9,7 +9,7 @@ import pytest
 from chains import chain
 
 import noisemodel as nm
-from inspector.analysis.level import estimate
+from inspector.analysis import estimate
 from inspector.cli import main
 from inspector.errors import InspectorError
 from inspector.sound import Settings, clip, common_gain, mix, output_paths, save, sonify

@@ -8,7 +8,6 @@ import pytest
 
 import noiseclassifier as nc
 from inspector import tune, verdict
-from inspector.analysis.status import Status
 from inspector.errors import InspectorError
 from inspector.labelfiles import read_labels
 from inspector.live import LiveError, LiveSession
@@ -17,6 +16,7 @@ from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import column_signal, time_column
 from inspector.logs.read import read_log
 from inspector.reference import store
+from inspector.status import Status
 from inspector.text import counted, plain
 from inspector.verdict import classify_file
 from noiseclassifier import jsontext, noisytest

@@ -11,7 +11,7 @@ import pytest
 from commandline import call
 
 from inspector import read_log
-from inspector.analysis.level import Estimate, noise_level
+from inspector.analysis import Estimate, noise_level
 from inspector.errors import InspectorError, LogError
 from inspector.logs.mapping import ReadOptions
 from noisemodel import MeshError, Robot, RobotError, Run, RunError, meshes

@@ -22,7 +22,7 @@ import numpy as np
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector import tune, verdict
-from inspector.analysis.analyse import analyse
+from inspector.analysis import analyse
 from inspector.assets import model_files
 from inspector.errors import InspectorError
 from inspector.labelfiles import read_labels

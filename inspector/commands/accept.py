@@ -41,7 +41,6 @@ def accept(
     from fnmatch import fnmatchcase
 
     from inspector import assets
-    from inspector.analysis.status import Status
     from inspector.errors import InspectorError
     from inspector.library import load_library
     from inspector.logs.read import sources
@@ -55,6 +54,7 @@ def accept(
         wanted_in,
         who,
     )
+    from inspector.status import Status
     from inspector.verdict import classify_files
 
     if os.environ.get("CI", "").lower() in ("true", "1") and not in_ci:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from inspector.analysis.status import OUTPUT_LOST, Status, Unknown, worst
 from inspector.commands.options import (
     BadInput,
     Dask,
@@ -26,11 +25,12 @@ from inspector.commands.options import (
     say_assumed,
 )
 from inspector.commands.outputs import files_of, tried, written
+from inspector.status import OUTPUT_LOST, Status, Unknown, worst
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from inspector.analysis.analyse import Analysis
+    from inspector.analysis import Analysis
     from inspector.library import Library
     from inspector.logs.read import Source
     from inspector.reference.verdicts import References

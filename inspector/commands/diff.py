@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.analysis.status import OUTPUT_LOST, Unknown, worst
 from inspector.commands.options import (
     BadInput,
     Dask,
@@ -21,6 +20,7 @@ from inspector.commands.options import (
     jobs_or_dask,
 )
 from inspector.commands.outputs import files_of, tried, written
+from inspector.status import OUTPUT_LOST, Unknown, worst
 
 if TYPE_CHECKING:
     from inspector.library import Library

@@ -72,7 +72,7 @@ def export(
     library = load_library(assets.model_files(model))
     recorded = opened(run, reading).run
     if labels:
-        from inspector.analysis.analyse import analyse
+        from inspector.analysis import analyse
         from inspector.labelfiles import write_labels
 
         findings = labels is Labels.FINDINGS

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from inspector.analysis.status import EXIT, Status
 from inspector.commands.options import Overwrite
+from inspector.status import EXIT, Status
 
 
 def history(

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from inspector.analysis.status import EXIT, OUTPUT_LOST, Status, worst
 from inspector.commands.options import Overwrite
+from inspector.status import EXIT, OUTPUT_LOST, Status, worst
 
 if TYPE_CHECKING:
     from inspector.logs.read import Reading

@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from inspector.analysis.status import OUTPUT_LOST, worst
 from inspector.commands.classify import Format, OutputFormat, say_lost
 from inspector.commands.options import Overwrite, Write
 from inspector.commands.outputs import files_of, tried, written
+from inspector.status import OUTPUT_LOST, worst
 
 
 def merge(

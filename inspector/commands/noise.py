@@ -98,7 +98,7 @@ def _print_levels(
     run: Path, reading: "Reading", kinds: list[str], csv: Path | None, *, overwrite: bool
 ) -> None:
     """Print the noise levels of a run, and write the noise over time."""
-    from inspector.analysis.level import default_kinds, estimate, noise_level, write_csv
+    from inspector.analysis import default_kinds, estimate, noise_level, write_csv
 
     recorded = opened(run, reading).run
     say_warnings(recorded)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.analysis.status import EXIT, Status
 from inspector.commands.options import (
     Floor,
     Kind,
@@ -19,9 +18,10 @@ from inspector.commands.options import (
     one_at_a_time,
     opened,
 )
+from inspector.status import EXIT, Status
 
 if TYPE_CHECKING:
-    from inspector.analysis.analyse import Analysis
+    from inspector.analysis import Analysis
     from inspector.library import Library
     from inspector.logs.read import Opened, Reading
     from inspector.reference.judging import Comparison
@@ -187,7 +187,7 @@ def _picture(
     overwrite: bool,
 ) -> None:
     """Write a PNG of what the viewer shows, without a display."""
-    from inspector.analysis.analyse import analyse_file
+    from inspector.analysis import analyse_file
     from inspector.recording import picture as screenshot
     from inspector.recording.run import write
     from inspector.sound import worst_time
@@ -225,7 +225,7 @@ def _page(
     overwrite: bool,
 ) -> None:
     """Write one HTML page about a run: pictures, tables, sound."""
-    from inspector.analysis.analyse import analyse_file
+    from inspector.analysis import analyse_file
     from inspector.audit import text
     from inspector.report import html
 
@@ -321,7 +321,7 @@ def _one(
     overwrite: bool,
 ) -> float:
     """Write the recording of a run; returns the time of its worst moment, in [s]."""
-    from inspector.analysis.analyse import analyse_file
+    from inspector.analysis import analyse_file
     from inspector.recording.run import write
     from inspector.report.markdown import sentence
     from inspector.sound import of_recording, worst_time

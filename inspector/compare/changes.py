@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector.analysis.analyse import Analysis
-from inspector.analysis.loudest import worst_signal
+from inspector.analysis import Analysis, worst_signal
 from inspector.compare.pair import Pair
 from inspector.report.markdown import spoken
 from inspector.spectrogram import Spectrogram, spectrogram

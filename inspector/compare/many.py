@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rerun.blueprint import Blueprint
 
 from inspector import colors, levels
-from inspector.analysis.analyse import Analysis, analyse
+from inspector.analysis import Analysis, analyse
 from inspector.levels import FLOOR_DB, velocity_levels
 from inspector.library import Library
 from inspector.logs.read import Opened

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import noisemodel as nm
-from inspector.analysis.analyse import Analysis, analyse, robot_known, with_links
+from inspector.analysis import Analysis, analyse, robot_known, with_links
 from inspector.compare.alignment import Align, Alignment, align
 from inspector.errors import InspectorError
 from inspector.library import Library

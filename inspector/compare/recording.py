@@ -12,8 +12,7 @@ from rerun.blueprint import Blueprint
 from rerun.urdf import UrdfTree
 
 from inspector import colors
-from inspector.analysis.analyse import Analysis
-from inspector.analysis.loudest import worst_joint
+from inspector.analysis import Analysis, worst_joint
 from inspector.compare.changes import (
     NEW,
     Change,

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from inspector.analysis.status import EXIT, Status
 from inspector.live.session import Summary
+from inspector.status import EXIT, Status
 from inspector.verdict import Verdict, counts
 from inspector.version import program_version
 from noiseclassifier import Event

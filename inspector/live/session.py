@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import noisemodel as nm
-from inspector.analysis.analyse import headline, status_of
-from inspector.analysis.status import Status
+from inspector.analysis import headline, status_of
 from inspector.library import Library, for_robot, load_library
 from inspector.live.drawing import SHOWN, Contents, Drawing, Lane, SpectrogramStream, layout
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
@@ -29,6 +28,7 @@ from inspector.live.samples import (
     widths_of,
 )
 from inspector.live.sink import Sink
+from inspector.status import Status
 from inspector.wrongrobot import LONG, LimitWatch, check_joints
 from noiseclassifier import Event, merged
 from noisemodel.files import beyond, limit

@@ -106,7 +106,7 @@ def widget_class() -> Any:
 
 
 def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:
-    from inspector.analysis.analyse import analyse_file
+    from inspector.analysis import analyse_file
     from inspector.library import load_library
     from inspector.recording.run import write
     from inspector.sound import of_recording

@@ -16,9 +16,7 @@ from rerun.components import MarkerShapeLike
 from rerun.urdf import UrdfTree
 
 from inspector import colors, levels
-from inspector.analysis.analyse import Analysis
-from inspector.analysis.loudest import SHOWN, chosen
-from inspector.analysis.moments import Moment, gaps
+from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps
 from inspector.levels import Scale
 from inspector.orders import orders
 from inspector.recording import axes, robot, unstable

@@ -11,9 +11,7 @@ import rerun as rr
 from rerun.urdf import UrdfTree
 
 from inspector import levels
-from inspector.analysis.analyse import Analysis
-from inspector.analysis.loudest import worst_joint, worst_signal
-from inspector.analysis.moments import worst
+from inspector.analysis import Analysis, worst, worst_joint, worst_signal
 from inspector.recording import axes, framing, panels, robot, unstable
 from inspector.recording.layout import Contents, layout
 from inspector.reference.judging import Comparison

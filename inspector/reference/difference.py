@@ -13,8 +13,6 @@ from statistics import median
 
 import numpy as np
 
-from inspector.analysis.status import EXIT, Status, Unknown
-from inspector.analysis.status import worst as worst_code
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library
 from inspector.logs.read import Source, sources
@@ -22,6 +20,8 @@ from inspector.reference.judging import Comparison, Kind, compare, share_of_moti
 from inspector.reference.levels import HOP, Levels
 from inspector.reference.store import Reference, levels_of, of_runs
 from inspector.reference.verdicts import References
+from inspector.status import EXIT, Status, Unknown
+from inspector.status import worst as worst_code
 from inspector.verdict import EXPECTED, Verdict, classify_files
 from noiseclassifier import Event
 from noiseclassifier.labels import interval

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from inspector.analysis.status import EXIT, Status
 from inspector.reference.difference import (
     BROKEN,
     LOUDER,
@@ -21,6 +20,7 @@ from inspector.report import cases
 from inspector.report.cases import DIFF_MARKER, Case, Job
 from inspector.report.cases import Outcome as OfTest
 from inspector.report.findings import table
+from inspector.status import EXIT, Status
 from inspector.text import counted
 from inspector.version import program_version
 

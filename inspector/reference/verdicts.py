@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inspector.analysis.analyse import Analysis
-from inspector.analysis.status import Status
+from inspector.analysis import Analysis
 from inspector.library import Library
 from inspector.logs.read import Reading
 from inspector.reference.judging import (
@@ -23,6 +22,7 @@ from inspector.reference.judging import (
 )
 from inspector.reference.levels import HOP, Levels, levels
 from inspector.reference.store import NAME, Reference, find, scenario_of
+from inspector.status import Status
 from inspector.verdict import Beside, Evidence, Missing, Ruled, Ruling, Verdict
 from noiseclassifier import UNKNOWN, Event
 

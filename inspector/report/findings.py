@@ -4,8 +4,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from inspector.analysis.status import Status
 from inspector.report.localisation import words
+from inspector.status import Status
 from inspector.text import counted
 from inspector.verdict import Verdict
 from noiseclassifier import Event

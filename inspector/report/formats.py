@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.report import cases
 from inspector.report.cases import Case, Job, Outcome
 from inspector.report.findings import (
@@ -25,6 +24,7 @@ from inspector.report.findings import (
     table,
     timeline,
 )
+from inspector.status import IGNORED, Status, Unknown
 from inspector.text import counted
 from inspector.verdict import Verdict, counts, exit_status
 from inspector.version import program_version

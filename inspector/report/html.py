@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from inspector.analysis.analyse import Analysis
+from inspector.analysis import Analysis
 from inspector.errors import InspectorError
 from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
 from inspector.sound import clip, worst_time

@@ -8,13 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from inspector.analysis.analyse import Analysis
-from inspector.analysis.status import Status
+from inspector.analysis import Analysis
 from inspector.colors import of_classes
 from inspector.errors import InspectorError
 from inspector.report.findings import COUNTED, excused, failing
 from inspector.report.formats import summary
 from inspector.report.html import STYLE, add_text, document
+from inspector.status import Status
 from inspector.verdict import Verdict
 from noisemodel.files import replacing
 

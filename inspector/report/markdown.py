@@ -1,6 +1,6 @@
 """The report of a recording, in Markdown."""
 
-from inspector.analysis.analyse import Analysis
+from inspector.analysis import Analysis
 from inspector.localisation.links import fault_links
 from inspector.localisation.localise import has_stages
 from inspector.report.localisation import words

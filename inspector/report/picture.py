@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inspector import colors, levels
-from inspector.analysis.analyse import Analysis
-from inspector.analysis.loudest import chosen, worst_joint, worst_signal
-from inspector.analysis.moments import gaps
+from inspector.analysis import Analysis, chosen, gaps, worst_joint, worst_signal
 from inspector.levels import Scale
 from inspector.orders import orders
 from inspector.report.markdown import classes_of, spoken

@@ -1,4 +1,4 @@
-"""The analysis of a run: labels, findings, audit, status and remarks, decided here for all outputs.
+"""The analysis of a run: labels, findings, audit, status, and how loud it is.
 
 `classify`, `view`, `report`, comparisons of two runs, `export`, `inspector.show` and the summary of
 `live` print what an `Analysis` says; none of them decides again.
@@ -15,12 +15,11 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.audit_signals import without_placeholder
 from inspector.errors import InspectorError
 from inspector.hold import without_hold
-from inspector.levels import velocity_levels
+from inspector.levels import FLOOR_DB, STEP, velocity_levels
 from inspector.library import (
     CannotTellError,
     Labelled,
@@ -31,14 +30,19 @@ from inspector.library import (
 )
 from inspector.localisation.extent import extent
 from inspector.logs.read import Opened, open_run
+from inspector.status import IGNORED, Status, Unknown
 from noiseclassifier import Event
 from noiseclassifier.lasting import HOP as LASTING_HOP
 from noiseclassifier.lasting import MARGIN as LASTING_MARGIN
 from noiseclassifier.lasting import WINDOW as LASTING_WINDOW
 from noiseclassifier.lasting import joined
+from noisemodel import Block, Run
+from noisemodel.extended import vibrating
+from noisemodel.files import replacing
 from noisemodel.robot import is_name
 from noisemodel.run import is_robot_file
-from noisemodel.types import Array
+from noisemodel.runfile import pieces
+from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
@@ -285,12 +289,6 @@ def analyse_noise(
     Args:
         time: Uniform, shape (samples,), in [s].
         noise: Shape (samples,), in [rad/s].
-        library: Models to choose from.
-        name: Name of the log.
-        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
-
-    Returns:
-        The analysis, without an audit, of a run of one joint.
     """
     uniform = float(time[0]) + np.arange(len(time)) / nc.nominal_rate(time)
     run = nm.Run(time=uniform, velocity=noise[:, None], joint_names=("noise",))
@@ -336,20 +334,7 @@ def analyse_file(
 
 
 def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysis:
-    """Add the noise link by link, if the run names a robot that is known and holds positions.
-
-    Args:
-        analysis: Of a run.
-        kind: Kind of the extended noise, see ``noisemodel.extended``; empty for none.
-        terms: Whether to compute the paper's terms A, B and C one by one.
-
-    Returns:
-        The analysis with the links' noise, and with what the run lacks.
-
-    Raises:
-        RobotError: If the robot cannot be read, or lacks one of the run's joints.
-        InspectorError: If the robot's shape cannot be had.
-    """
+    """Add the noise link by link, if the run names a robot that is known and holds positions."""
     from noisemodel.extended import link_noise
 
     run = analysis.run
@@ -426,3 +411,252 @@ def _missing(run: nm.Run) -> Iterator[str]:
     lost = int((~run.mask).sum())
     if lost:
         yield f"{lost} samples lie in gaps; frames that touch one are not labelled."
+
+
+MOST = 3
+LOUDEST = "loudest"
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A stretch of a run, and where in it the noise is loudest.
+
+    Attributes:
+        label: Its class; ``loudest`` where nothing was found or annotated.
+        start: In [s].
+        stop: In [s].
+        peak: Middle of its loudest 50 ms, in [s].
+    """
+
+    label: str
+    start: float
+    stop: float
+    peak: float
+
+    @property
+    def failure(self) -> bool:
+        """Whether it was found, or annotated, to be one."""
+        return self.label != LOUDEST
+
+
+def gaps(run: Run) -> list[tuple[float, float]]:
+    """Start and stop of each gap, in [s]."""
+    lost = np.concatenate(([False], ~run.mask, [False]))
+    edges = np.flatnonzero(lost[1:] != lost[:-1]).reshape(-1, 2)
+    last = len(run.time) - 1
+    return [
+        (float(run.time[first]), float(run.time[min(stop, last)])) for first, stop in edges.tolist()
+    ]
+
+
+def worst(analysis: Analysis) -> tuple[Moment, ...]:
+    """Pick the findings whose noise vibrates most, up to three.
+
+    Where nothing was found, annotated failures take their place, and without these the loudest
+    moment of the run.
+    """
+    run = analysis.run
+    failures: Sequence[Event | Block] = analysis.findings or [
+        block for block in run.blocks if block.label != "ok"
+    ]
+    stretches = [(failure.label, failure.start, failure.stop) for failure in failures]
+    begin, end = float(run.time[0]), float(run.time[-1])
+    time, level = _noise_level(analysis)
+    found = []
+    for label, start, stop in stretches or [(LOUDEST, begin, end)]:
+        inside = np.flatnonzero((time >= start - STEP / 2) & (time <= stop + STEP / 2))
+        if len(inside):
+            peak = inside[level[inside].argmax()]
+            moment = Moment(label, max(start, begin), min(stop, end), float(time[peak]))
+            found.append((float(level[peak]), moment))
+    found.sort(key=lambda pair: -pair[0])
+    return tuple(moment for _, moment in found[:MOST])
+
+
+def _noise_level(analysis: Analysis) -> tuple[Array, Array]:
+    """Level of the noise above 10 Hz, every 50 ms: middles of the steps and values, in [dB]."""
+    run = analysis.run
+    starts, level = analysis.noise_level
+    stop = float(run.time[-1]) + 1.0 / run.rate
+    middles = (starts + np.append(starts[1:], stop)) / 2
+    return middles, np.nan_to_num(level[:, 0], nan=FLOOR_DB)
+
+
+SHOWN = 8
+"""Joints and links that have a row in a picture."""
+
+
+def worst_joint(analysis: Analysis) -> int:
+    """Column of the joint that the worst finding is localised at; else that of the loudest."""
+    moment = worst(analysis)[:1]
+    for event, known in analysis.localisations.items() if analysis.findings and moment else ():
+        if known.joints and event.start <= moment[0].peak <= event.stop:
+            return analysis.run.joint_names.index(known.joints[0][0])
+    _, level = analysis.joint_levels
+    power = np.nansum(10.0 ** (level / 10.0), axis=0)
+    return int(np.argmax(power))
+
+
+def worst_signal(analysis: Analysis, joint: int) -> Array:
+    """Velocity of a joint above 10 Hz, shape (samples,), in [rad/s] or [m/s].
+
+    The noise is a norm, in which a vibration of 35 Hz has 70 Hz.
+    """
+    run = analysis.run
+    own = [run.velocity[rows][:, joint].astype(np.float64) for rows in pieces(run.velocity)]
+    return np.asarray(vibrating(np.concatenate(own)[:, None], run.mask, run.rate)[:, 0])
+
+
+def chosen(analysis: Analysis, time: Array, level: Array) -> list[int]:
+    """Columns of those that are loudest during findings, or at any time of a run without.
+
+    Args:
+        time: Starts of the steps, shape (steps,), in [s].
+        level: Shape (steps, columns), in [dB]; NaN in gaps.
+    """
+    inside = np.zeros(len(time), dtype=bool)
+    for event in analysis.findings:
+        inside |= (time > event.start - STEP) & (time < event.stop)
+    shown = level[inside] if inside.any() else level
+    peaks = np.where(np.isnan(shown), -np.inf, shown).max(axis=0, initial=-np.inf)
+    return sorted(np.argsort(-peaks, kind="stable")[:SHOWN].tolist())
+
+
+KINDS = ("simplified", *nm.KINDS)
+
+
+@dataclass(frozen=True)
+class NoiseLevel:
+    """A run's noise in numbers, by one estimate.
+
+    Attributes:
+        kind: "simplified", or a kind of the extended noise.
+        unit: Of ``rms`` and ``peak``: the square root of the power.
+        rms: Root mean square.
+        peak: Largest value.
+        peak_time: When that is, in [s].
+        shares: Share of each joint or link in the power, largest first; they add up to 1.
+        remarks: What this estimate leaves out, a sentence each.
+    """
+
+    kind: str
+    unit: str
+    rms: float
+    peak: float
+    peak_time: float
+    shares: tuple[tuple[str, float], ...]
+    remarks: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """The levels in lines."""
+        head = f"{self.kind}: rms {self.rms:.4g} {self.unit}, peak {self.peak:.4g} {self.unit}"
+        rows = [f"  {share:6.1%}  {name}" for name, share in self.shares if share >= 0.001]
+        remarks = [f"  {remark}" for remark in self.remarks]
+        return "\n".join([f"{head} at {self.peak_time:.3f} s", *rows, *remarks])
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A noise over time.
+
+    Attributes:
+        kind: "simplified", or a kind of the extended noise.
+        unit: Of the pressure.
+        power: Power of each part, shape (samples, parts), in [unit²].
+        parts: Joints or links.
+        remarks: What the estimate leaves out, a sentence each.
+    """
+
+    kind: str
+    unit: str
+    power: Array
+    parts: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def pressure(self) -> Array:
+        """Square root of the whole power, shape (samples,), in [unit]."""
+        return np.asarray(np.sqrt(self.power.sum(axis=1)))
+
+
+def default_kinds(run: Run) -> tuple[str, ...]:
+    """Take the simplified noise, and the paper's whole sum beside it where the run allows."""
+    whole = robot_known(run) and run.position is not None
+    return ("simplified", "paper") if whole else ("simplified",)
+
+
+def estimate(run: Run, kind: str, *, geometry: str = "auto") -> Estimate:
+    """Compute a noise over time."""
+    if kind == "simplified":
+        return _simplified(run)
+    if kind not in nm.KINDS:
+        raise nm.UnknownKindError(kind, KINDS)
+    if run.robot is None or not robot_known(run):
+        raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {run.robot!r}")
+    robot = nm.Robot.load(run.robot, floating_base=True if run.base_pose is not None else None)
+    surface = nm.Surface.of(robot, geometry)
+    q_desired, v_desired = robot.desired(run) or (None, None)
+    noise = nm.extended(
+        robot, surface, *robot.configuration(run), kind, q_desired=q_desired, v_desired=v_desired
+    )
+    without_geometry = (
+        (f"links without geometry: {', '.join(surface.without_geometry)}",)
+        if surface.without_geometry
+        else ()
+    )
+    return Estimate(kind, "√W", noise.power, noise.names, without_geometry)
+
+
+def noise_level(run: Run, estimate: Estimate) -> NoiseLevel:
+    """Sum an estimate up."""
+    pressure = np.where(run.mask, estimate.pressure, 0.0)
+    if not np.isfinite(pressure).all():
+        sample = int(np.argmin(np.isfinite(pressure)))
+        raise InspectorError(
+            f"the {estimate.kind} noise is {pressure[sample]:g} at {run.time[sample]:.6g} s: the"
+            " run's motion or the size of the robot is no robot's"
+        )
+    energy = estimate.power[run.mask].sum(axis=0)
+    shares = energy / (energy.sum() or 1.0)
+    order = np.argsort(-shares, kind="stable")
+    return NoiseLevel(
+        kind=estimate.kind,
+        unit=estimate.unit,
+        rms=float(np.sqrt(np.mean(pressure[run.mask] ** 2))),
+        peak=float(pressure.max()),
+        peak_time=float(run.time[pressure.argmax()]),
+        shares=tuple((estimate.parts[i], float(shares[i])) for i in order),
+        remarks=estimate.remarks,
+    )
+
+
+def write_csv(
+    run: Run, estimates: tuple[Estimate, ...], path: Path, *, overwrite: bool = False
+) -> None:
+    """Write time and noises as CSV."""
+    columns = np.column_stack((run.time, *(estimate.pressure for estimate in estimates)))
+    names = ["time [s]", *(f"{estimate.kind} [{estimate.unit}]" for estimate in estimates)]
+    with replacing(path, overwrite=overwrite) as temporary:
+        np.savetxt(
+            temporary,
+            columns[run.mask],
+            fmt="%.9g",
+            delimiter=",",
+            header=",".join(names),
+            comments="",
+            encoding="utf-8",
+        )
+
+
+def _simplified(run: Run) -> Estimate:
+    def power(signal: Real) -> Array:
+        return np.square(signal.astype(np.float64))
+
+    parts, powers = list(run.joint_names), [power(run.velocity)]
+    if run.velocity_desired is not None:
+        parts += [f"{name}, desired" for name in run.desired_joint_names]
+        powers.append(power(run.velocity_desired))
+    if run.base_velocity is not None:
+        parts.append("base")
+        powers.append(power(run.base_velocity).sum(axis=1, keepdims=True))
+    return Estimate("simplified", "rad/s", np.hstack(powers), tuple(parts))

@@ -1,1 +1,0 @@
-"""Analysis of a run: labels, findings, audit, status."""
