@@ -89,15 +89,15 @@ def test_a_log_held_at_ten_hertz_has_the_status_cannot_tell_in_every_output():
     held = Run(time=np.arange(5000) / RATE, velocity=velocity, joint_names=("a", "b"))
     found = analyse(held, LIBRARY)
     assert found.status is Status.CANNOT_TELL
-    assert "measured values are held: rate of 10 Hz" in found.headline
+    assert "measured values are held: logged at 10 Hz" in found.headline
     assert found.reason == found.message
 
 
 def test_a_run_without_a_fitting_model_has_the_status_cannot_tell_and_a_reason():
     found = analyse(moving(rate=50.0), LIBRARY)
     assert (found.status, found.labels, found.findings) == (Status.CANNOT_TELL, None, ())
-    assert "rate of 50 Hz" in found.reason
-    assert any(remark.startswith("No labels: rate of 50 Hz") for remark in found.remarks)
+    assert "logged at 50 Hz" in found.reason
+    assert any(remark.startswith("No labels: logged at 50 Hz") for remark in found.remarks)
 
 
 def test_an_analysis_names_its_model_and_the_hash_of_its_file():

@@ -160,8 +160,8 @@ def test_a_rate_below_every_model_shows_everything_but_the_lanes(inspector, tmp_
     run = run_without_robot(tmp_path / "slow.npz", rate=50.0, seconds=20.0)
     status, out, _ = inspector("view", run, "--save", tmp_path / "slow.rrd")
     assert status == 0
-    assert "cannot-tell: rate of 50 Hz" in out
-    assert "No labels: rate of 50 Hz" in out
+    assert "cannot-tell: logged at 50 Hz" in out
+    assert "No labels: logged at 50 Hz" in out
     assert (tmp_path / "slow.rrd").exists()
     status, out, _ = inspector("classify", run)
     assert status == 4

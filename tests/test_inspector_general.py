@@ -78,8 +78,8 @@ def test_the_rate_that_is_needed_shows_all_oscillations(rate):
 def test_below_80_hz_there_is_no_verdict_and_the_rate_that_is_needed_is_told_once(rate):
     found = analyse(run_at(rate, seconds=8.0), LIBRARY)
     assert found.status is Status.CANNOT_TELL
-    assert f"rate of {rate:g} Hz" in found.message
-    assert "log at 80 Hz or above" in found.message
+    assert f"logged at {rate:g} Hz" in found.message
+    assert "the model needs 80 Hz or more" in found.message
     assert sum("80 Hz" in remark for remark in found.remarks) == 1
     assert {each.needed for each in found.audit.classes} == {80.0}
 
@@ -155,8 +155,7 @@ def test_values_held_at_less_than_80_hz_have_no_verdict():
     found = analyse(held(run_at(40.0, seconds=20.0), 25), LIBRARY)
     assert found.status is Status.CANNOT_TELL
     assert found.message == (
-        "measured values are held: rate of 40 Hz; the models' rates are 80 Hz: too low for any;"
-        " log at 80 Hz or above"
+        "measured values are held: logged at 40 Hz, the model needs 80 Hz or more"
     )
 
 
@@ -166,7 +165,7 @@ def test_a_model_of_one_rate_labels_a_held_log_at_that_rate():
     whole = fixed().classify(signals_of(log), 1000.0)
     np.testing.assert_array_equal(labelled.labels.scores, whole.scores)
     assert "Labelled" not in labelled.remark
-    with pytest.raises(CannotTellError, match="measured values are held: rate of 500 Hz"):
+    with pytest.raises(CannotTellError, match="measured values are held: logged at 500 Hz"):
         label_run(held(run_at(100.0), 5), FIXED)
 
 

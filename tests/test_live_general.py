@@ -46,7 +46,4 @@ def test_live_motion_above_10_khz_is_decimated(rate, lower):
 
 def test_live_motion_below_80_hz_has_no_labels():
     labeller = Labeller(LIBRARY, 50.0, {"velocity": 3})
-    assert labeller.remark == (
-        "No labels: rate of 50 Hz; the models' rates are 80 Hz: too low for any; log at 80 Hz or"
-        " above."
-    )
+    assert labeller.remark == ("No labels: logged at 50 Hz, the model needs 80 Hz or more.")

@@ -316,7 +316,7 @@ def test_a_folder_is_ranked_in_one_table(folder):
     lines = out.splitlines()
     assert lines[0] == "3 episodes, the smoothest first by level of the velocities above 10 Hz"
     assert [line.split()[1] for line in lines[4:7]] == ["smooth.npz", "middle.npz", "rough.npz"]
-    assert "flagged: empty, rate of 50 Hz" in out
+    assert "flagged: empty, logged at 50 Hz" in out
     assert lines[-1] == f"The roughest by >10 Hz: inspector view {folder / 'rough.npz'}"
     assert out.count("empty") == 1
 

@@ -63,5 +63,4 @@ def nearest(
         return name, found[name]
     if lacking and not rates:
         raise min(lacking, key=lambda error: len(error.lacking))
-    least = f"at {min(rates):g} Hz or above" if rates else "faster"
-    raise RateError(rate, rates, f"too low for any; log {least}")
+    raise RateError(rate, rates)

@@ -112,7 +112,7 @@ class Classifier:
             lacking = [name for name in self.profile.signals if name not in signals]
             raise MissingSignalError(lacking, signals)
         if self.rate > rate * (1.0 + NOMINAL):
-            raise RateError(rate, [self.rate], "too low for any; log faster")
+            raise RateError(rate, [self.rate])
         return self
 
     @property

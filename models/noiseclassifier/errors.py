@@ -48,13 +48,18 @@ class RateError(ModelsError):
     Args:
         rate: The rate that was given, in [Hz].
         known: The rates that there are, in [Hz].
-        advice: What to do about it.
+        advice: What to do about it; empty if the rate is too low for all.
     """
 
-    def __init__(self, rate: float, known: Iterable[float], advice: str) -> None:
+    def __init__(self, rate: float, known: Iterable[float], advice: str = "") -> None:
         self.rate, self.known = rate, tuple(sorted(set(known)))
         there = ", ".join(f"{each:g}" for each in self.known) or "none"
-        super().__init__(f"rate of {rate:g} Hz; the models' rates are {there} Hz: {advice}")
+        if advice or not self.known:
+            advice = advice or "there is no model"
+            super().__init__(f"rate of {rate:g} Hz; the models' rates are {there} Hz: {advice}")
+        else:
+            least = f"{self.known[0]:g} Hz or more"
+            super().__init__(f"logged at {rate:g} Hz, the model needs {least}")
 
 
 class FileError(ModelsError):

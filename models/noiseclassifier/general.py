@@ -160,7 +160,7 @@ class General:
             MissingSignalError: If there is none of the signals that it takes.
         """
         if rate < LOWEST * (1.0 - TOLERANCE):
-            raise RateError(rate, [LOWEST], "too low for any; log faster")
+            raise RateError(rate, [LOWEST])
         taken = next((names for names in INPUTS if feeds(signals, names)), None)
         if taken is None:
             raise MissingSignalError([NOISE], signals)
