@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from inspector.analysis import Analysis, analyse  # type: ignore[no-redef] # of a cycle
+    from inspector.analysis import Analysis, analyse  # type: ignore[no-redef,unused-ignore] # of a cycle
     from inspector.library import load_library
     from inspector.live import LiveSession
     from inspector.logs.motion import Imported
