@@ -14,6 +14,7 @@ from rerun.chunk import RrdReader
 import inspector
 import noisemodel as nm
 from inspector import assets
+from inspector.analysis.analyse import analyse
 from inspector.library import label_run, load_library
 from inspector.live import LiveError
 from inspector.live.session import BATCH
@@ -285,6 +286,42 @@ def test_missing_samples_end_the_lane_and_labels_resume_after_them(tmp_path, lib
     time, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(time, (batch.start + batch.stop) / 2, atol=1e-6)
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
+
+
+def as_live(signals, kind):
+    """A motion with one thing wrong."""
+    time, velocity = signals["time"], signals["velocity"]
+    if kind == "a knock":
+        velocity[2000:2010] += 0.5
+    elif kind == "a chatter from the first sample to the last":
+        velocity[:, 1] += 0.05 * np.sin(2 * np.pi * 35.0 * time)
+    elif kind == "a hum that lasts to the end":
+        late = time >= 2.6
+        velocity[late] += 0.1 * np.sin(2 * np.pi * 90.0 * time[late])[:, None]
+    return signals
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["nothing", "a knock", "a chatter from the first sample to the last",
+     "a hum that lasts to the end"],
+)  # fmt: skip
+def test_live_finds_what_classify_finds_on_the_same_samples(tmp_path, library, kind):
+    """By design, live tells times by whole frames: onset and end are estimated of whole runs."""
+    signals = as_live(motion(4.0, hum=(9.0, 9.0)), kind)
+    _, _, summary = shown(tmp_path, signals, range(70, 4000, 70), library=library)
+    run = nm.Run(joint_names=("a", "b", "c"), **signals)
+    whole = analyse(run, library)
+    assert bool(whole.findings) == (kind != "nothing")
+    assert summary.status == whole.status
+    assert [each.label for each in summary.findings] == [each.label for each in whole.findings]
+    for live, span, finding in zip(summary.findings, whole.spans, whole.findings, strict=True):
+        # The last frame of a whole run is flush with its end, which a stream does not know before.
+        assert live.start == pytest.approx(span.start, abs=1e-6)
+        assert span.stop - 0.1 - 1e-6 <= live.stop <= span.stop + 1e-6
+        assert live.score == pytest.approx(span.score, abs=1e-6)
+        assert 0.0 <= finding.start - live.start <= 0.41  # a frame
+        assert -0.11 <= live.stop - finding.stop <= 0.41
 
 
 @pytest.mark.parametrize(
