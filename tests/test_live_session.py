@@ -14,7 +14,7 @@ from rerun.chunk import RrdReader
 import inspector
 import noisemodel as nm
 from inspector import assets
-from inspector.analysis.analyse import analyse
+from inspector.analysis import analyse
 from inspector.library import label_run, load_library
 from inspector.live import LiveError
 from inspector.live.session import BATCH
