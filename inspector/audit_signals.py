@@ -110,7 +110,7 @@ def _square(amplitude: NDArray[np.complex128]) -> Array:
 EXACT = 1e-12
 """Largest deviation of a difference of positions, as a share of the largest velocity."""
 
-COMPARED = 5000
+COMPARED = 1000
 """Samples that are compared, evenly spread, or a few more."""
 
 COARSE = 1e-4
@@ -439,6 +439,10 @@ SAME = 0.99
 """Least share of equal samples, bit for bit, among those in motion."""
 
 
+PROBED, LIKELY = 50, 0.9
+"""Samples by which a lag is looked at first, and the share of equal ones from which it is again."""
+
+
 @dataclass(frozen=True)
 class Copy:
     """A measured signal that equals the desired one.
@@ -461,7 +465,11 @@ def copies(run: Run) -> tuple[Copy, ...]:
         measured, desired = getattr(run, signal), getattr(run, f"{signal}_desired")
         if measured is None or desired is None or derived(run, signal):
             continue
-        actual, wanted = (np.ascontiguousarray(each[run.mask].T) for each in (measured, desired))
+        whole = run.mask.all()
+        actual, wanted = (
+            np.ascontiguousarray((each if whole else each[run.mask]).T)
+            for each in (measured, desired)
+        )
         lags = {}
         for name in (name for name in run.joint_names if name in run.desired_joint_names):
             lag = _lag(
@@ -476,15 +484,18 @@ def copies(run: Run) -> tuple[Copy, ...]:
 
 def _lag(measured: Real, desired: Real) -> int | None:
     """Find the shift at which two signals are equal, None if there is none."""
-    samples = len(measured)
     changes = np.flatnonzero(desired[1:] != desired[:-1])
-    for lag in sorted(range(-FARTHEST, FARTHEST + 1), key=abs):
-        ends = np.searchsorted(changes, (max(-lag, 0), samples - max(lag, 0) - 1))
-        moving = changes[slice(*ends)]
-        moving = moving[:: max(1, len(moving) // EXAMINED)]
-        equal = np.count_nonzero(measured[moving + lag] == desired[moving])
-        if len(moving) >= FARTHEST and equal >= SAME * len(moving):
-            return lag
+    ends = np.searchsorted(changes, (FARTHEST, len(measured) - FARTHEST - 1))
+    moving = changes[slice(*ends)]
+    moving = moving[:: max(1, len(moving) // EXAMINED)]
+    if len(moving) < FARTHEST:
+        return None
+    few = moving[:: max(1, len(moving) // PROBED)]
+    lags = np.array(sorted(range(-FARTHEST, FARTHEST + 1), key=abs))
+    alike = (measured[few[:, None] + lags] == desired[few][:, None]).mean(axis=0)
+    for lag in lags[alike >= LIKELY].tolist():
+        if np.mean(measured[moving + lag] == desired[moving]) >= SAME:
+            return int(lag)
     return None
 
 
