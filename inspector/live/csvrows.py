@@ -9,6 +9,7 @@ import numpy as np
 from inspector.live.rows import Note, Rows
 from inspector.live.samples import SIGNALS, LiveError
 from inspector.logs.clocks import UNITS
+from inspector.logs.csv import numbers_in
 from inspector.logs.names import (
     TIME_UNITS,
     Naming,
@@ -85,32 +86,10 @@ class CsvReader:
             yield Rows(signals, None if self._time is None else table[:, self._time] * self._second)
 
     def _read_numbers(self, lines: bytes) -> Array | None:
-        """Read rows of plain numbers, in half of the time; None if a cell is anything else.
-
-        Cells are converted as one array: beginning a hundred small columns costs as much again.
-        """
-        import pyarrow as pa
-
-        if b"\r" in lines:
-            lines = lines.replace(b"\r\n", b"\n")
-        text = np.frombuffer(lines, dtype=np.uint8)
-        ends = text == ord("\n")
-        marks = ends | (text == ord(self._delimiter))
-        places = np.flatnonzero(marks)
-        lasts = places[len(self._header) - 1 :: len(self._header)]
-        rows = np.count_nonzero(ends)
-        if len(places) != rows * len(self._header) or not ends[lasts].all():
-            return None  # a row is too short or too long
-        edges = np.zeros(len(places) + 1, dtype=np.int32)  # of cells, once the marks are gone
-        edges[1:] = places - np.arange(len(places))
-        written = lines.translate(None, b"\n" + self._delimiter.encode())
-        cells = pa.StringArray.from_buffers(len(places), pa.py_buffer(edges), pa.py_buffer(written))
-        try:
-            numbers = cells.cast(pa.float64())
-        except pa.ArrowInvalid:  # such as cells that are empty, quoted or padded
-            return None
-        table: Array = numbers.to_numpy().reshape(rows, len(self._header))
-        return table
+        """Read rows of plain numbers; None if a cell is anything else."""
+        columns = range(len(self._header))
+        found = numbers_in(lines, len(columns), self._delimiter, columns)
+        return None if found is None else found[0]
 
     def _read_table(self, lines: bytes) -> Array | None:
         """Read rows that are all well formed; None if one is not."""
