@@ -471,6 +471,26 @@ def test_names_that_two_rules_claim_are_named_with_the_option_to_type(tmp_path):
         read_log(path)
 
 
+def test_a_quaternion_is_no_four_joints(tmp_path):
+    turn = np.column_stack([np.cos(T6), np.sin(T6), 0 * T6, 0 * T6])
+    path = written(tmp_path, f"t,{names('q#', 4, 0)}", T6, turn)
+    with pytest.raises(
+        InspectorError, match="q0, q1, q2, q3 hold a quaternion .* name them: --map"
+    ):
+        read_log(path)
+    assert len(read_log(path, mapping=["position.joint_{joint}=q{joint}"]).run.joint_names) == 4
+
+
+@pytest.mark.parametrize(
+    "header", ["t,x,y,angle", "t,cmd1,cmd2", "t,ref,y", "t,joint1_target,joint2_target", "t,u1,u2"]
+)
+def test_set_points_and_poses_are_no_measured_joints(tmp_path, header):
+    path = written(tmp_path, header, T6, Q6[:, : header.count(",")])
+    with pytest.raises(InspectorError, match="no position or velocity of a joint") as caught:
+        read_log(path)
+    assert "position.joint_{joint}" not in str(caught.value)
+
+
 def test_units_may_differ_by_column(tmp_path):
     path = written(tmp_path, "t,j1 [deg],j2 [rad]", T6, DEG * Q6[:, 0], Q6[:, 1])
     assert np.allclose(read_log(path).run.position, Q6[:, :2], rtol=1e-12)

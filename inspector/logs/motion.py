@@ -4,6 +4,7 @@ Degrees are converted, samples without a value and stretches in which a log froz
 clocks are synchronised, and missing velocities are differentiated.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -68,6 +69,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
         raise LogError(path, log.units)
     tracks, not_read, found = tracks_of(log, options, robot)
     remarks = [*log.remarks, *found]
+    _refuse_quaternion(path, tracks, options)
     tracks = _at_rate(path, tracks, options)
     tracks = _with_two_samples(path, tracks, remarks)
     tracks = tuple(_finite(path, _believable(path, tracks, remarks), remarks))
@@ -99,6 +101,21 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
         },
         in_degrees=in_degrees,
     )
+
+
+def _refuse_quaternion(path: Path, tracks: Sequence[Track], options: ReadOptions) -> None:
+    """Refuse four columns such as q0 to q3 that are one rotation, and no joints."""
+    for track in tracks:
+        names = [re.fullmatch(r"q_?\[?[wxyz\d]\]?", label.lower()) for label in track.labels]
+        given = options.columns or any(each.signal == "position" for each in options.entries)
+        if track.signal == "position" and len(names) == 4 and all(names) and not given:
+            norm = np.linalg.norm(np.asarray(track.values, dtype=np.float64), axis=1)
+            if np.isfinite(norm).all() and (np.abs(norm - 1) < 1e-3).all():
+                raise LogError(
+                    path,
+                    f"{listed(track.labels)} hold a quaternion (their norm is 1), not joints; if"
+                    " they are joints, name them: --map position.JOINT=COLUMN",
+                )
 
 
 def _at_rate(path: Path, tracks: Sequence[Track], options: ReadOptions) -> tuple[Track, ...]:

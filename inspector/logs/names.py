@@ -63,7 +63,7 @@ UNIT = re.compile(
 
 QUANTITIES = {
     "position": r"positions?|pos|angles?|q_?pos|q|theta",
-    "velocity": r"velocity|velocities|vel|speeds?|q_?vel|q_?dot|qd|dq|omega",
+    "velocity": r"velocity|velocities|vel|speeds?|q_?vel|q_?dot|theta_?dot|dtheta|qd|dq|omega",
     "effort": r"efforts?|eff|torques?|tau(?:_?j)?",
 }
 """Words of a quantity. ``qd`` is a velocity, ``q_d`` a desired position."""
@@ -88,7 +88,7 @@ LIMB = r"(?P<joint>(?:left|right|l|r|arm|leg|hand)\d*(?:_(?:left|right|arm|leg|h
 WHOSE = rf"(?:(?:output|shaft|rotor|encoder|angular|motor|joint){GAP})?"
 ALONE = (
     r"(?P<quantity>(?:joint|dof)_(?:pos|vel|positions?|velocity|velocities|efforts?|torques?)"
-    r"|positions?|pos|angles?|theta|velocity|velocities|vel|efforts?|torques?|applied_torque|tau"
+    r"|positions?|pos|angles?|velocity|velocities|vel|efforts?|torques?|applied_torque|tau"
     r"|q|qd|dq|q_?dot)"
 )
 
@@ -168,7 +168,7 @@ SIDED = re.compile(
 UNLIKELY = re.compile(
     rf"(?:.*{GAP})?(?:errors?|err|torques?|tau|effort|currents?|cur|amps?|volt(?:age|s)?|temp\w*"
     rf"|force|acc\w*|imu|gyro\w*|tcp|pose|end|fsm|state|status|mode|flags?|is|contact|id|index|seq"
-    rf"|{DESIRED})(?:{GAP}.*|\d*)|[xyz]|q[wxyz]|time.*|.*time|t",
+    rf"|u|{DESIRED})(?:{GAP}.*|[\[(]?\d*[\])]?)|[xyz]|q[wxyz]|time.*|.*time|t",
     re.IGNORECASE,
 )
 """Names that an example of what to type leaves out."""
@@ -223,12 +223,13 @@ class Naming:
             for signal, joint in (named | bare).values()
             if signal.startswith(("position", "velocity"))
         }
+        is_pose = {"x", "y"} <= {column.lower() for column in columns}  # beside x, y, an angle
         return cls(
             first=int(min(numbers, default=0) == 1),
             qd_is_desired={"dq", "qd"} <= words,
             bare=bare,
             remark=remark,
-            only=None if len(moved) > 1 else next(iter(moved.values()), ""),
+            only=None if len(moved) > 1 or is_pose else next(iter(moved.values()), ""),
         )
 
 
