@@ -216,19 +216,20 @@ def strong(window: Array, rate: float) -> list[tuple[int, float, float]]:
     if not loud.any():
         return []
     rows, places = np.nonzero(loud)
-    strength = np.full(len(rows), -np.inf)
+    median = np.empty((len(power), len(rows)))
     band = np.floor(np.log(frequency[places] / LOWEST) / np.log(BAND))
     for each in np.unique(band).tolist():
-        middle = LOWEST * BAND ** (each + 0.5)
-        around = slice(*np.searchsorted(frequency, (middle / AROUND, middle * AROUND)))
+        centre = LOWEST * BAND ** (each + 0.5)
+        around = slice(*np.searchsorted(frequency, (centre / AROUND, centre * AROUND)))
         own = np.flatnonzero(band == each)
-        there, which = np.unique(rows[own], return_inverse=True)
-        for signal in power:
-            median = np.median(signal[there, around], axis=-1)[which]
-            shared = np.minimum(line[rows[own], places[own]], signal[rows[own], places[own]])
-            found = 10.0 * np.log10(np.maximum(shared, TINY) / np.maximum(median, TINY))
-            level = 10.0 * np.log10(np.maximum(shared, TINY)) - FLOOR
-            strength[own] = np.maximum(strength[own], np.minimum(found, level))
+        beside = power[:, rows[own], around]
+        middle = beside.shape[-1] // 2
+        median[:, own] = np.partition(beside, middle, axis=-1)[..., middle]
+    # A line of both, at the level of the weaker one.
+    shared = np.maximum(np.minimum(line[rows, places], power[:, rows, places]), TINY)
+    level = 10.0 * np.log10(shared)
+    prominence = level - 10.0 * np.log10(np.maximum(median, TINY))
+    strength = np.minimum(prominence, level - FLOOR).max(axis=0)
     kept = np.flatnonzero(strength >= STRONG)
     return [(int(rows[k]), float(frequency[places[k]]), float(strength[k])) for k in kept.tolist()]
 
