@@ -43,7 +43,9 @@ SHOWN = (1000.0, 500.0, 250.0, 125.0)
 """Rates of the logs of targets, in [Hz]."""
 COPIES = 2
 """Logs of each run at 1 kHz and above, each of another logger; below, one."""
-EVERY = 3  # one log in so many is also learnt from in a piece that begins anywhere
+EVERY = 3
+"""One log in so many is also learnt from in a piece that begins anywhere, and one good log with a
+fault throughout: every frame of these is a failure, and all of them would outnumber the rest."""
 NAME = "general"
 DEMO = ("panda", "obstacle-full", 102, 4.0)
 CARD = """# {name}
@@ -55,9 +57,9 @@ unknown.
 Made by `make models`: profile `general`, trained on {runs} logs of {robots} robots: logs of wide
 domains (recipe {wide}, {domains} seeds of every source robot) at {rates} Hz, with faults of a while
 and of the whole run; copies of the good ones with faults added (scenarios/logs.py), of a while and
-throughout; pieces of one log in {every} that begin anywhere; and {seeds} seeds of every scenario at
-home (recipe {recipe}) of {home}, each without the part that is held out by hash. The model file has
-the hashes of all of them. Their licences allow anyone anything (docs/robots.md).
+throughout (one in {every}); pieces of one log in {every} that begin anywhere; and {seeds} seeds of
+every scenario at home (recipe {recipe}) of {home}, each without the part that is held out by hash.
+The model file has the hashes of all of them. Their licences allow anyone anything (docs/robots.md).
 
 Never learnt from: {targets}; impedance control, encoders of 13 bit or fewer, samples held four
 times or more; any real robot; any other simulator. Measures are defined in docs/metrics.md.
@@ -87,7 +89,7 @@ def main() -> None:
     for source in sources:
         inputs += [
             copies(source, "added", with_faults, GOOD),
-            copies(source, "throughout", with_fault_throughout, GOOD),
+            copies(source, "throughout", with_fault_throughout, GOOD, every=EVERY),
             copies(source, "pieces", beginning_anywhere, "", every=EVERY),
         ]
     model = build / f"{NAME}.npz"
