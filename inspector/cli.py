@@ -160,6 +160,8 @@ SHARED = {"model", "jobs"}
 """Settings of all commands, besides those on reading logs."""
 
 
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as of a shell."""
 UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.EROFS, errno.EIO)
 """Errors of the system about a path that a user typed, or of a disk: no bugs."""
 
@@ -303,6 +305,11 @@ class _Group(TyperGroup):
         except typer.BadParameter as error:
             error.message = error.message.removeprefix("Value error, ")  # of pydantic
             raise
+        except EOFError as error:  # typer would end with 1, the status of a finding
+            raise RuntimeError("a file ends too early") from error
+        except KeyboardInterrupt:
+            typer.echo("inspector: interrupted", err=True)
+            raise typer.Exit(INTERRUPTED) from None
 
 
 app = typer.Typer(

@@ -208,3 +208,19 @@ def test_a_backend_of_matplotlib_that_does_not_exist_does_not_matter(tmp_path):
     command = [sys.executable, "-m", "inspector", "view", demo_run(), "-o", tmp_path / "a.html"]
     done = subprocess.run(command, env=env, check=False, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "said"),
+    [
+        (EOFError, 70, "RuntimeError: a file ends too early"),
+        (KeyboardInterrupt, 130, "interrupted"),
+    ],
+)
+def test_an_end_that_is_no_finding_has_not_its_exit_status(monkeypatch, error, status, said):
+    def ends(*_, **__):
+        raise error
+
+    monkeypatch.setattr("inspector.library.load_library", ends)
+    found, _, err = call("classify", demo_run())
+    assert (found, said in err, "Aborted" in err) == (status, True, False)
