@@ -188,7 +188,8 @@ class Tuned:
                 axes.set_xticks(places, values)
             elif min(values) > 0 and max(values) >= 100 * min(values):
                 axes.set_xscale("log")
-            axes.set_xlabel(f"{name}, best: {values[place]}")
+            best_value = getattr(best, name)
+            axes.set_xlabel(f"{name}, best: {best_value if words else format(best_value, '.6g')}")
             axes.grid(alpha=0.4)
         row[0].set_ylabel("share of frames, or mean recall")
         row[0].legend(fontsize=8)
