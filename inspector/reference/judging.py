@@ -527,11 +527,11 @@ def _raised(level: NDArray[np.float32], floor: NDArray[np.float32]) -> NDArray[n
 
 def _spread(level: NDArray[np.float32]) -> NDArray[np.float32]:
     """The loudest within some frames to each side; NaN where none is known."""
-    from scipy.ndimage import maximum_filter1d
-
-    lowered = np.where(np.isnan(level), np.float32(-np.inf), level)
-    loud = maximum_filter1d(lowered, 2 * NEIGHBOURS + 1, axis=0, mode="nearest")
-    return np.where(np.isfinite(loud), loud, np.float32(np.nan))
+    loud = level.copy()
+    for shift in range(1, NEIGHBOURS + 1):
+        loud[shift:] = np.fmax(loud[shift:], level[:-shift])
+        loud[:-shift] = np.fmax(loud[:-shift], level[shift:])
+    return loud
 
 
 def _over_repetitions(
