@@ -148,30 +148,14 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
     Returns:
         The folders of the file and of those that it includes or attaches.
     """
-    waiting, known = [path], {path.resolve()}
-    folders, below, named = [path.parent], {""}, set()
-    while waiting:
-        part = waiting.pop()
-        root = _parsed(part)
-        if part == path and root.tag != "mujoco":
-            raise RobotError(f"{path}: not an MJCF, its root is <{root.tag}>, expected <mujoco>")
+    folders, below, named = list[Path](), {""}, set[str]()
+    for part, root in _parts(path, roots):
+        folders.append(part.parent)
         for element in root.iter():
             if element.tag == "compiler":
                 below |= {element.get("assetdir", ""), element.get("meshdir", "")}
             if element.tag not in ("texture", "skin"):  # which are not read
                 named |= {file for name, file in element.items() if name.startswith("file")}
-            if element.tag in ("include", "model"):
-                file = element.get("file", "")
-                found = [f / file for f in (path.parent, part.parent) if (f / file).is_file()]
-                if not found:
-                    raise RobotError(f"{part}: includes {file!r}, which is missing")
-                _inside(path, file, found[0], roots)
-                if found[0].resolve() not in known:
-                    known.add(found[0].resolve())
-                    waiting.append(found[0])
-                    folders.append(found[0].parent)
-        if len(known) > MAX_INCLUDED:
-            raise RobotError(f"{path}: includes more than {MAX_INCLUDED} files")
     folders = list(dict.fromkeys(folders))
     for file in sorted(named):
         for place in (folder / each / file for folder in folders for each in below):
@@ -180,6 +164,28 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
                 if not place.is_file():  # a pipe may have no end
                     raise RobotError(f"{path}: names {file!r}, which is no regular file")
     return folders
+
+
+def _parts(path: Path, roots: Sequence[Path]) -> Iterator[tuple[Path, ET.Element]]:
+    """The files of an MJCF, each once, with their roots."""
+    waiting, known = [path], {path.resolve()}
+    while waiting:
+        part = waiting.pop()
+        root = _parsed(part)
+        if part == path and root.tag != "mujoco":
+            raise RobotError(f"{path}: not an MJCF, its root is <{root.tag}>, expected <mujoco>")
+        yield part, root
+        for element in (*root.iter("include"), *root.iter("model")):
+            file = element.get("file", "")
+            found = [f / file for f in (path.parent, part.parent) if (f / file).is_file()]
+            if not found:
+                raise RobotError(f"{part}: includes {file!r}, which is missing")
+            _inside(path, file, found[0], roots)
+            if found[0].resolve() not in known:
+                known.add(found[0].resolve())
+                waiting.append(found[0])
+        if len(known) > MAX_INCLUDED:
+            raise RobotError(f"{path}: includes more than {MAX_INCLUDED} files")
 
 
 def _parsed(path: Path) -> ET.Element:
