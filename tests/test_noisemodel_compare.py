@@ -1,28 +1,50 @@
+import dataclasses
+import pickle
 import sys
+from collections import Counter
 from contextlib import nullcontext
+from itertools import count
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import workers
 from chains import BAR, chain, motion
 
 from noisemodel import (
+    Block,
+    Comparisons,
     GeometryError,
+    LeftOut,
+    MotionError,
     NoiseModelError,
     Robot,
+    Run,
     Surface,
     UnknownKindError,
+    UnknownMotionError,
     compare,
     extended,
+    parallel,
     simplified,
 )
 from noisemodel.compare import (
+    BANDS,
+    SHAKES,
+    Comparison,
+    RobotComparison,
     check_length,
     contrasts,
     correlation,
+    ends,
     envelopes,
+    excitation,
     log_spectra,
+    medians,
     spectral_distances,
 )
+from noisemodel.extended import vibrating
+from noisemodel.robot import limits_of
 
 RATE = 1000.0
 
@@ -65,15 +87,6 @@ def test_one_revolute_joint_alone_makes_the_same_noise_in_every_kind(tmp_path):
     assert np.ptp(found.contrast) < 1e-9
     assert np.allclose(found.shares, 1.0)
     assert np.allclose(found.terms, [[0, 0, 1]], atol=1e-9)
-
-
-def test_a_factor_is_no_difference(panda):
-    robot, surface = panda
-    q, v = swinging(robot)
-    one, ten = (compare(robot, q, scale * v, rate=RATE, surface=surface) for scale in (1, 10))
-    assert np.allclose(one.correlation, ten.correlation, rtol=1e-9)
-    assert np.allclose(one.distance, ten.distance, rtol=1e-9)
-    assert np.allclose(one.terms, ten.terms, rtol=1e-9)
 
 
 def test_shares_are_those_of_the_noise(panda, comparison):
@@ -277,3 +290,885 @@ def test_q_v_and_their_rate_belong_together(tmp_path):
         compare(robot, **whole, motion="excitation")
     with pytest.raises(NoiseModelError, match=r"^q and v are given; expected one Robot, or motion"):
         compare([robot], **whole)
+
+
+comparing = sys.modules["noisemodel.compare"]
+FEW = ("simplified", "C", "paper", "normal")
+THREE = ("simplified", "paper", "normal")
+ARM, SLIDING = ("revolute", "revolute"), ("revolute", "revolute", "prismatic")
+
+
+def arm(folder, *kinds, **options):
+    return str(chain(folder, *kinds, **options).path)
+
+
+def saved(folder, moved, **changes):
+    run = dataclasses.replace(excitation(moved), **changes)
+    run.save(folder / "run.npz", overwrite=True)
+    return folder / "run.npz"
+
+
+def alone(source, kinds=FEW, **options):
+    """What a comparison of one robot finds."""
+    found = compare(source, kinds=kinds, **options)
+    assert found.left_out == ()
+    (one,) = found
+    return one
+
+
+def reason(source, **options):
+    """Why a comparison leaves a robot out."""
+    found = compare(source, **options)
+    assert len(found) == 0
+    (left_out,) = found.left_out
+    assert left_out.name == str(source)
+    return left_out.reason
+
+
+def test_on_one_joint_all_models_agree(tmp_path):
+    """With one degree of freedom every kind is the joint's speed times a constant."""
+    found = alone(arm(tmp_path, "revolute"))
+    np.testing.assert_allclose(found.comparison.correlation, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(found.comparison.distance, 0.0, atol=1e-6)
+    np.testing.assert_allclose(found.contrast, found.contrast[[0]] * np.ones((4, 1)), rtol=1e-6)
+    np.testing.assert_allclose(found.pressure, found.pressure[[0]] * np.ones((4, 1)), rtol=1e-9)
+
+
+def test_pressures_have_a_root_mean_square_of_one(tmp_path):
+    found = alone(arm(tmp_path, "revolute", "continuous"))
+    np.testing.assert_allclose(np.mean(found.pressure**2, axis=1), 1.0, rtol=1e-12)
+
+
+def test_a_vibration_is_as_loud_as_it_is_above_the_ripple(tmp_path):
+    """One joint at a steady speed: p = |v|, so the contrast is that of the velocity itself."""
+    robot = chain(tmp_path, "revolute")
+    time = np.arange(8000) / 4000.0
+    velocity = 2.0 + 0.01 * np.sin(2 * np.pi * 100 * time)
+    velocity[4000:6000] += 0.1 * np.sin(2 * np.pi * 100 * time[4000:6000])
+    run = Run(
+        time=time,
+        velocity=velocity[:, None],
+        position=np.zeros((8000, 1)),
+        joint_names=robot.joint_names,
+        robot=str(robot.path),
+        blocks=(Block(0.0, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
+    )
+    run.save(tmp_path / "run.npz")
+    found = alone(tmp_path / "run.npz")
+    assert [event.label for event in found.events] == ["oscillations"]
+    np.testing.assert_allclose(found.contrast, 20 * np.log10(11.0), atol=0.2)
+
+
+def test_a_sine_of_a_tenth_of_the_amplitude_is_20_decibels_lower():
+    phase = 2 * np.pi * np.arange(4000) / 1000
+    spectra = log_spectra(np.sin(50 * phase) + 0.1 * np.sin(200 * phase), 1000)
+    assert spectra.max() == 0.0
+    np.testing.assert_allclose(spectra[:, 50] - spectra[:, 200], 20.0, atol=0.01)
+    assert np.all(log_spectra(np.zeros(4000), 1000) == -100.0)
+
+
+def test_the_distance_in_a_band_is_that_of_its_own_frequencies(tmp_path):
+    found = alone(arm(tmp_path, "revolute", "revolute")).comparison
+    for place, (low, high) in enumerate(BANDS):
+        own = (found.frequency >= low) & (found.frequency < high)
+        other = np.where(own, found.distance_by_frequency, 0.0)
+        alike = dataclasses.replace(found, distance_by_frequency=other)
+        assert alike.by_band(0, 3)[place] == found.by_band(0, 3)[place] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("kinds", "reference"),
+    [("paper,normal,mean", "normal"), ("mean,paper", "mean"), ("paper,A,simplified", "simplified")],
+)
+def test_the_reference_is_normal_else_mean_else_the_last(tmp_path, kinds, reference):
+    found = alone(arm(tmp_path, "revolute"), ("simplified", "C", "paper")).comparison
+    named = dataclasses.replace(found, kinds=tuple(kinds.split(",")))
+    assert named.kinds[named.reference] == reference
+
+
+def test_a_recorded_motion_is_compared_as_the_robot_that_made_it(tmp_path):
+    robot = chain(tmp_path, "revolute", "prismatic", floating_base=True)
+    run = alone(saved(tmp_path, robot))
+    assert run.floating_base
+    assert run.joints == 2
+    assert len(run.comparison.names) == 3
+    assert run.remarks == ()
+
+
+def test_joints_that_are_not_in_the_log_are_named(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute")
+    run = excitation(robot)
+    run = dataclasses.replace(
+        run,
+        velocity=run.velocity[:, :1],
+        position=run.position[:, :1],
+        joint_names=("joint1",),
+        desired_joint_names=(),
+    )
+    run.save(tmp_path / "run.npz")
+    found = alone(tmp_path / "run.npz")
+    assert found.remarks == ("Not in the log, assumed stationary: joint2.",)
+
+
+def test_of_a_run_with_nothing_but_gaps_nothing_is_compared(tmp_path):
+    robot = chain(tmp_path, "revolute")
+    run = excitation(robot)
+    still = np.zeros_like(run.velocity)
+    valid = np.arange(len(run.time)) % 2 == 0
+    path = saved(tmp_path, robot, valid=valid, velocity=still, position=still)
+    assert "with at least 2 samples" in reason(path)
+
+
+def test_mimic_joints_that_cannot_be_coupled_move_independently(tmp_path):
+    follow = '<mimic joint="unknown"/>'
+    found = alone(arm(tmp_path, "revolute", "revolute", follow=follow))
+    assert found.joints == 2
+    assert "move independently" in found.remarks[0]
+
+
+def test_mimic_joints_follow(tmp_path):
+    follow = '<mimic joint="joint1" multiplier="2"/>'
+    found = alone(arm(tmp_path, "revolute", "revolute", follow=follow))
+    assert found.joints == 1
+    assert len(found.comparison.names) == 2
+
+
+def rows(found):
+    """The numbers of a comparison, by robot and kind."""
+    return {(row["name"], row["kind"]): row for row in found.to_arrow().to_pylist()}
+
+
+@pytest.fixture(scope="module")
+def urdfs(tmp_path_factory):
+    """An arm, and another with a slider."""
+    return [arm(tmp_path_factory.mktemp("arm"), *kinds) for kinds in (ARM, SLIDING)]
+
+
+def test_many_robots_are_compared_as_each_alone(urdfs):
+    together = compare(urdfs, kinds=FEW)
+    for one, urdf in zip(together, urdfs, strict=True):
+        np.testing.assert_array_equal(one.pressure, alone(urdf).pressure)
+
+
+def test_a_run_brings_its_robot_and_its_motion(urdfs, tmp_path):
+    robot = Robot.load(urdfs[0])
+    run = excitation(robot, seed=3)
+    run.save(tmp_path / "run.npz")
+    paths = (tmp_path / "run.npz", str(tmp_path / "run.npz"))
+    found = compare([run, *paths], kinds=FEW)
+    assert [one.name for one in found] == [urdfs[0], str(paths[0]), paths[1]]
+    expected = alone(robot, motion=run)
+    for one in found:
+        np.testing.assert_array_equal(one.pressure, expected.pressure)
+        assert one.events == run.blocks
+
+
+def test_a_run_a_pair_and_a_name_are_the_same_motion(urdfs):
+    robot = Robot.load(urdfs[0])
+    run = excitation(robot, seed=2)
+    pair = alone(robot, motion=robot.configuration(run), rate=run.rate)
+    np.testing.assert_array_equal(pair.pressure, alone(robot, motion=run).pressure)
+    named = alone(robot, motion="excitation", seed=2)
+    np.testing.assert_array_equal(pair.pressure, named.pressure)
+    assert (pair.events, len(named.events)) == ((), 3)
+
+
+def test_one_comparison_of_a_pair_is_that_of_its_configurations(urdfs):
+    robot = Robot.load(urdfs[0])
+    q, v = motion(robot, samples=400)
+    one = compare(robot, q, v, FEW, rate=1000.0)
+    found = alone(robot, motion=(q, v), rate=1000.0).comparison
+    for name in ("correlation", "distance", "shares", "terms"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(found, name))
+
+
+def test_each_robot_may_have_its_own_motion(urdfs):
+    runs = [excitation(Robot.load(urdf), seed=seed) for seed, urdf in enumerate(urdfs, start=1)]
+    apart = [alone(urdf, motion=run) for urdf, run in zip(urdfs, runs, strict=True)]
+    in_order = compare(urdfs, kinds=FEW, motion=runs)
+    by_name = compare(urdfs, kinds=FEW, motion=dict(zip(urdfs[::-1], runs[::-1], strict=True)))
+    for one, other, expected in zip(in_order, by_name, apart, strict=True):
+        np.testing.assert_array_equal(one.pressure, expected.pressure)
+        np.testing.assert_array_equal(other.pressure, expected.pressure)
+
+
+def test_a_surface_that_is_at_hand_is_taken(urdfs):
+    robot = Robot.load(urdfs[0])
+    found = alone(robot, surface=Surface.of(robot))
+    np.testing.assert_array_equal(found.pressure, alone(robot, surface="visual").pressure)
+
+
+def test_each_kind_is_evaluated_once(urdfs, monkeypatch):
+    """A, B and C are evaluated for their shares; "paper" is their sum."""
+    calls, evaluate = Counter(), sys.modules["noisemodel.compare"].chunk_speeds
+
+    def counted(robot, surface, q, v, kind):
+        calls[kind] += len(q)
+        return evaluate(robot, surface, q, v, kind)
+
+    monkeypatch.setattr(sys.modules["noisemodel.compare"], "chunk_speeds", counted)
+    samples = len(alone(urdfs[0], ("simplified", "C", "paper", "mean", "normal")).time)
+    assert calls == dict.fromkeys(("A", "B", "C", "mean", "normal"), samples)
+
+
+def test_a_robot_that_kills_its_worker_is_left_out(tmp_path, monkeypatch):
+    def die(name, *others):
+        return workers.die() if name == "ur5" else compare_one(name, *others)
+
+    compare_one = comparing._compare
+    monkeypatch.setattr(comparing, "_compare", die)
+    workers.simulate(monkeypatch)
+    found = compare([arm(tmp_path, *ARM), "ur5"], kinds=FEW, jobs=2)
+    assert len(found) == 1
+    assert [(each.name, each.reason) for each in found.left_out] == [("ur5", parallel.DIED)]
+
+
+def test_robots_are_compared_many_at_once_and_alike(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute")
+    sources = [str(robot.path), robot, excitation(robot), "ur3_empty", str(tmp_path / "none.urdf")]
+    one, two = (compare(sources, kinds=FEW, jobs=jobs) for jobs in (1, 2))
+    assert rows(one) == rows(two)
+    assert one.left_out == two.left_out
+    assert len(two) == 3
+    assert pickle.dumps(two)  # what workers hand back
+
+
+def test_robots_that_are_left_out_are_named_with_the_reason(urdfs, tmp_path):
+    missing = str(tmp_path / "none.urdf")
+    found = compare([missing, urdfs[0], "tallos"], kinds=FEW)
+    assert [one.name for one in found] == [urdfs[0]]
+    first, second = found.left_out
+    assert first == LeftOut(missing, "there is no such URDF file")
+    assert second.name == "tallos"
+    assert "did you mean 'talos'" in second.reason
+    assert str(found).splitlines()[-2:] == [str(first), str(second)]
+    assert str(first) == f"{missing}: left out: there is no such URDF file"
+
+
+def test_progress_passes_each_robot_on(urdfs):
+    passed = []
+
+    def progress(results, *, total):
+        for result in results:
+            passed.append((result.name, total))
+            yield result
+
+    found = compare([*urdfs, "tallos"], kinds=FEW, progress=progress)
+    assert passed == [(name, 3) for name in (*urdfs, "tallos")]
+    assert len(found) == 2
+
+
+def test_where_every_robot_is_left_out_the_reasons_remain():
+    found = compare("tallos", kinds=FEW)
+    assert (list(found), str(found)) == ([], str(found.left_out[0]))
+    with pytest.raises(NoiseModelError, match="no robot was compared; tallos: left out: no robot"):
+        found.to_arrow()
+
+
+def test_runs_that_do_not_suffice_are_left_out(tmp_path):
+    robot = chain(tmp_path, "revolute")
+    assert "the run names no robot; `inspector import --robot`" in reason(
+        saved(tmp_path, robot, robot=None)
+    )
+    assert "the run has no positions" in reason(saved(tmp_path, robot, position=None))
+    assert "no robot 'robby'" in reason(saved(tmp_path, robot, robot="robby"))
+    assert "cannot be read" in reason(tmp_path / "none.npz")
+    short = excitation(robot).cut(0.0, 0.01)
+    short.save(tmp_path / "short.npz")
+    assert "40 samples at 4000 Hz, expected 0.1024 s at least" in reason(tmp_path / "short.npz")
+
+
+def test_robots_that_cannot_be_read_or_have_no_surface_are_left_out(tmp_path):
+    assert "the URDF is empty" in reason("ur3_empty")
+    empty = arm(tmp_path, "revolute", shapes=[""])
+    assert reason(empty, surface="visual") == "no link has a surface by geometry 'visual'"
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"kinds": ("paper", "loud")}, UnknownKindError, "no kind 'loud' of noise; .*simplified"),
+        ({"kinds": ("paper",)}, NoiseModelError, "are paper; expected two different ones or more"),
+        ({"kinds": "paper"}, NoiseModelError, "are paper; expected two different ones or more"),
+        ({"kinds": ("A", "A")}, NoiseModelError, "expected two different ones"),
+        ({"kinds": ()}, NoiseModelError, "expected two different ones"),
+        ({"surface": "skin"}, GeometryError, "geometry 'skin' is not known, .* visual, collision"),
+        (
+            {"motion": "dance"},
+            UnknownMotionError,
+            "no built-in motion 'dance'; there is excitation",
+        ),
+        ({"motion": ["excitation"] * 3}, NoiseModelError, "3 motions for 2 robots"),
+        ({"motion": [np.zeros((9, 9))]}, NoiseModelError, "1 motions for 2 robots"),
+        ({"motion": [np.zeros((9, 9))] * 3}, NoiseModelError, "3 motions for 2 robots"),
+        ({"motion": {"panda": "excitation"}}, NoiseModelError, "for panda, expected .* panda, go2"),
+        ({"motion": 7}, NoiseModelError, "a motion is of type int, expected a Run, a pair"),
+        ({"motion": ["excitation", None]}, NoiseModelError, "a motion is of type NoneType"),
+        ({"motion": (np.zeros((9, 9)),) * 2}, NoiseModelError, "needs the rate of its samples"),
+        ({"robots": []}, NoiseModelError, "no robots to compare"),
+        ({"robots": ["panda", 3]}, NoiseModelError, "a robot is of type int, expected a Robot"),
+        ({"rate": 0.0}, NoiseModelError, "rate is 0 Hz"),
+        ({"seed": -1}, NoiseModelError, "seed is -1, expected 0 or more"),
+        ({"jobs": 0}, NoiseModelError, "jobs is 0, expected 1 or more"),
+        ({"events": [(0, 9)]}, NoiseModelError, "events are samples of q and v"),
+        ({"q": np.zeros((9, 9))}, NoiseModelError, "expected q, v and their rate"),
+        ({"v": np.zeros((9, 9)), "rate": 1e3}, NoiseModelError, "expected q, v and their rate"),
+        (
+            {"q": np.zeros((9, 9)), "v": np.zeros((9, 9)), "rate": 1e3, "motion": "excitation"},
+            NoiseModelError,
+            "expected q, v and their rate, and no other motion",
+        ),
+        (
+            {"q": np.zeros((9, 9)), "v": np.zeros((9, 9)), "rate": 1e3},
+            NoiseModelError,
+            "q and v are given; expected one Robot",
+        ),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_before_any_work(options, error, message):
+    with pytest.raises(error, match=message):
+        compare(**({"robots": ["panda", "go2"]} | options))
+
+
+def test_one_surface_for_many_robots_is_refused(urdfs):
+    surface = Surface.of(Robot.load(urdfs[0]))
+    with pytest.raises(GeometryError, match="one surface for 2 robots, expected a geometry's name"):
+        compare(urdfs, surface=surface)
+
+
+def test_a_pair_that_is_not_the_robots_is_refused(urdfs):
+    q, v = np.zeros((200, 3)), np.zeros((200, 2))
+    with pytest.raises(MotionError, match=r"chain.urdf: q has shape \(200, 3\), expected \(200, 2"):
+        compare(urdfs[0], motion=(q, v), rate=1000.0)
+    v[7, 1] = np.nan
+    with pytest.raises(MotionError, match="v: nan in row 7, column 1"):
+        compare(urdfs[0], motion=(q[:, :2], v), rate=1000.0)
+
+
+@pytest.fixture(scope="module")
+def thrice(urdfs):
+    """One robot that makes the excitation of three seeds."""
+    seeds = (compare(urdfs[1], kinds=THREE, seed=seed) for seed in (0, 1, 2))
+    return Comparisons(tuple(one for (one,) in seeds))
+
+
+def test_a_table_prints_the_numbers_of_the_comparison(thrice):
+    one = thrice[0]
+    row = next(line for line in str(Comparisons((one,))).splitlines() if "chain.urdf" in line)
+    shares = [f"{share:.0%}" for share in one.comparison.terms.sum(axis=0)]
+    numbers = [f"{n:.2f}" for n in one.comparison.correlation[2, :2]]
+    numbers += [f"{n:.1f}" for n in one.comparison.distance[2, :2]]
+    assert row.split()[1:8] == [*shares, *numbers]
+    lines = str(one.comparison).splitlines()
+    loudest = [line.split()[0] for line in lines if line.split()[0] in one.comparison.names]
+    assert loudest[0] == one.comparison.loudest[0]
+    assert row.endswith(one.comparison.loudest[0])
+
+
+def test_medians_pass_over_what_is_not_there():
+    rows = [np.array([1.0, np.nan, np.nan]), np.array([3.0, 5.0, np.nan])]
+    np.testing.assert_array_equal(medians(rows), [2.0, 5.0, np.nan])
+
+
+def test_an_arrow_table_has_a_row_per_robot_and_kind(thrice):
+    table = thrice.to_arrow()
+    assert table.num_rows == 3 * len(THREE)
+    assert table["kind"].to_pylist() == [*THREE] * 3
+    one, distances = thrice[1], table["distance_db"].to_pylist()[3:6]
+    np.testing.assert_array_equal(distances, one.comparison.distance[:, 2])
+    np.testing.assert_array_equal(table["contrast_jerk_db"][3:6], one.contrast[:, 2])
+    assert table["floating_base"].to_pylist() == [False] * 9
+
+
+def test_an_arrow_table_of_one_comparison_has_a_row_per_pair_of_kinds(thrice):
+    found = thrice[0].comparison
+    table = found.to_arrow()
+    assert table.column_names[:4] == ["kind", "other", "correlation", "distance_db"]
+    pairs = list(zip(table["kind"].to_pylist(), table["other"].to_pylist(), strict=True))
+    assert pairs == [(kind, other) for kind in THREE for other in THREE]
+    np.testing.assert_array_equal(table["correlation"], found.correlation.ravel())
+
+
+KINDS = ("paper", "normal", "C")
+LABELS = ("jerk", "oscillations", "fall")
+
+
+def made(name, *, seed, floating_base=False, labels=LABELS, remarks=()):
+    """A comparison with numbers that are all different, and some that do not exist."""
+    golden = (0.3 * seed + number * (np.sqrt(5.0) - 1.0) / 2.0 for number in count())
+
+    def spread(low, high, shape):
+        """Numbers between two limits."""
+        parts = np.fromiter(golden, float, int(np.prod(shape))) % 1.0
+        return low + (high - low) * parts.reshape(shape)
+
+    frequency = np.arange(0.0, 500.0 + 1000.0 * floating_base, 10.0)
+    by_frequency = spread(1.0, 30.0, (3, 3, len(frequency)))
+    terms = spread(0.0, 1.0, (6, 3))
+    correlation = spread(-1.0, 1.0, (3, 3))
+    correlation[1, 2] = np.nan if seed in (1, 2, 3) else correlation[1, 2]
+    shares = spread(0.0, 1.0, (3, 6))
+    compared = Comparison(
+        kinds=KINDS,
+        names=("base", "hip", "knee", "foot", "wheel", "hand"),
+        correlation=correlation,
+        distance=spread(0.0, 20.0, (3, 3)),
+        frequency=frequency,
+        distance_by_frequency=by_frequency,
+        contrast=spread(-5.0, 40.0, 3) if labels else np.full(3, np.nan),
+        shares=shares / shares.sum(axis=1, keepdims=True),
+        terms=terms / terms.sum(),
+    )
+    return RobotComparison(
+        name=name,
+        floating_base=floating_base,
+        joints=5,
+        time=np.arange(300) / 1000.0,
+        rate=1000.0,
+        events=tuple(
+            Block(place / 10, place / 10 + 0.05, each) for place, each in enumerate(labels)
+        ),
+        comparison=compared,
+        pressure=np.ones((3, 300)),
+        contrast=spread(-5.0, 40.0, (3, len(labels))),
+        links_with_surface=4,
+        remarks=remarks,
+    )
+
+
+MANY = """\
+Reference 'normal'; F: floating base; last: the loudest link
+                             share in paper  correlation  distance [dB]
+                                 A    B    C  paper     C  paper    C
+arm                            37%  33%  30%  -0.21     -    1.6  6.3   29% hand
+…lder/with/a/long/arm.urdf     33%  30%  37%   0.39     -    7.6 12.3   33% foot
+exactly/26/letters/arm.urd     33%  30%  38%   0.99     -   13.6 18.3   32% wheel
+walker                     F   37%  33%  30%   0.05  0.52    4.2  9.0   32% base
+runner                     F   33%  30%  38%   0.65 -0.88   10.2 15.0   32% hip
+glider                     F   40%  26%  34%  -0.75 -0.28   16.2  1.0   31% knee
+swimmer                    F   29%  37%  34%  -0.15  0.32    2.2  7.0   28% hand
+median of 3 fixed              33%  30%  37%   0.39     -    7.6 12.3
+median of 4 floating           35%  31%  34%  -0.05  0.02    7.2  8.0
+
+Of all 7, medians
+                                   distance by frequency [dB]        contrast of events above 10 Hz [dB]
+                              0-20 Hz 20-100 Hz 100-500 Hz 500 Hz up  jerk oscillations fall
+paper                            18.3      17.0       17.8      17.6  24.6         10.4 21.8
+normal                           18.3      18.1       17.7      17.6  19.5          3.8 28.7
+C                                16.5      17.9       17.4      17.6  14.4          6.3 22.1
+walker: one finger is left out
+walker: it has no hand
+swimmer: wet
+tallos: left out: there is no such robot"""  # noqa: E501
+
+ONE = """\
+Reference 'normal'; F: floating base; last: the loudest link
+                             share in paper  correlation  distance [dB]
+                                 A    B    C  paper     C  paper    C
+arm                            37%  33%  30%  -0.21     -    1.6  6.3   29% hand
+
+By kind
+                                   distance by frequency [dB]
+                              0-20 Hz 20-100 Hz 100-500 Hz 500 Hz up
+paper                            18.2      16.9       17.2         -
+normal                           22.5      19.0       17.4         -
+C                                14.3      17.9       17.5         -"""
+
+ALONE = """\
+arm, 300 samples at 1000 Hz
+correlation of envelopes          paper     normal          C
+paper                             0.080     -0.684      0.552
+normal                           -0.212     -0.976        nan
+C                                -0.504      0.732     -0.032
+spectral distance [dB]            paper     normal          C
+paper                               4.5       16.9        9.3
+normal                              1.6       14.0        6.3
+C                                  18.7       11.1        3.4
+                                  paper     normal          C
+contrast of events [dB]            30.5       13.3       -3.9
+foot                              33.2%      21.2%      11.0%
+wheel                             19.9%       9.0%      29.3%
+hand                               6.7%      28.7%      18.0%
+base                               3.5%      25.9%      15.3%
+hip                               25.0%      13.7%       4.0%
+of the energy of paper: A 36.6%, B 33.3%, C 30.1%"""
+
+
+def test_many_robots_print_as_a_table_with_medians_of_three_or_more():
+    hands = ("one finger is left out", "it has no hand")
+    found = Comparisons(
+        (
+            made("arm", seed=1),
+            made("a/folder/with/a/long/arm.urdf", seed=2, labels=LABELS[:1]),
+            made("exactly/26/letters/arm.urd", seed=3, labels=(LABELS[0], LABELS[0])),
+            made("walker", seed=4, floating_base=True, remarks=hands),
+            made("runner", seed=5, floating_base=True),
+            made("glider", seed=6, floating_base=True, labels=()),
+            made("swimmer", seed=7, floating_base=True, remarks=("wet",)),
+        ),
+        (LeftOut("tallos", "there is no such robot"),),
+    )
+    assert str(found) == MANY
+    two = str(Comparisons(found.robots[1:3]))
+    assert "Of all 2, medians" in two
+    assert "median of" not in two
+
+
+def test_one_robot_without_events_prints_as_a_table_by_kind():
+    one = made("arm", seed=1, labels=())
+    assert str(Comparisons((one,))) == ONE
+    assert "contrast" not in str(one)
+    assert str(made("arm", seed=1)) == ALONE
+
+
+def test_a_row_of_an_arrow_table_has_the_numbers_of_its_kind():
+    one = made("walker", seed=4, floating_base=True, labels=("jerk", "fall", "jerk"))
+    table = Comparisons((made("arm", seed=1), one)).to_arrow().to_pylist()
+    found = one.comparison
+    for kind in range(3):
+        frequency, squares = found.frequency, found.distance_by_frequency[kind, 1] ** 2
+        bands = np.split(squares, np.searchsorted(frequency, [20.0, 100.0, 500.0]))
+        names = ("0_20", "20_100", "100_500", "500_up")
+        expected = {
+            "name": "walker",
+            "floating_base": True,
+            "joints": 5,
+            "links": 6,
+            "links_with_surface": 4,
+            "rate_hz": 1000.0,
+            **{f"share_{term}": found.terms[:, at].sum() for at, term in enumerate("ABC")},
+            "kind": KINDS[kind],
+            "reference": "normal",
+            "correlation": found.correlation[kind, 1],
+            "distance_db": found.distance[kind, 1],
+            **{f"distance_{n}_db": np.sqrt(b.mean()) for n, b in zip(names, bands, strict=True)},
+            "contrast_jerk_db": (one.contrast[kind, 0] + one.contrast[kind, 2]) / 2,
+            "contrast_oscillations_db": np.nan,
+            "contrast_fall_db": one.contrast[kind, 1],
+            "loudest_share": found.shares[kind].max(),
+            "loudest_link": found.names[found.shares[kind].argmax()],
+        }
+        assert list(table[3 + kind]) == list(expected)
+        for name, value in table[3 + kind].items():
+            text = isinstance(value, str)
+            wanted = expected[name]
+            assert value == (wanted if text else pytest.approx(wanted, rel=1e-12, nan_ok=True))
+
+
+def test_the_contrast_of_an_event_is_its_mean_power_over_that_outside_of_all(tmp_path):
+    """Events last from their start to before their stop; the slow motion is left out."""
+    robot = chain(tmp_path, "revolute", "prismatic")
+    events = (Block(1.0, 1.5, "jerk"), Block(1.5, 1.50025, "fall"), Block(3.0, 4.0, "jerk"))
+    found = alone(saved(tmp_path, robot, blocks=(Block(0.5, 0.9, "ok"), *events)))
+    assert found.events == events
+    power = vibrating(found.pressure.T, np.ones(len(found.time), dtype=bool), 4000.0).T ** 2
+    rest = np.ones(len(found.time), dtype=bool)
+    means = []
+    for first, stop in ((4000, 6000), (6000, 6001), (12_000, 16_000)):
+        rest[first:stop] = False
+        means.append(power[:, first:stop].mean(axis=1))
+    expected = 10 * np.log10(np.array(means).T / power[:, rest].mean(axis=1, keepdims=True))
+    np.testing.assert_allclose(found.contrast, expected, rtol=1e-9)
+    np.testing.assert_allclose(found.by_label(1, ["jerk"]), expected[1, [0, 2]].mean(), rtol=1e-9)
+
+
+def test_the_motion_is_the_excitation_of_seed_0_at_4000_hertz_unless_another_is_named(
+    urdfs, thrice
+):
+    found = alone(urdfs[1], THREE)
+    np.testing.assert_array_equal(found.pressure, thrice[0].pressure)
+    assert not np.array_equal(found.pressure, thrice[1].pressure)
+    slow = alone(urdfs[0], THREE, rate=1000.0)
+    assert (found.rate, slow.rate) == (4000.0, 1000.0)
+    assert len(slow.time) * 4 == len(found.time)
+
+
+def test_of_equal_stretches_the_first_is_compared_with_the_blocks_that_lie_in_it(tmp_path):
+    robot = chain(tmp_path, "revolute", shapes=[""])
+    run = excitation(robot)
+    valid = np.ones(len(run.time), dtype=bool)
+    valid[[0, *range(8001, 8011), *range(16_011, len(run.time))]] = False  # two of 8000 samples
+    edges = run.time[[1, 8000]]
+    blocks = (
+        Block(run.time[0], 0.1, "jerk"),
+        Block(edges[0] + 0.2, 0.3, "ok"),
+        Block(0.3, 0.4, "jerk"),
+        Block(1.5, edges[1], "fall"),
+        Block(edges[1], 2.2, "jerk"),
+    )
+    signals = {"velocity": run.velocity * valid[:, None], "position": run.position * valid[:, None]}
+    moving = comparing._measured(
+        run, dataclasses.replace(run, valid=valid, blocks=blocks, **signals)
+    )
+    assert (len(moving.time), moving.time[0], moving.time[-1]) == (8000, *edges)
+    assert [event.label for event in moving.events] == ["jerk", "fall"]
+    assert moving.remarks == ("The run has gaps: compared from 0.00 s on.",)
+    whole = comparing._longest(dataclasses.replace(run, blocks=(Block(*edges, "fall"),)))
+    assert len(whole.blocks) == 1
+
+
+def test_a_robot_that_stands_still_and_has_a_link_without_a_surface_is_compared(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute", shapes=["", BAR])
+    q = np.zeros((500, 2))
+    found = alone(robot, motion=(q, q), rate=1000.0, surface="visual")
+    assert (found.links_with_surface, len(found.comparison.names)) == (1, 2)
+    assert not found.pressure.any()
+    assert found.time[[0, 1, -1]].tolist() == [0.0, 0.001, 0.499]
+
+
+ODD = (
+    "panda",  # prismatic, mimic
+    "tiago",  # continuous, prismatic, slow
+    "baxter",  # mimic, little room
+    "double_pendulum",  # no room and no speed
+    "iris_rotors",  # limits of 1e16
+    "hector",  # nothing but a base
+    "talos",
+)
+
+
+@pytest.fixture(scope="module", params=ODD)
+def robot(request):
+    return Robot.load(request.param, mimic=True)
+
+
+def limits(robot):
+    found = limits_of(robot)
+    each = [found[name] for name in robot.joint_names]
+    return SimpleNamespace(
+        centre=np.array([one.centre for one in each]),
+        range=np.array([one.upper - one.lower for one in each]),
+        speed=np.array([one.velocity for one in each]),
+    )
+
+
+def test_positions_stay_within_the_limits(robot):
+    run, bounds = excitation(robot), limits(robot)
+    assert (np.abs(run.position - bounds.centre) <= bounds.range / 2).all()
+    assert np.isfinite(run.position).all()
+
+
+def test_every_joint_moves_and_the_base_sways_if_it_can(robot):
+    run = excitation(robot)
+    assert (np.ptp(run.velocity, axis=0) > 0.0).all()
+    assert (run.base_velocity is not None) == robot.floating_base
+    if robot.floating_base:
+        assert 0.0 < np.sqrt(np.mean(run.base_velocity**2)) < 0.3
+
+
+def test_velocities_are_the_slopes_of_positions(robot):
+    run = excitation(robot)
+    slope = np.diff(run.position, axis=0) * 4000.0
+    np.testing.assert_allclose(slope, run.velocity[1:], atol=1e-7)
+
+
+def test_a_seed_makes_one_motion_and_another_seed_another():
+    robot = Robot.load("panda")
+    one, same, other = (excitation(robot, seed=seed) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(one.velocity, same.velocity)
+    assert not np.allclose(one.velocity, other.velocity)
+
+
+def test_both_shakes_are_equally_fast(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute", "revolute")
+    run = excitation(robot)
+    near, far = ends(robot)
+    energies, loudest = [], []
+    for label, name in zip(SHAKES, (near, far), strict=True):
+        (block,) = [block for block in run.blocks if block.label == label]
+        inside = (run.time >= block.start) & (run.time < block.stop)
+        velocity = run.velocity[inside, robot.joint_names.index(name)]
+        spectrum = np.abs(np.fft.rfft(velocity * np.hanning(len(velocity))))
+        energies.append(spectrum[30:].max())
+        loudest.append((30 + spectrum[30:].argmax()) * run.rate / len(velocity))
+    assert energies[0] == pytest.approx(energies[1], rel=0.1)
+    assert 40.0 <= loudest[0] == loudest[1] <= 200.0
+
+
+def test_the_near_joint_carries_most_and_the_far_one_ends_the_chain(tmp_path):
+    robot = chain(tmp_path, "prismatic", "revolute", "continuous", "revolute", "prismatic")
+    assert ends(robot) == ("joint2", "joint4")
+    assert ends(chain(tmp_path, "prismatic")) == ()
+    assert ends(chain(tmp_path, "revolute")) == ("joint1",)
+
+
+def tree(folder, *joints, **options):
+    """A robot of links that are named after their joints: name, kind and parent link of each."""
+    text = '<robot name="tree"><link name="base"/>'
+    for name, kind, parent, *limit in joints:
+        lower, upper, speed = limit or (-9, 9, 1)
+        follow = f'<mimic joint="{kind}"/>' if kind in [each[0] for each in joints] else ""
+        text += f"""<link name="{name}"/>
+          <joint name="{name}" type="{"revolute" if follow else kind}">
+            <parent link="{parent}"/><child link="{name}"/><axis xyz="0 0 1"/>{follow}
+            <limit lower="{lower}" upper="{upper}" effort="1" velocity="{speed}"/></joint>"""
+    path = folder / "tree.urdf"
+    path.write_text(text + "</robot>")
+    return Robot.load(path, mimic=True, **options)
+
+
+def test_the_ends_of_a_robot_with_branches(tmp_path):
+    joints = [
+        ("a", "revolute", "base"),  # ends after one joint
+        ("b", "prismatic", "base"),
+        ("b1", "revolute", "b"),  # carries as many as c, further from the base
+        ("b2", "revolute", "b1"),
+        ("b3", "prismatic", "b2"),  # so b2 is as deep as d2, and carries more
+        ("c", "revolute", "base"),
+        ("c1", "prismatic", "c"),
+        ("c2", "prismatic", "c"),
+        ("d", "prismatic", "base"),
+        ("d1", "prismatic", "d"),
+        ("d2", "revolute", "d1"),
+        ("d3", "d2", "d2"),  # follows d2
+    ]
+    robot = tree(tmp_path, *joints)
+    names = [joint.name for joint in robot.joints]
+    assert names.index("b1") < names.index("c")
+    assert ends(robot) == ("c", "b2")  # d2 carries the one that follows it
+    continuous = [
+        (name, kind.replace("revolute", "continuous"), *rest) for name, kind, *rest in joints
+    ]
+    assert ends(tree(tmp_path, *continuous[:-1])) == ("c", "d2")
+
+
+def test_each_joint_has_its_own_limits(tmp_path):
+    robot = tree(
+        tmp_path,
+        ("a", "continuous", "base", -1, 1, 4),
+        ("b", "b2", "base"),
+        ("b2", "revolute", "b", -1, 3, 0),
+        ("c", "prismatic", "base", 0.5, 0.6, 0.25),
+        ("d", "revolute", "c", 2, 2, 7),
+        floating_base=True,
+    )
+    assert robot.joint_names == ("a", "b2", "c", "d")
+    bounds = limits(robot)
+    np.testing.assert_allclose(bounds.centre, [0.0, 1.0, 0.55, 0.0])
+    np.testing.assert_allclose(bounds.range, [np.inf, 4.0, 0.1, np.inf])
+    np.testing.assert_array_equal(bounds.speed, [4.0, np.inf, 0.25, 7.0])
+
+
+def test_a_joint_uses_nine_tenths_of_its_range_or_of_its_speed(tmp_path):
+    robot = tree(
+        tmp_path,
+        ("near", "revolute", "base", -9, 9, 0),
+        ("room", "revolute", "near", -0.1, 0.3, 0),
+        ("slide", "prismatic", "room", 0.5, 0.6, 0),
+        ("slow", "revolute", "slide", -9, 9, 0.2),
+        ("far", "revolute", "slow", 0, 0, 0),
+    )
+    run = excitation(robot, rate=1000.0)
+    assert ends(robot) == ("near", "far")
+    motion = {name: run.position[:, column] for column, name in enumerate(run.joint_names)}
+    for name, low, high in (("room", -0.1, 0.3), ("slide", 0.5, 0.6)):
+        middle, part = (low + high) / 2, 0.9 * (high - low) / 2
+        assert motion[name].min() == pytest.approx(middle - part)
+        assert motion[name].max() == pytest.approx(middle + part)
+    slow = run.velocity[:, run.joint_names.index("slow")]
+    assert np.abs(slow).max() == pytest.approx(0.9 * 0.2)
+
+
+def test_a_shake_is_where_its_block_is_and_has_its_amplitude(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute", "revolute")
+    run = excitation(robot)
+    assert [(each.label, each.start, each.stop) for each in run.blocks] == [
+        ("shake-near", 1.0, 1.8),
+        ("shake-far", 2.6, 3.4),
+        ("jerk", 4.6, 4.8),
+    ]
+    spectra = np.abs(np.fft.rfft(run.velocity[:16000], axis=0))
+    hertz = np.fft.rfftfreq(16000, 1 / run.rate)[30:]
+    assert hertz[spectra[30:, 0].argmax()] == hertz[spectra[30:, 2].argmax()]
+    for column, start in ((0, 1.0), (2, 2.6)):
+        fast = vibrating(run.velocity, np.ones(len(run.time), dtype=bool), run.rate)[:, column]
+        place = (run.time - start) / 0.8
+        envelope = 0.2 * np.sin(np.pi * np.clip(place, 0.0, 1.0)) ** 2
+        calm = run.time < 4.5
+        noise = fast[calm & (envelope == 0.0)]
+        for part in range(8):
+            inside = (place >= part / 8) & (place < (part + 1) / 8)
+            expected = np.sqrt(np.mean(envelope[inside] ** 2) / 2 + np.mean(noise**2))
+            assert np.sqrt(np.mean(fast[inside] ** 2)) == pytest.approx(expected, rel=0.2)
+
+
+def test_the_speed_of_all_joints_jumps_by_half_and_the_jump_decays(tmp_path):
+    robot = tree(tmp_path, *((f"j{n}", "revolute", "base", 0, 0, 0) for n in range(6)))
+    run = excitation(robot)
+    first = round(4.6 * run.rate)
+    step = np.diff(run.velocity[first - 1 : first + 1], axis=0)[0]
+    np.testing.assert_allclose(np.abs(step), 0.5, atol=0.05)
+    assert {-1.0, 1.0} == set(np.sign(step))
+    gone = run.velocity[first] - run.velocity[first + round(0.03 * run.rate)]
+    np.testing.assert_allclose(gone * np.sign(step), 0.5 * (1 - np.exp(-1)), atol=0.2)
+
+
+def test_the_rate_changes_the_samples_and_not_the_events(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute")
+    slow, fast = excitation(robot, rate=1000.0), excitation(robot)
+    assert (slow.rate, fast.rate) == (1000.0, 4000.0)
+    assert slow.duration == fast.duration
+    assert slow.blocks == fast.blocks
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            {"rate": 400.0},
+            "the excitation at 400 Hz, expected above 400 Hz: its shakes have up to 200 Hz$",
+        ),
+        ({"rate": np.inf}, "the excitation at inf Hz, expected above 400 Hz"),
+        ({"rate": np.nan}, "the excitation at nan Hz, expected above 400 Hz"),
+        ({"seed": -1}, "seed is -1, expected 0 or more"),
+    ],
+)
+def test_a_rate_or_a_seed_that_cannot_be_is_refused(tmp_path, options, message):
+    with pytest.raises(NoiseModelError, match=message):
+        excitation(chain(tmp_path, "revolute"), **options)
+
+
+def test_a_run_names_a_listed_robot_and_the_file_of_another(tmp_path):
+    assert excitation(Robot.load("ur5"), rate=500.0).robot == "ur5"
+    robot = chain(tmp_path, "revolute")
+    assert excitation(robot, rate=500.0).robot == str(robot.path)
+
+
+def test_the_lowest_rate_is_above_twice_that_of_the_shakes(tmp_path):
+    robot = chain(tmp_path, "revolute", floating_base=True)
+    run = excitation(robot, rate=401.0)
+    assert len(run.time) == 2406
+    assert run.meta == {"scenario": "excitation", "seed": 0}
+    np.testing.assert_array_equal(
+        excitation(robot, rate=401.0, seed=0).base_velocity, run.base_velocity
+    )
+    assert run.base_velocity.shape == (2406, 6)
+
+
+def test_the_motion_of_a_seed_is_that_of_every_version(tmp_path):
+    """Published comparisons of robots are of this motion."""
+    run = excitation(chain(tmp_path, "revolute", "revolute"), rate=1000.0, seed=3)
+    rows = [0, 500, 1400, 2600, 3000, 3900, 4599, 4600, 4630]
+    velocity = [
+        [-0.07680895, 0.54502649],
+        [0.01674567, 0.47425227],
+        [-0.43822055, -0.24924171],
+        [-0.4288232, 0.09651234],
+        [-0.31210099, 0.29743893],
+        [-0.67597647, -0.12145249],
+        [0.23916955, -0.84358737],
+        [0.04153442, -0.60159598],
+        [0.20848983, -0.7720573],
+    ]
+    np.testing.assert_allclose(run.velocity[rows], velocity, atol=1e-7)
+    position = [[0.83873093, 0.10168808], [-0.14746383, 0.29010324], [-0.494962, -0.42117099]]
+    np.testing.assert_allclose(run.position[[0, 3000, 5999]], position, atol=1e-7)
+    kinds = ("revolute", "prismatic", "continuous")
+    run = excitation(chain(tmp_path, *kinds, floating_base=True), rate=1000.0, seed=3)
+    position = [[-0.84855862, 0.55368367, 0.23291852], [0.82628143, -0.36440717, 0.07629094]]
+    np.testing.assert_allclose(run.position[[0, 3000]], position, atol=1e-7)
+    base = [
+        [0.08977637, 0.07622201, 0.06053005, 0.01255334, 0.16195811, -0.16350946],
+        [0.12727098, -0.03048063, -0.15098178, 0.11352999, -0.09512691, -0.0067453],
+    ]
+    np.testing.assert_allclose(run.base_velocity[[0, 4600]], base, atol=1e-7)

@@ -37,15 +37,6 @@ def test_pushed_samples_are_the_run_at_the_recorders_rate(tmp_path):
     recorder.save(tmp_path / "run.npz", overwrite=True)
 
 
-def test_a_pushed_array_may_change_afterwards():
-    recorder, state = nm.Recorder(None, 100), np.zeros(2)
-    for step in range(5):
-        state += step
-        recorder.push(velocity=state)
-    assert np.array_equal(recorder.run().velocity[:, 0], [0, 1, 3, 6, 10])
-    assert recorder.run().joint_names == ("joint1", "joint2")
-
-
 def test_values_by_name_are_put_in_the_recorders_order():
     recorder = nm.Recorder(None, 100, joint_names=["a", "b"], desired_joint_names=["b"])
     for _ in range(3):
@@ -123,21 +114,6 @@ def test_too_few_samples_are_no_run(tmp_path, samples, message):
     assert not (tmp_path / "run.npz").exists()
 
 
-def test_stamps_that_jitter_are_resampled_and_holes_are_gaps():
-    recorder, random = nm.Recorder(None, 100), np.random.default_rng(0)
-    for step in range(1000):
-        if not 400 <= step < 450:
-            time = 50 + step / 100 + random.uniform(-0.002, 0.002)
-            recorder.push(velocity=[np.sin(3 * time)], time=time)
-    run = recorder.run()
-    assert run.rate == 100.0
-    assert run.mask[0]
-    since = run.time + float(run.meta["start"])
-    assert np.allclose(run.velocity[run.mask, 0], np.sin(3 * since[run.mask]), atol=1e-3)
-    assert 48 <= (~run.mask).sum() <= 52
-    assert 0.001 < run.meta["jitter"]["rms"] < 0.003
-
-
 def test_angles_that_jump_by_a_turn_are_resampled_without_the_jump():
     recorder, random = nm.Recorder(None, 100), np.random.default_rng(0)
     for step in range(500):
@@ -147,28 +123,6 @@ def test_angles_that_jump_by_a_turn_are_resampled_without_the_jump():
     run = recorder.run()
     since = run.time + float(run.meta["start"])
     assert np.allclose(run.position[run.mask], np.outer(since, [3.0, 0.1])[run.mask], atol=1e-6)
-
-
-def test_uniform_stamps_count_for_more_than_the_rate():
-    recorder = nm.Recorder(None, 1000)
-    for step in range(100):
-        recorder.push(velocity=[float(step)], time=step / 125)
-    assert recorder.run().rate == 125.0
-
-
-def test_a_sample_that_is_not_finite_is_a_gap():
-    recorder = nm.Recorder(None, 100)
-    for step in range(100):
-        pose = [0, 0, 1, 0, 0, 0, 1]
-        recorder.push(velocity=[np.nan if step == 40 else 1.0], base_pose=pose)
-    run = recorder.run()
-    assert np.flatnonzero(~run.mask).tolist() == [40]
-    assert run.velocity[40, 0] == 0.0
-    silent = nm.Recorder(None, 100)
-    for _ in range(3):
-        silent.push(velocity=[np.nan])
-    with pytest.raises(RunError, match="every sample of the recorder has a value that is not fin"):
-        silent.run()
 
 
 def test_a_turning_base_is_interpolated_on_the_sphere():

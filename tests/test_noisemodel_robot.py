@@ -1,6 +1,11 @@
+"""Limits of joints as a URDF states them."""
+
 import dataclasses
+import json
 import os
 from importlib.metadata import PackageNotFoundError
+from math import inf
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -9,6 +14,7 @@ from chains import chain
 
 from noisemodel import (
     ROBOTS,
+    NoiseModelError,
     Robot,
     RobotError,
     Run,
@@ -17,7 +23,7 @@ from noisemodel import (
     UnknownRobotError,
     link_twists,
 )
-from noisemodel.robot import package_roots
+from noisemodel.robot import Limits, joint_limits, package_roots
 
 ARM = """
 <robot name="arm">
@@ -109,12 +115,6 @@ def test_a_configuration_is_ordered_by_joint_name(tmp_path):
     assert np.array_equal(v, [[0, 0, 1], [1, 0, 0]])
 
 
-def test_joints_that_the_run_does_not_name_rest(tmp_path):
-    q, v = arm(tmp_path).configuration(run(("elbow",), np.ones((2, 1)), np.ones((2, 1))))
-    assert np.array_equal(q, [[1, 0, 1, 0]] * 2)
-    assert np.array_equal(v, [[0, 1, 0]] * 2)
-
-
 def test_the_base_has_the_pose_of_the_run_and_rests_in_gaps(tmp_path):
     robot = arm(tmp_path, floating_base=True)
     pose = np.array([[1, 2, 3, 0, 0, 1, 0], [0, 0, 0, 0, 0, 0, 0]], dtype=float)
@@ -130,13 +130,6 @@ def test_the_base_has_the_pose_of_the_run_and_rests_in_gaps(tmp_path):
     )
     assert np.array_equal(q[:, :7], [pose[0], [0, 0, 0, 0, 0, 0, 1]])
     assert np.array_equal(v[0, :6], [1, 2, 3, 4, 5, 6])
-
-
-def test_a_base_without_a_pose_in_the_run_rests(tmp_path):
-    robot = arm(tmp_path, floating_base=True)
-    q, v = robot.configuration(run(("elbow",), np.ones((2, 1)), np.ones((2, 1))))
-    assert np.array_equal(q[0, :7], [0, 0, 0, 0, 0, 0, 1])
-    assert not v[:, :6].any()
 
 
 def test_mimic_joints_follow_and_take_no_place(tmp_path):
@@ -256,3 +249,233 @@ def test_the_desired_motion_is_ordered_like_the_measured_one():
     q, _ = robot.desired(dataclasses.replace(run, position_desired=7 * values[:, :1]))
     assert q[0, :2].tolist() == [0.0, 14.0]
     assert robot.desired(dataclasses.replace(run, velocity_desired=None)) is None
+
+
+GOLDEN = Path(__file__).parents[2] / "shared" / "golden" / "surface"
+SAMPLES = 50
+
+
+def read(tmp_path, joints, **options):
+    """A chain of joints, each (type, axis, xyz, rpy), as a robot."""
+    text = '<robot name="chain"><link name="link0"/>'
+    for number, (kind, axis, xyz, rpy) in enumerate(joints, start=1):
+        text += f"""
+          <link name="link{number}"/>
+          <joint name="joint{number}" type="{kind}">
+            <parent link="link{number - 1}"/><child link="link{number}"/>
+            <origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>
+            <limit lower="-9" upper="9" effort="1" velocity="1"/>
+          </joint>"""
+    path = tmp_path / "chain.urdf"
+    path.write_text(text + "</robot>")
+    return Robot.load(path, **options)
+
+
+def states(model):
+    """Configurations far from neutral and velocities."""
+    random = np.random.default_rng(1)
+    neutral = pin.neutral(model)
+    steps = 3 * random.standard_normal((SAMPLES, model.nv))
+    q = np.array([pin.integrate(model, neutral, step) for step in steps])
+    return q.reshape(SAMPLES, model.nq), random.standard_normal((SAMPLES, model.nv))
+
+
+def by_pinocchio(model, q, v):
+    """What `link_twists` has to give, state by state."""
+    data = model.createData()
+    twists = np.empty((len(q), model.njoints, 6))
+    for sample in range(len(q)):
+        pin.forwardKinematics(model, data, q[sample], v[sample])
+        twists[sample] = [motion.vector for motion in data.v]
+    return twists
+
+
+def test_spinning_link_moves_its_tip_at_radius_times_rate(tmp_path):
+    radius, rate = 0.7, 3.0
+    robot = read(
+        tmp_path,
+        [("revolute", "0 0 1", "0 0 0", "0 0 0"), ("revolute", "0 0 1", f"{radius} 0 0", "0 0 0")],
+    )
+    tip = link_twists(robot, np.zeros((1, 2)), np.array([[rate, 0.0]]))[0, 2]
+    assert np.allclose(tip, [0, radius * rate, 0, 0, 0, rate], rtol=0, atol=1e-15)
+
+
+def test_sliding_link_moves_along_its_axis(tmp_path):
+    robot = read(tmp_path, [("prismatic", "0 3 4", "1 2 3", "0 0 0")])
+    twist = link_twists(robot, np.array([[0.5]]), np.array([[2.0]]))[0, 1]
+    assert np.allclose(twist, [0, 1.2, 1.6, 0, 0, 0], rtol=0, atol=1e-15)
+
+
+def test_tip_of_a_turning_slider_moves_faster_the_further_it_is_out(tmp_path):
+    robot = read(
+        tmp_path,
+        [("revolute", "0 0 1", "0 0 0", "0 0 0"), ("prismatic", "1 0 0", "0 0 0", "0 0 0")],
+    )
+    out = np.array([[0.3, 0.1], [0.3, 0.2]])
+    twists = link_twists(robot, out, np.array([[2.0, 0.0], [2.0, 0.0]]))
+    assert np.allclose(np.linalg.norm(twists[:, 2, :3], axis=1), [0.2, 0.4], rtol=1e-14)
+
+
+def test_pose_of_the_base_changes_no_twist():
+    robot = Robot.load("solo12")
+    q, v = states(robot.model)
+    elsewhere = q.copy()
+    elsewhere[:, :7] = [5, -3, 1, 0.5, 0.5, 0.5, 0.5]
+    assert np.array_equal(link_twists(robot, q, v), link_twists(robot, elsewhere, v))
+
+
+def test_twists_are_linear_in_the_velocities():
+    robot = Robot.load("talos")
+    q, v = states(robot.model)
+    other = v[::-1]
+    sum_of_twists = 2 * link_twists(robot, q, v) - 3 * link_twists(robot, q, other)
+    assert np.allclose(link_twists(robot, q, 2 * v - 3 * other), sum_of_twists, rtol=0, atol=1e-12)
+
+
+def test_a_run_is_the_same_in_one_piece_and_in_many(monkeypatch):
+    robot = Robot.load("panda")
+    q, v = states(robot.model)
+    whole = link_twists(robot, q, v)
+    monkeypatch.setattr("noisemodel.robot.CHUNK", 7)
+    assert np.allclose(link_twists(robot, q, v), whole, rtol=0, atol=1e-15)
+
+
+def test_single_precision_is_computed_in_double():
+    robot = Robot.load("panda")
+    q, v = (state.astype(np.float32) for state in states(robot.model))
+    exact = link_twists(robot, q.astype(np.float64), v.astype(np.float64))
+    assert np.array_equal(link_twists(robot, q, v), exact)
+
+
+def test_no_samples_have_no_twists():
+    robot = Robot.load("panda")
+    assert link_twists(robot, np.empty((0, 9)), np.empty((0, 9))).shape == (0, 10, 6)
+
+
+@pytest.mark.parametrize("name", ["talos", "kinova", "pr2", "tiago", "romeo", "hyq", "iris"])
+def test_twists_are_those_of_pinocchio(name):
+    """kinova and tiago have continuous joints, tiago and pr2 prismatic ones."""
+    robot = Robot.load(name)
+    q, v = states(robot.model)
+    assert np.allclose(
+        link_twists(robot, q, v), by_pinocchio(robot.model, q, v), rtol=0, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("floating_base", [False, True])
+def test_planar_and_inner_floating_joints_are_those_of_pinocchio(tmp_path, floating_base):
+    robot = read(
+        tmp_path,
+        [
+            ("revolute", "1 2 3", "0.1 0.2 0.3", "0.4 0.5 0.6"),
+            ("planar", "0 0 1", "0.3 0 0.1", "0 0.7 0"),
+            ("continuous", "0 1 0", "0.2 0 0", "0.1 0 0"),
+            ("floating", "1 0 0", "0 0.3 0", "0 0 0.2"),
+            ("continuous", "1 -1 0", "0.1 0 0.1", "0.2 0.3 0"),
+            ("prismatic", "0 1 0", "0 0 0.1", "0 0 1"),
+            ("prismatic", "1 1 0", "0 0.2 0.1", "0 1 0"),
+            ("revolute", "-1 0 0", "0.1 0 0", "0 0 0"),
+        ],
+        floating_base=floating_base,
+    )
+    assert {joint.kind for joint in robot.joints} == {
+        "revolute",
+        "planar",
+        "continuous",
+        "floating",
+        "prismatic",
+    }
+    q, v = states(robot.model)
+    assert np.allclose(
+        link_twists(robot, q, v), by_pinocchio(robot.model, q, v), rtol=0, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("name", ["panda", "baxter", "pr2", "tiago_pro"])
+def test_mimic_joints_move_as_pinocchio_moves_them(name):
+    robot = Robot.load(name, mimic=True)
+    root = (pin.JointModelFreeFlyer(),) if robot.floating_base else ()
+    model = pin.buildModelFromUrdf(str(robot.path), *root, mimic=True)
+    assert robot.mimics
+    assert (robot.nq, robot.nv) == (model.nq, model.nv)
+    assert [joint.name for joint in robot.joints] == list(model.names)[1:]
+    q, v = states(model)
+    assert np.allclose(link_twists(robot, q, v), by_pinocchio(model, q, v), rtol=0, atol=1e-12)
+
+
+@pytest.mark.skipif(not GOLDEN.is_dir(), reason="golden/surface is not beside this checkout")
+@pytest.mark.parametrize(
+    "case",
+    ["panda_visual", "solo12_visual", "double_pendulum_simple_visual", "panda_collision_mimic"],
+)
+def test_twists_are_the_golden_ones(case):
+    facts = json.loads((GOLDEN / "index.json").read_text())[case]
+    golden = np.load(GOLDEN / f"{case}.npz", allow_pickle=False)
+    urdf = Robot.load("panda").package_roots[-1] / facts["urdf"]
+    robot = Robot.load(urdf, floating_base=facts["free_flyer"], mimic=facts["mimic"])
+    twists = link_twists(robot, golden["q"], golden["v"])
+    assert np.allclose(twists, golden["twist"], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("q", "v", "message"),
+    [
+        ((5, 8), (5, 9), r"q has shape \(5, 8\), expected \(5, 9\)"),
+        ((5, 9), (4, 9), r"v has shape \(4, 9\), expected \(5, 9\)"),
+        ((9,), (9,), r"q has shape \(9,\), expected \(9, 9\)"),
+    ],
+)
+def test_states_of_another_shape_are_refused(q, v, message):
+    with pytest.raises(NoiseModelError, match=message):
+        link_twists(Robot.load("panda"), np.zeros(q), np.zeros(v))
+
+
+def limits(folder, attributes, kind="revolute"):
+    """The limits of a joint of this kind with these attributes of its <limit>."""
+    (folder / "arm.urdf").write_text(
+        f"<robot name='arm'><link name='a'/><link name='b'/><joint name='j' type='{kind}'>"
+        f"<parent link='a'/><child link='b'/><axis xyz='0 0 1'/><limit effort='1' {attributes}/>"
+        "</joint></robot>"
+    )
+    return joint_limits(folder / "arm.urdf")["j"]
+
+
+def test_the_limits_of_a_panda_are_those_of_its_data_sheet():
+    found = joint_limits("panda")
+    assert found["panda_joint1"] == Limits(-2.8973, 2.8973, 2.175, turns=True)
+    assert found["panda_joint4"] == Limits(-3.0718, -0.0698, 2.175, turns=True)
+    assert found["panda_joint7"] == Limits(-2.8973, 2.8973, 2.61, turns=True)
+    assert found["panda_finger_joint1"] == Limits(0.0, 0.04, 0.2, turns=False)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "lower", "upper"),
+    [
+        ("lower='-1' upper='2' velocity='3'", -1.0, 2.0),
+        ("upper='2' velocity='3'", 0.0, 2.0),  # of the URDF's specification: 0 by default
+        ("lower='-2' velocity='3'", -2.0, 0.0),
+        ("lower='1' upper='1' velocity='3'", -inf, inf),
+        ("lower='-1' upper='2e6' velocity='3'", -inf, inf),
+    ],
+)
+def test_a_range_is_as_it_is_written_and_none_if_it_is_empty_or_without_end(
+    tmp_path, attributes, lower, upper
+):
+    assert limits(tmp_path, attributes) == Limits(lower, upper, 3.0, turns=True)
+
+
+@pytest.mark.parametrize(
+    ("written", "speed"), [("0.5", 0.5), ("0", inf), ("-1", inf), ("1e6", inf), ("fast", inf)]
+)
+def test_a_speed_is_as_it_is_written_and_none_if_no_joint_moves_so(tmp_path, written, speed):
+    assert limits(tmp_path, f"lower='-1' upper='1' velocity='{written}'").velocity == speed
+
+
+def test_a_joint_that_turns_for_ever_has_a_speed_and_no_range(tmp_path):
+    found = limits(tmp_path, "lower='-1' upper='1' velocity='3'", kind="continuous")
+    assert found == Limits(-inf, inf, 3.0, turns=True)
+
+
+def test_limits_of_which_nothing_is_stated_are_none():
+    nothing = Limits()
+    assert (nothing.lower, nothing.upper, nothing.velocity) == (-inf, inf, inf)
