@@ -153,7 +153,7 @@ class Differentiator:
 
 
 def _savitzky_golay() -> tuple[float, ...]:
-    """Weights of the polynomial's slope in the middle, as `noisemodel.differentiate` takes it."""
+    """Weights of the polynomial's slope in the middle, as `noisemodel.run` takes it."""
     places = np.arange(WINDOW) - WINDOW // 2
     fit = np.linalg.pinv(np.vander(places, ORDER + 1, increasing=True).astype(np.float64))
     return tuple(fit[1].tolist())

@@ -273,7 +273,7 @@ def extended(
         sound_speed: In [m/s].
         efficiency: Radiation efficiency: one for all links, one for each, shape (links,), or
             "dipole", that of a small body that oscillates, by its frequency (see
-            ``noisemodel.dipole``). With the kind "normal" that is the physics; the motion that
+            `Dipole`). With the kind "normal" that is the physics; the motion that
             the other kinds see is filtered alike, so that they can be compared.
         rate: Sample rate, which only "dipole" needs, in [Hz].
         q_desired: Desired configurations, shape (samples, nq); ``q`` unless given.

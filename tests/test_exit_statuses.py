@@ -55,7 +55,7 @@ COMMANDS = {
 
 SILENT_BUGS = {
     "live": "inspector.live.input.reader_of",
-    "robots": "noisemodel.catalog.menagerie_names",
+    "robots": "noisemodel.robot.menagerie_names",
     "merge": "inspector.verdict.from_json",
     "history": "inspector.verdict.from_json",
 }

@@ -120,42 +120,28 @@ def attached(folder, count):
     return folder / "a0.xml"
 
 
-def test_models_that_attach_each_other_twice_are_counted_before_they_are_built(tmp_path):
+def test_models_that_attach_each_other_twice_are_one_line(tmp_path):
     assert len(Robot.load(attached(tmp_path, 3)).joints) == 0
-    with pytest.raises(RobotError, match="more than 20000 bodies and geoms"):
+    with pytest.raises(RobotError, match="a0.xml: MuJoCo ") as caught:
         Robot.load(attached(tmp_path, 40))
-    (tmp_path / "a39.xml").write_text((tmp_path / "a0.xml").read_text())
-    (tmp_path / "a0.xml").write_text((tmp_path / "a0.xml").read_text().replace("a1.", "a39."))
-    (tmp_path / "a39.xml").write_text((tmp_path / "a39.xml").read_text().replace("a1.", "a0."))
-    with pytest.raises(RobotError, match="its models contain each other"):
-        Robot.load(tmp_path / "a0.xml")
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("element", "problem"),
+    "element",
     [
-        ('<flexcomp name="f" type="grid" count="300 300 300"/>', "more than 10000 times"),
-        ('<composite type="cable" prefix="a" count="1000000 1 1"/>', "more than 10000 times"),
-        ("<body/>" * 30_000, "more than 20000 bodies and geoms"),
-        ("<body><joint/></body>" * 15_000, "more than 1000 joints"),
+        '<flexcomp name="f" type="grid" count="300 300 300"/>',
+        '<composite type="cable" prefix="a" count="1000000 1 1"/>',
+        "<body/>" * 30_000,
+        "<body><joint/></body>" * 15_000,
     ],
 )
-def test_an_mjcf_of_more_than_any_robot_has_is_refused_at_once(tmp_path, element, problem):
+def test_an_mjcf_of_more_than_any_robot_has_is_one_line(tmp_path, element):
     path = tmp_path / "r.xml"
     path.write_text(f'<mujoco><worldbody><body name="b">{element}</body></worldbody></mujoco>')
-    with pytest.raises(RobotError, match=problem):
+    with pytest.raises(RobotError, match="r.xml: (MuJoCo |30002 bodies and geoms)") as caught:
         Robot.load(path)
-
-
-def test_sizes_for_which_mujoco_would_take_gigabytes_are_refused(tmp_path):
-    path = tmp_path / "r.xml"
-    for head, problem in (
-        ('<size nuserdata="1000000000"/>', "nuserdata='1000000000'> is too large"),
-        ('<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>', "height fi"),
-    ):
-        path.write_text(f"<mujoco>{head}<worldbody><geom size='1'/></worldbody></mujoco>")
-        with pytest.raises(RobotError, match=problem):
-            Robot.load(path)
+    assert "\n" not in str(caught.value)
 
 
 def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):
