@@ -1043,7 +1043,7 @@ def compare(
         v: Velocities as Pinocchio has them, shape (samples, nv), in [rad/s] and [m/s].
         kinds: "simplified", or kinds of ``surface_speed``.
         motion: A ``Run``, a pair ``(q, v)``, or the name of a built-in motion: "excitation", the
-            default, see ``noisemodel.compare.excitation``. One for all robots, a list with one for each, or
+            default, see `excitation`. One for all robots, a list with one for each, or
             a mapping from each robot's name to its motion. Robots that are named are read as
             ``Robot.load(name)`` does; for built-in motions their mimic joints are coupled.
         rate: Sample rate of ``q`` and ``v``, or of built-in motions, where it is 4000 Hz unless
