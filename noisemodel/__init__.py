@@ -8,7 +8,6 @@ and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robot
 from noisemodel.compare import Comparison, Comparisons, LeftOut, RobotComparison, compare
 from noisemodel.errors import (
     ClusterError,
-    CornerError,
     GeometryError,
     MeshError,
     MissingMeshError,
@@ -20,7 +19,6 @@ from noisemodel.errors import (
     RunFileError,
     UnknownJointError,
     UnknownKindError,
-    UnknownMotionError,
     UnknownRobotError,
 )
 from noisemodel.extended import KINDS, extended, extended_chunks, surface_speed
@@ -37,7 +35,6 @@ __all__ = [
     "ClusterError",
     "Comparison",
     "Comparisons",
-    "CornerError",
     "GeometryError",
     "LeftOut",
     "MeshError",
@@ -56,7 +53,6 @@ __all__ = [
     "Surface",
     "UnknownJointError",
     "UnknownKindError",
-    "UnknownMotionError",
     "UnknownRobotError",
     "by_joint",
     "compare",

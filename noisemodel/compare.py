@@ -17,7 +17,6 @@ from noisemodel.errors import (
     RobotError,
     RunError,
     UnknownKindError,
-    UnknownMotionError,
 )
 from noisemodel.extended import KINDS, check_motion, chunk_speeds, vibrating
 from noisemodel.noise import (
@@ -899,7 +898,10 @@ def _motions(motion: Motions, names: Sequence[str]) -> list[Motion]:
         motions = [motion] * len(names)
     for one in motions:
         if isinstance(one, str) and one not in BUILT_IN:
-            raise UnknownMotionError(one, BUILT_IN)
+            raise NoiseModelError(
+                f"no built-in motion {one!r}; there is {', '.join(BUILT_IN)};"
+                " expected such a name, a Run, or a pair (q, v)"
+            )
         if not isinstance(one, str | Run) and not _is_pair(one):
             raise NoiseModelError(
                 f"a motion is of type {type(one).__name__}, expected a Run, a pair (q, v), or the"
@@ -1062,7 +1064,6 @@ def compare(
 
     Raises:
         UnknownKindError: If a kind does not exist.
-        UnknownMotionError: If a built-in motion does not exist.
         MotionError: If ``q`` or ``v`` are of another shape than the robot's, or not finite.
         GeometryError: If a geometry does not exist, or one surface is given for many robots; with
             ``q`` and ``v`` also if the surface cannot be read or is that of another robot.

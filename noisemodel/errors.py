@@ -14,12 +14,7 @@ class RunError(NoiseModelError):
 
 
 class RunFileError(RunError):
-    """A file that is not a run, or that holds one that is wrong.
-
-    Args:
-        path: The file that was read.
-        problem: What is wrong with it, in one line.
-    """
+    """A file that is not a run, or that holds one that is wrong."""
 
     def __init__(self, path: Path, problem: str) -> None:
         self.path, self.problem = path, problem
@@ -42,53 +37,12 @@ class MotionError(NoiseModelError):
     """Configurations or velocities that are not a robot's, or not finite."""
 
 
-class UnknownMotionError(NoiseModelError):
-    """A name that is no built-in motion.
-
-    Args:
-        motion: The name.
-        known: The built-in motions.
-    """
-
-    def __init__(self, motion: str, known: Iterable[str]) -> None:
-        self.motion, self.known = motion, tuple(known)
-        super().__init__(
-            f"no built-in motion {motion!r}; there is {', '.join(self.known)};"
-            " expected such a name, a Run, or a pair (q, v)"
-        )
-
-
 class UnknownKindError(NoiseModelError):
-    """A kind of noise estimate that does not exist.
-
-    Args:
-        kind: The name of the kind.
-        known: The kinds that exist.
-    """
+    """A kind of noise estimate that does not exist."""
 
     def __init__(self, kind: str, known: Sequence[str]) -> None:
         self.kind, self.known = kind, tuple(known)
         super().__init__(f"no kind {kind!r} of noise; there are {', '.join(known)}")
-
-
-class CornerError(NoiseModelError):
-    """A sample rate that is too low for the radiation of small links.
-
-    Args:
-        links: The links that are too small.
-        corners: The corner frequency of each, in [Hz].
-        rate: The sample rate, in [Hz].
-    """
-
-    def __init__(self, links: Sequence[str], corners: Sequence[float], rate: float) -> None:
-        self.links, self.corners, self.rate = tuple(links), tuple(corners), rate
-        named = ", ".join(
-            f"{link} ({corner:.0f} Hz)" for link, corner in zip(links, corners, strict=True)
-        )
-        super().__init__(
-            f"at {rate:g} Hz efficiency 'dipole' needs corners below {rate / 2:g} Hz, these links"
-            f" are too small: {named}; give a number for the efficiency, or a higher rate"
-        )
 
 
 class GeometryError(NoiseModelError):
@@ -96,12 +50,7 @@ class GeometryError(NoiseModelError):
 
 
 class MeshError(GeometryError):
-    """A mesh that cannot be read, or that has no surface.
-
-    Args:
-        mesh: Its file, or its address in the URDF.
-        problem: What is wrong with it, in one line.
-    """
+    """A mesh that cannot be read, or that has no surface."""
 
     def __init__(self, mesh: str | Path, problem: str) -> None:
         self.mesh, self.problem = str(mesh), problem
@@ -117,12 +66,7 @@ class MissingMeshError(MeshError):
 
 
 class UnknownRobotError(RobotError):
-    """A name that is no listed robot, and no file of one either.
-
-    Args:
-        name: The name that was given.
-        known: The names that are listed.
-    """
+    """A name that is no listed robot, and no file of one either."""
 
     def __init__(self, name: str, known: Iterable[str]) -> None:
         self.name, self.known = name, tuple(known)
@@ -133,13 +77,7 @@ class UnknownRobotError(RobotError):
 
 
 class UnknownJointError(RobotError):
-    """A run names a joint that the robot does not have.
-
-    Args:
-        joint: The joint that the run names.
-        robot: The name of the robot.
-        known: The joints that the robot has.
-    """
+    """A run names a joint that the robot does not have."""
 
     def __init__(self, joint: str, robot: str, known: Sequence[str]) -> None:
         self.joint, self.robot, self.known = joint, robot, tuple(known)

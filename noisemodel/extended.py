@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel.errors import CornerError, MotionError, NoiseModelError, UnknownKindError
+from noisemodel.errors import MotionError, NoiseModelError, UnknownKindError
 from noisemodel.noise import CHUNK, DENSITY, SOUND_SPEED, Noise, check_positive, sound_power
 from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
 from noisemodel.run import Run, stretches
@@ -219,7 +219,7 @@ class Dipole:
         sound_speed: In [m/s].
 
     Raises:
-        CornerError: If the corner of a link is not below half the rate.
+        NoiseModelError: If the corner of a link is not below half the rate.
     """
 
     def __init__(self, surface: Surface, *, rate: float, sound_speed: float) -> None:
@@ -229,7 +229,11 @@ class Dipole:
         sources = np.flatnonzero(surface.area)
         small = [link for link in sources if corners[link] >= 0.5 * rate]
         if small:
-            raise CornerError([surface.names[i] for i in small], corners[small].tolist(), rate)
+            named = ", ".join(f"{surface.names[i]} ({corners[i]:.0f} Hz)" for i in small)
+            raise NoiseModelError(
+                f"at {rate:g} Hz efficiency 'dipole' needs corners below {rate / 2:g} Hz, these"
+                f" links are too small: {named}; give a number for the efficiency, or a higher rate"
+            )
         self._filters = {
             int(link): butter(2, corners[link], "highpass", fs=rate, output="sos")
             for link in sources
@@ -286,9 +290,9 @@ def extended(
     Raises:
         UnknownKindError: If the kind does not exist.
         GeometryError: If the surface is that of another robot.
-        CornerError: If a link is too small for "dipole" at this rate.
         MotionError: If ``q`` or ``v`` are of another shape than the robot's, or not finite.
-        NoiseModelError: If a number is not positive, or lengths differ.
+        NoiseModelError: If a number is not positive, lengths differ, or a link is too small for
+            "dipole" at this rate.
     """
     chunks = extended_chunks(
         robot,

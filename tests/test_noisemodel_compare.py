@@ -22,7 +22,6 @@ from noisemodel import (
     Run,
     Surface,
     UnknownKindError,
-    UnknownMotionError,
     compare,
     extended,
     parallel,
@@ -595,7 +594,7 @@ def test_robots_that_cannot_be_read_or_have_no_surface_are_left_out(tmp_path):
         ({"surface": "skin"}, GeometryError, "geometry 'skin' is not known, .* visual, collision"),
         (
             {"motion": "dance"},
-            UnknownMotionError,
+            NoiseModelError,
             "no built-in motion 'dance'; there is excitation",
         ),
         ({"motion": ["excitation"] * 3}, NoiseModelError, "3 motions for 2 robots"),

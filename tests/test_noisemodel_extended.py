@@ -8,7 +8,6 @@ from chains import BAR, chain, motion
 
 from noisemodel import (
     KINDS,
-    CornerError,
     GeometryError,
     Noise,
     NoiseModelError,
@@ -471,11 +470,9 @@ def test_links_that_are_too_small_for_the_rate_are_named(tmp_path):
     message = (
         r"at 20000 Hz .* below 10000 Hz, these links are too small: link2 \(77\d\d\d Hz\); give"
     )
-    with pytest.raises(CornerError, match=message) as caught:
+    with pytest.raises(NoiseModelError, match=message):
         extended(robot, surface, q, v, efficiency="dipole", rate=RATE)
-    assert caught.value.links == ("link2",)
-    assert isinstance(caught.value, NoiseModelError)
-    with pytest.raises(CornerError, match="link1"):
+    with pytest.raises(NoiseModelError, match="link1"):
         extended(robot, surface, q, v, efficiency="dipole", rate=1000.0)
 
 
