@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from inspector import LiveSession
 from inspector.analysis import analyse
 from inspector.library import load_library
 from inspector.status import Status
@@ -95,3 +96,16 @@ def test_the_first_motion_after_standing_is_compared_with_the_motion_that_follow
         joint_names=run.joint_names,
     )
     assert analyse(still, LIBRARY).status is Status.OK
+
+
+def test_what_lasts_is_found_live_as_in_a_file(tmp_path):
+    run = run_of("arm", shake=0.3, during=(-np.inf, np.inf))
+    path = tmp_path / "live.rrd"
+    with LiveSession(RATE, joint_names=run.joint_names, library=LIBRARY, save=path) as session:
+        for first in range(0, len(run.time), 37):
+            part = slice(first, first + 37)
+            session.push(velocity=run.velocity[part], velocity_desired=run.velocity_desired[part])
+        summary = session.close()
+    (live,), (found,) = summary.findings, analyse(run, LIBRARY).findings
+    assert live.label == found.label == "oscillations"
+    assert (live.start, live.stop) == pytest.approx((found.start, found.stop), abs=0.1)
