@@ -342,8 +342,8 @@ def test_a_hum_after_the_clock_jumped_is_found_as_before(tmp_path, library, stam
     _, _, summary = shown(tmp_path, signals, range(70, 4000, 70), library=library)
     (event,) = summary.findings
     assert (event.label, summary.status) == ("oscillations", "findings")
-    assert event.stop - event.start == pytest.approx(0.8, abs=0.65)  # by frames
-    assert event.stop == pytest.approx(seconds - 0.6, abs=0.35)
+    assert 0.5 < event.stop - event.start < 1.8  # by frames of 0.4 s and windows of 1 s
+    assert event.stop == pytest.approx(seconds - 0.6, abs=0.6)
 
 
 def test_samples_that_are_left_out_leave_no_verdict_of_ok(tmp_path, library):
