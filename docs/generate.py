@@ -1,5 +1,6 @@
 """Write the pages that are made from the code: `python docs/generate.py`; a test holds them."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,24 @@ def _cell(text: str | None) -> str:
     return " ".join((text or "").split()).replace("|", "\\|")
 
 
-PAGES = {"commands.md": commands}
+def log_formats() -> str:
+    """The page of log formats: what the tests read, what is typed for it, and what is said."""
+    sys.path.insert(0, str(HERE.parent / "tests"))
+    import test_logs_formats_of_others as others
+    import test_logs_kinds as kinds
+
+    head = "| log | header | typed | said | read |\n|---|---|---|---|---|"
+    rows = "\n".join(each.row for each in others.FORMATS)
+    told = (
+        "Each row is a log that a test writes and reads. *Typed* is what has to be added to the"
+        " command, *said* what it prints. The same rules hold in all formats"
+        " ([read your log](logs.md))."
+    )
+    public = f"## In the manner of public logs\n\n{kinds.table()}\n"
+    return f"# Log formats\n\n{NOTE}{told}\n\n## CSV\n\n{head}\n{rows}\n\n{public}"
+
+
+PAGES = {"commands.md": commands, "log-formats.md": log_formats}
 """Files of this folder, and what makes each."""
 
 
