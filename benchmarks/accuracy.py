@@ -18,12 +18,15 @@ Written by `python -m benchmarks.accuracy`. [Metrics](metrics.md) defines the me
 model has learnt from none of this. All motion is simulated unless it says "real": no repeated
 motion of a real robot was available.
 """
-OTHERS = """Robots and controllers of PyBullet and Drake (`python -m benchmarks.elsewhere`), never used
-in training. Legged robots have most of the false alarms."""
-LASTING = """Other seeds of robots in wide domains: good runs, faults, tones over whole runs, and faults
-that are cut out of their runs. Then real logs of good motion, with tones of half a second added."""
-REPEATED = """Runs of three robots against good repetitions of the same motion, with other sensor noise,
-friction and gains ([statistics](statistics.md))."""
+OTHERS = """
+Robots and controllers of PyBullet and Drake (`python -m benchmarks.elsewhere`), never used in
+training. Legged robots have most of the false alarms."""
+LASTING = """
+Other seeds of robots in wide domains: good runs, faults, tones over whole runs, and faults that are
+cut out of their runs. Then real logs of good motion, with tones of half a second added."""
+REPEATED = """
+Runs of robots against good repetitions of the same motion, with other sensor noise, friction and
+gains ([statistics](statistics.md))."""
 
 
 def main() -> None:
@@ -45,7 +48,7 @@ def main() -> None:
         ("Against a reference", REPEATED, repeated),
     ]
     parts = [
-        f"\n## {title}\n\n{text}\n\n```text\n{out.strip()}\n```\n" for title, text, out in sections
+        f"\n## {title}\n{text}\n\n```text\n{out.strip()}\n```\n" for title, text, out in sections
     ]
     PAGE.write_text(HEAD + "".join(parts), encoding="utf-8")
 
