@@ -142,7 +142,7 @@ class Noise:
         if not reference.scenarios:
             return analysis, judge(verdict, today=date.today()), None
         comparison = compare(levels(run, name=scenario), reference.scenarios)
-        verdict = beside(analysis, verdict, comparison, reference)
+        verdict = beside(verdict, comparison, reference, analysis.labels)
         return analysis, judge(verdict, reference, today=date.today()), comparison
 
     def _reference(self) -> "Reference":

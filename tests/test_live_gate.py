@@ -2,13 +2,16 @@
 
 import io
 import json
+import re
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from commandline import call
 
 from inspector.assets import demo_run
+from inspector.reference.levels import LevelStream, levels
 from noisemodel import Run
 
 
@@ -74,3 +77,91 @@ def test_a_rate_without_a_model_ends_with_4(live):
     assert status == 4
     assert summary["status"] == "cannot-tell"
     assert "30 Hz" in summary["reason"]
+
+
+@pytest.fixture(scope="module")
+def simulate():
+    folder = str(Path(__file__).parents[1] / "examples" / "accept")
+    sys.path.insert(0, folder)
+    try:
+        import simulate
+
+        yield simulate
+    finally:
+        sys.path.remove(folder)
+
+
+@pytest.fixture(scope="module")
+def accepted(simulate, tmp_path_factory):
+    """A store of accepted runs."""
+    folder = tmp_path_factory.mktemp("accepted")
+    simulate.write(folder / "runs")
+    assert call("accept", folder / "runs", "--reason", "first release")[0] == 0
+    return folder / "reference"
+
+
+def streamed(run):
+    """A run as rows."""
+    names = [f"{name}.velocity" for name in run.joint_names]
+    names += [f"{name}_desired" for name in names]
+    text = io.StringIO()
+    columns = np.hstack([run.time[:, None], run.velocity, run.velocity_desired])
+    np.savetxt(text, columns, "%.8g", ",", header=",".join(["time", *names]), comments="")
+    return text.getvalue()
+
+
+def test_a_stream_like_its_reference_ends_with_0(live, accepted, simulate):
+    text = streamed(simulate.run("pick", 5, "harmless"))
+    status, out, err = live("--reference", accepted, text=text, rate=1000)
+    assert status == 0, out + err
+    assert f"compared with {accepted}" in out
+    assert "3 repetitions of pick" in out
+
+
+def test_a_stream_louder_than_its_reference_ends_with_1_and_names_joint_and_decibels(
+    live, accepted, simulate
+):
+    text = streamed(simulate.run("pick", 5, "chatter"))
+    status, out, err = live("--reference", accepted, text=text, rate=1000)
+    assert status == 1, out + err
+    assert re.search(r"\d\d\.\d dB over repetitions at .*\(elbow, ", out)
+    status, out, _ = live("--reference", accepted, "--format", "json", text=text, rate=1000)
+    summary = json.loads(out.splitlines()[-1])
+    assert (status, summary["status"]) == (1, "findings")
+    assert summary["reference"]["scenarios"] == ["pick"]
+    assert summary["findings"][0]["evidence"]["joint"] == "elbow"
+
+
+def test_a_touch_that_was_accepted_is_excused_at_the_end(live, simulate, tmp_path):
+    good = tmp_path / "good"
+    good.mkdir()
+    for number in (1, 2, 3):
+        simulate.run("place", number, "impact").save(good / f"place-{number}.npz")
+    text = streamed(simulate.run("place", 5, "impact"))
+    assert live(text=text, rate=1000)[0] == 1
+    status, out, err = live("--reference", good, text=text, rate=1000)
+    assert status == 0, out + err
+    assert "does not count: as reference: as loud as 3 of place" in out
+
+
+def test_a_reference_and_an_early_end_exclude_each_other(live, accepted):
+    status, _, err = live("--reference", accepted, "--fail-fast")
+    assert status == 2
+    assert "exclude each other" in err
+
+
+def test_levels_that_come_in_pieces_are_those_of_the_whole(simulate):
+    run = simulate.run("wave", 1)
+    long = {n: np.tile(getattr(run, n), (3, 1)) for n in ("velocity", "velocity_desired")}
+    count = len(long["velocity"])
+    valid, lost = np.ones(count, dtype=bool), np.zeros(count)
+    stream = LevelStream(run.joint_names, run.rate)
+    for first in range(0, count, 50):
+        part = slice(first, first + 50)
+        signals = {name: values[part] for name, values in long.items()}
+        stream.push(first / run.rate, signals, valid[part], lost[part])
+    found = stream.finish()
+    whole = levels(Run(time=np.arange(count) / run.rate, joint_names=run.joint_names, **long))
+    assert found.level.shape == whole.level.shape
+    assert np.nanmax(np.abs(found.level - whole.level)[:, :, :, 1:]) < 0.5
+    np.testing.assert_allclose(found.guide, whole.guide, atol=1e-3)

@@ -45,6 +45,14 @@ def live(
     fail_fast: Annotated[
         bool, typer.Option("--fail-fast", help="End at the first finding that counts.")
     ] = False,
+    reference: Annotated[
+        Path | None,
+        typer.Option(
+            "--reference",
+            help="Accepted runs, or a folder of good ones, that all of the stream is compared with"
+            " at its end; while it runs, the general model decides.",
+        ),
+    ] = None,
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -74,14 +82,18 @@ def live(
     from inspector.live import LiveError, LiveSession
     from inspector.live.gate import Gate
     from inspector.live.input import follow
+    from inspector.reference.store import Reference
 
     del package_root, limit  # have been set
     if sys.stdin.isatty():
         raise LiveError(
             "samples are read from standard input; pipe them in: robot | inspector live"
         )
+    if reference is not None and fail_fast:
+        raise typer.BadParameter("--reference and --fail-fast exclude each other")
     library = load_library(assets.model_files(model))
-    gate = Gate(_tell, as_json=format is Format.JSON)
+    known = None if reference is None else Reference.load(reference)
+    gate = Gate(_tell, as_json=format is Format.JSON, reference=known)
     session = partial(
         LiveSession,
         rate,
@@ -90,6 +102,7 @@ def live(
         save=save,
         connect=connect,
         overwrite=overwrite,
+        keep_levels=known is not None,
         on_warning=partial(typer.echo, err=True),
         on_finding=gate.take,
     )

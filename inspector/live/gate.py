@@ -2,10 +2,14 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 from inspector.live.session import Summary
+from inspector.reference.store import Reference
+from inspector.reference.verdicts import beside, judge
 from inspector.status import EXIT, Status
 from inspector.verdict import Verdict, counts
 from inspector.version import program_version
@@ -20,6 +24,11 @@ NAME = Path("live")
 class Gate:
     """Prints findings while they come.
 
+    Args:
+        tell: Prints a line.
+        as_json: Whether lines are of JSON.
+        reference: What the stream is compared with at its end; None leaves it to the model.
+
     Attributes:
         failed: Whether a finding counts so far.
     """
@@ -29,9 +38,11 @@ class Gate:
         tell: Callable[[str], None],
         *,
         as_json: bool = False,
+        reference: Reference | None = None,
     ) -> None:
         self.failed = False
         self._tell, self._as_json = tell, as_json
+        self._reference = reference
         self._found: dict[tuple[str, float], Event] = {}
 
     def take(self, event: Event, over: bool) -> None:
@@ -59,8 +70,7 @@ class Gate:
 
     def end(self, summary: Summary) -> int:
         """Print what became of the stream."""
-        events, duration = tuple(summary.findings), summary.samples / summary.rate
-        verdict = Verdict(NAME, summary.status, summary.model, events, duration=duration)
+        verdict, duration = self._verdict(summary), summary.samples / summary.rate
         if self._as_json:
             line = {
                 "event": "summary",
@@ -77,12 +87,41 @@ class Gate:
                 "warnings": dict(summary.warnings),
                 "where": summary.where,
             }
+            if verdict.beside is not None:
+                known = verdict.as_dict()
+                line |= {"reference": known["reference"], "findings": known["events"]}
             self._tell(json.dumps({"format": FORMAT, **line}))
             return EXIT[verdict.status]
-        self._tell(str(summary))
+        shown = summary.findings if verdict.beside is None else verdict.failing
+        self._tell(str(replace(summary, status=verdict.status, findings=shown)))
+        for event, evidence in verdict.evidence.items():
+            if not evidence.excused:
+                span = interval(event.start, event.stop)
+                self._tell(f"  {event.label} from {span}: {evidence}")
         for event in verdict.excused:
             span = interval(event.start, event.stop)
             self._tell(f"  {event.label} from {span} does not count: {verdict.ruled(event)}")
         for missing in verdict.missing:
             self._tell(f"  {missing}")
+        if verdict.beside is not None:
+            self._tell(f"compared with {verdict.beside.path}: {verdict.beside.words}")
         return EXIT[verdict.status]
+
+    def _verdict(self, summary: Summary) -> Verdict:
+        """The verdict on the whole stream."""
+        verdict = Verdict(
+            NAME,
+            summary.status,
+            summary.model,
+            tuple(summary.findings),
+            duration=summary.samples / summary.rate,
+        )
+        if self._reference is None or summary.levels is None:
+            return verdict
+        verdict = replace(verdict, begin=summary.levels.start)
+        comparison = self._reference.compare(summary.levels)
+        verdict = beside(verdict, comparison, self._reference)
+        verdict = judge(verdict, self._reference, today=date.today())
+        if summary.status is Status.CANNOT_TELL and summary.model and verdict.status is Status.OK:
+            return replace(verdict, status=Status.CANNOT_TELL)  # too little of it was seen
+        return verdict

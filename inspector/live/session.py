@@ -28,6 +28,7 @@ from inspector.live.samples import (
     widths_of,
 )
 from inspector.live.sink import Sink
+from inspector.reference.levels import LONGEST, Levels, LevelStream
 from inspector.status import Status
 from inspector.wrongrobot import LONG, LimitWatch, check_joints
 from noiseclassifier import Event, merged
@@ -48,6 +49,7 @@ class Worker:
         rate: Nominal samples per second, in [Hz].
         robot: The robot to draw; None draws none.
         watch: The limits of the robot that the samples are said to be of; None checks none.
+        levels: Keeps octave levels; None keeps none.
     """
 
     def __init__(
@@ -61,6 +63,7 @@ class Worker:
         library: Library,
         warnings: Warnings,
         watch: LimitWatch | None = None,
+        levels: LevelStream | None = None,
         on_finding: Callable[[Event, bool], None] | None = None,
     ) -> None:
         self.samples, self._now = 0, 0.0
@@ -78,7 +81,8 @@ class Worker:
         self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
         self._robot = None
         self._links: LinkLevels | None = None
-        self._watch = watch
+        self._watch, self._stream = watch, levels
+        self.levels: Levels | None = None  # until the end
         if robot is not None:
             floating = "base_pose" in widths
             self._robot = LiveRobot(
@@ -150,6 +154,8 @@ class Worker:
         self._note_unknown(time, valid)
         motion = np.where(valid[:, None], motion, 0.0)
         noise = nm.simplified(motion)  # of measured and desired velocities side by side
+        if self._stream is not None:
+            self._stream.push(float(time[0]), signals, valid, lost)
         edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(time)]
         for first, stop in pairwise(edges):  # labels first: their latency counts
             piece = slice(first, stop)
@@ -183,6 +189,11 @@ class Worker:
     def finish(self) -> None:
         """Show what waits, and tell of findings that last to the end."""
         self._labeller.finish()
+        if self._stream is not None:
+            self.levels = self._stream.finish()
+            if self._stream.too_long:
+                line = f"more than {LONGEST / 60:.0f} minutes are not compared with a reference"
+                self._warnings.note("streams too long for a reference", line)
         self._news.update(self.findings, float("inf"))
         if self._sink.alive:
             self._drawing.changes(self._lane.end())
@@ -352,6 +363,7 @@ class Summary:
         findings: From the start of the first frame of each to the end of its last.
         reason: Why nothing can be told; empty otherwise.
         frame: Duration of a frame, by which findings may begin too early, in [s].
+        levels: Octave levels of the whole session once it is closed, if they were kept.
     """
 
     samples: int
@@ -365,6 +377,7 @@ class Summary:
     findings: Sequence[Event] = ()
     reason: str = "no frame was labelled"
     frame: float = 0.0
+    levels: Levels | None = None
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {label}" for label, count in self.labels.items())
@@ -401,6 +414,8 @@ class LiveSession:
         connect: Address of a viewer that runs. Unless given, and without a file, the viewer on
             this machine is used, and one is opened if none runs.
         overwrite: Whether a file that exists may be replaced.
+        keep_levels: Whether octave levels are kept, of an hour at most, 8 kB a second of 7 joints
+            at 1 kHz, which `Reference.compare` takes at the end.
         on_warning: Called with a line for what cannot be shown, once per kind.
         on_finding: Called with each finding as soon as it is confirmed, and False; and with it and
             True when it is over. The latter are those of the summary.
@@ -421,6 +436,7 @@ class LiveSession:
         save: str | Path | None = None,
         connect: str | None = None,
         overwrite: bool = False,
+        keep_levels: bool = False,
         on_warning: Callable[[str], None] = lambda line: None,
         on_finding: Callable[[Event, bool], None] | None = None,
     ) -> None:
@@ -429,7 +445,7 @@ class LiveSession:
         self._rate, self._robot, self._names = rate, robot, tuple(joint_names)
         self._library = load_library() if library is None else library
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
-        self._on_finding = on_finding
+        self._on_finding, self._keep_levels = on_finding, keep_levels
         self._latest = -1.0 / rate
         self._buffer: SampleBuffer | None = None
         self._worker: Worker | None = None
@@ -520,6 +536,7 @@ class LiveSession:
             findings=findings,
             reason=reason,
             frame=worker.frame if worker else 0.0,
+            levels=worker.levels if worker else None,
         )
 
     def close(self) -> Summary:
@@ -563,6 +580,9 @@ class LiveSession:
         names = _names(self._names, self._robot, widths["velocity"])
         absent = check_joints(names, self._robot)
         size = max(1, round(BATCH * self._rate))
+        # A file's name is none that a reference knows.
+        robot = "" if self._robot is None or Path(self._robot).suffix else self._robot
+        levels = LevelStream(tuple(names), self._rate, robot) if self._keep_levels else None
         worker = Worker(
             self._sink,
             rate=self._rate,
@@ -572,6 +592,7 @@ class LiveSession:
             library=for_robot(self._library, self._robot),
             warnings=self._warnings,
             watch=LimitWatch(names, self._robot) if self._robot else None,
+            levels=levels,
             on_finding=self._on_finding,
         )
         if self._robot and "position" not in widths:

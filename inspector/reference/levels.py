@@ -4,8 +4,10 @@ A frame lasts 0.2 s and the next one begins 0.05 s later. Octaves go from 8 Hz t
 Each joint has two signals: its velocity, and its tracking error where a velocity is desired.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,8 @@ LOWEST, HIGHEST = 8.0, 0.45
 """Lower edge of the first octave, in [Hz], and upper edge of the last as a share of the rate."""
 SETTLING = 1.0
 """Time after which filters have rung out, in [s]."""
+PIECE, LONGEST = 6.0, 3600.0
+"""Stretch of a stream that is measured at once, and longest stream that is, in [s]."""
 SIGNALS = ("velocity", "tracking error")
 LEAST_DB, STEP_DB, ABSENT = -100.0, 0.5, 255
 """What code 0 of a stored level stands for, the step between codes, and the code of no level."""
@@ -131,6 +135,117 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
         guided_by,
         np.sqrt(np.mean(np.square(_framed(moved, frames) / BINS), axis=1)).astype(np.float32),
     )
+
+
+class LevelStream:
+    """Measures the levels of a run while it comes, 6 s at a time, so that no sample is kept.
+
+    Args:
+        joint_names: Names of the joints.
+        rate: In [Hz].
+        robot: The robot's name; empty without.
+    """
+
+    def __init__(self, joint_names: tuple[str, ...], rate: float, robot: str = "") -> None:
+        self._joints, self._rate, self._robot = joint_names, rate, robot
+        self._start: float | None = None
+        self._held: dict[str, NDArray[np.float32]] = {}
+        self._valid = np.zeros(0, dtype=bool)
+        self._before = 0  # bins of the samples held that were measured already
+        self._count = 0
+        self._parts: list[Levels] = []
+        self.too_long = False
+
+    def push(
+        self, time: float, signals: Mapping[str, Array], valid: NDArray[np.bool_], lost: Array
+    ) -> None:
+        """Take samples.
+
+        Args:
+            time: That of the first one, in [s].
+            signals: Velocities, desired ones and positions, each of shape (samples, joints).
+            valid: Which samples are known, shape (samples,).
+            lost: How many samples are missing before each, shape (samples,).
+        """
+        self._start = time if self._start is None else self._start
+        # Positions tell the motion only where no desired velocity does.
+        names = ["velocity"]
+        names += [n for n in ("velocity_desired", "position") if n in signals][:1]
+        known = valid & np.isfinite(signals[names[-1]]).all(axis=1)
+        edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(valid)]
+        for first, stop in pairwise(edges):
+            self._add_gap(int(lost[first]), {n: signals[n].shape[1] for n in names})
+            self._add({n: signals[n][first:stop] for n in names}, known[first:stop])
+
+    def finish(self) -> Levels | None:
+        """Levels of what came; None of less than a frame, or of more than an hour."""
+        if not self.too_long and len(self._valid) > 1:
+            self._measure(len(self._valid), None)
+        if self.too_long or not self._parts or self._start is None:
+            return None
+        whole: dict[str, Any] = {
+            name: np.concatenate([getattr(each, name) for each in self._parts])
+            for name in ("level", "guide", "pace")
+        }
+        last = self._parts[-1]
+        return replace(last, start=self._start, duration=self._count / self._rate, **whole)
+
+    def _add_gap(self, lost: int, widths: Mapping[str, int]) -> None:
+        if lost > LONGEST * self._rate:
+            self.too_long = True
+        piece = round(PIECE * self._rate)
+        while lost and not self.too_long:
+            count = min(lost, piece)
+            lost -= count
+            self._add({n: np.zeros((count, w)) for n, w in widths.items()}, np.zeros(count, bool))
+
+    def _add(self, signals: Mapping[str, Array], valid: NDArray[np.bool_]) -> None:
+        self._count += len(valid)
+        self.too_long = self.too_long or self._count > LONGEST * self._rate
+        if self.too_long:
+            self._held, self._valid, self._parts = {}, self._valid[:0], []
+            return
+        for name, values in signals.items():
+            new = np.where(valid[:, None], values, 0.0).astype(np.float32)
+            held = self._held.get(name)
+            self._held[name] = new if held is None else np.concatenate((held, new))
+        self._valid = np.concatenate((self._valid, valid))
+        bins, around = round(PIECE / HOP), round(SETTLING / HOP)
+        # Filters need a second of samples to each side.
+        while len(self._valid) > self._samples(self._before + bins + BINS + around):
+            self._measure(self._samples(self._before + bins + BINS + around), bins)
+            drop = self._samples(self._before + bins - around)
+            self._held = {name: values[drop:] for name, values in self._held.items()}
+            self._valid, self._before = self._valid[drop:], around
+
+    def _samples(self, bins: int) -> int:
+        return int(np.ceil(bins * self._rate * HOP - 1e-9))
+
+    def _measure(self, samples: int, frames: int | None) -> None:
+        """Measure frames of the first samples that are held; all that there are if None."""
+        valid = self._valid[:samples]
+        taken = slice(self._before, None if frames is None else self._before + frames)
+        signals: dict[str, Any] = {name: each[:samples] for name, each in self._held.items()}
+        run = Run(
+            time=np.arange(samples) / self._rate,
+            joint_names=self._joints,
+            valid=valid if valid.any() else None,
+            robot=self._robot or None,
+            **signals,
+        )
+        found = levels(run)
+        guide, level = found.guide, found.level
+        if not valid.any():
+            level = np.full_like(level, np.nan)
+        if self._parts and len(guide) >= self._before:
+            # What is integrated or unwrapped goes on from the piece before.
+            step = self._parts[-1].guide[-1] - guide[self._before - 1]
+            if not found.guided_by.endswith("velocities"):
+                step = 2 * np.pi * np.round(step / (2 * np.pi))
+            guide = (guide + step).astype(np.float32)
+        part = replace(found, guide=guide[taken], level=level[taken], pace=found.pace[taken])
+        if len(part.guide):
+            self._parts.append(part)
 
 
 def encoded(level: NDArray[np.float32]) -> Codes:

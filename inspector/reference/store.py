@@ -95,16 +95,18 @@ class Reference:
             raise StoreError(path, "no such file or folder")
         return cls(path, of_runs(measured([path], reading)))
 
-    def compare(self, run: Run) -> Comparison:
+    def compare(self, run: Run | Levels) -> Comparison:
         """Compare a run with what is normal.
 
         Args:
-            run: The run.
+            run: The run, or levels that a live session kept of one.
 
         Returns:
             The `Comparison`: dB over the reference by joint, octave and time, and findings.
         """
-        return compare(levels(run, name=str(run.meta.get("scenario", ""))), self.scenarios)
+        if isinstance(run, Run):
+            run = levels(run, name=str(run.meta.get("scenario", "")))
+        return compare(run, self.scenarios)
 
     def named(self, name: str) -> Scenario | None:
         """The scenario of a name, or that had it; None without."""

@@ -24,7 +24,7 @@ from inspector.reference.levels import HOP, Levels, levels
 from inspector.reference.store import NAME, Reference, find, scenario_of
 from inspector.status import Status
 from inspector.verdict import Beside, Evidence, Missing, Ruled, Ruling, Verdict
-from noiseclassifier import UNKNOWN, Event
+from noiseclassifier import UNKNOWN, Event, Labels
 
 LOUDER = "louder"
 """Class of a finding that only the reference shows."""
@@ -75,7 +75,8 @@ class References:
         if not self.names and reference.named(name) is None:
             name = scenario_of(analysis.run, verdict.path, _root(verdict.path, path))
         run = levels(analysis.run, name=name, file=str(verdict.path))
-        return beside(analysis, verdict, compare(run, reference.scenarios), reference)
+        comparison = compare(run, reference.scenarios)
+        return beside(verdict, comparison, reference, analysis.labels)
 
     def __str__(self) -> str:
         """What a batch that resumes must find unchanged: the levels of each reference."""
@@ -195,15 +196,16 @@ def classes_found(library: Library) -> tuple[str, ...]:
 
 
 def beside(
-    analysis: Analysis, verdict: Verdict, comparison: Comparison, reference: Reference
+    verdict: Verdict, comparison: Comparison, reference: Reference, labels: Labels | None = None
 ) -> Verdict:
     """Add what a comparison shows to the verdict on a run.
 
     A moment that is louder than its reference is a finding, with the class that the general model
     gives it, or ``louder``. What the general model finds where the run is as loud as its reference
-    is excused. Where no reference covers the run, the general model decides.
+    is excused. Where no reference covers the run, the general model decides. Labels of the frames
+    name what no finding does.
     """
-    events, evidence = _events(analysis, comparison)
+    events, evidence = _events(verdict.events, labels, comparison)
     localisations = {
         event: found for event, found in verdict.localisations.items() if event in evidence
     }
@@ -262,10 +264,10 @@ def _words(comparison: Comparison, reference: Reference) -> str:
 
 
 def _events(
-    analysis: Analysis, comparison: Comparison
+    findings: Sequence[Event], labels: Labels | None, comparison: Comparison
 ) -> tuple[tuple[Event, ...], dict[Event, Evidence]]:
     """Findings in order of time, and the evidence of each."""
-    left = list(analysis.findings)
+    left = list(findings)
     found: list[tuple[Event, Evidence]] = []
     for each in comparison.exceedances:
         start, stop, absorbed = each.start, each.stop, []
@@ -276,7 +278,7 @@ def _events(
         left = [event for event in left if event not in absorbed]
         # The general model sets onsets by single samples, levels by frames.
         near = [event.start for event in absorbed if abs(event.start - start) <= 4 * HOP]
-        label, score, novel = _named(analysis, each, absorbed)
+        label, score, novel = _named(labels, each, absorbed)
         event = Event(label, min(near, default=start), stop, score, novel)
         found.append((event, _evidence(each)))
     for event in left:
@@ -306,7 +308,7 @@ def _evidence(each: Exceedance) -> Evidence:
 
 
 def _named(
-    analysis: Analysis, each: Exceedance, absorbed: Sequence[Event]
+    labels: Labels | None, each: Exceedance, absorbed: Sequence[Event]
 ) -> tuple[str, float, bool]:
     """Class, score and novelty that the general model has for a stretch."""
     named = [event for event in absorbed if event.label != UNKNOWN]
@@ -315,7 +317,6 @@ def _named(
             named, key=lambda event: min(event.stop, each.stop) - max(event.start, each.start)
         )
         return best.label, best.score, best.novel
-    labels = analysis.labels
     if labels is None:
         return LOUDER, 0.0, False
     inside = (labels.start < each.stop) & (labels.stop > each.start)
