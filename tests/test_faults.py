@@ -219,8 +219,9 @@ time.time = lambda: true() + 86400 * next(days)
 """
 
 
-@pytest.mark.parametrize("arguments", FILES.values(), ids=FILES)
-def test_a_clock_that_jumps_by_days_changes_nothing(place, undisturbed, arguments):
+@pytest.mark.parametrize("name", ["view", "export mcap", "classify", "resume", "simulate", "live"])
+def test_a_clock_that_jumps_by_days_changes_nothing(place, undisturbed, name):
+    arguments = FILES[name]
     (place / "site").mkdir()
     (place / "site/sitecustomize.py").write_text(JUMPS)
     path = f"{place / 'site'}{os.pathsep}{ROOT}"

@@ -103,22 +103,13 @@ def test_it_stands_sways_squats_and_waves(robot):
 
 
 @pytest.mark.slow
-def test_it_walks_while_its_arms_move():
-    walks_well(G1_MOVING, "walk")
-
-
-@pytest.mark.slow
-@EACH
-@pytest.mark.parametrize("gait", WALKS)
-def test_every_robot_walks_in_every_gait(robot, gait):
+@pytest.mark.parametrize(
+    ("robot", "gait"),
+    zip(HUMANOIDS, WALKS, strict=True),
+    ids=lambda each: getattr(each, "name", each),
+)
+def test_every_robot_walks_and_every_gait_is_walked(robot, gait):
     walks_well(robot, gait)
-
-
-@pytest.mark.slow
-@EACH
-def test_every_robot_stands_sways_and_waves(robot):
-    _, run = simulated(robot, SQUAT)
-    assert (run.contact > 0).all()
 
 
 def test_gaits_differ_in_their_time_on_both_feet():

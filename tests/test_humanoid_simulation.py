@@ -165,15 +165,17 @@ def test_planned_velocities_are_those_that_drives_follow_where_nothing_disturbs(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["talos", "g1"])
-@pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])
+@pytest.mark.parametrize(
+    ("robot", "way"),
+    [("g1", "straight"), ("talos", "curve"), ("g1", "directions"), ("talos", "spot")],
+)
 def test_humanoids_walk_every_way_without_an_event(robot, way):
     run = simulated(robot, way, 2)
     assert [block.label for block in run.blocks] == ["ok"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("side", ["full", "heel", "toe", "left", "right"])
+@pytest.mark.parametrize("side", ["heel", "toe", "left"])
 def test_obstacles_under_any_part_of_a_sole_are_impacts(side):
     run = simulated("talos", f"obstacle-{side}", 2)
     assert "impact" in {block.label for block in run.blocks}

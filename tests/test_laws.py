@@ -9,7 +9,6 @@ finds a loud one is a law.
 import tempfile
 from dataclasses import replace
 from functools import cache
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -110,10 +109,7 @@ def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(rate, kind, joint, f
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "rate"),
-    [
-        *((robot, 250.0) for robot in ("panda", "talos", "ur5")),
-        *product(("panda", "go2", "talos", "ur5"), (1000.0, 2000.0, 10_000.0)),
-    ],
+    [("panda", 250.0), ("ur5", 10_000.0), ("go2", 2000.0), ("talos", 1000.0)],
 )
 @given(**FAULTS)
 @settings(max_examples=30, deadline=None, derandomize=True)

@@ -3,6 +3,8 @@
 import json
 import re
 import shutil
+import subprocess
+import tempfile
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -261,12 +263,14 @@ def test_names_and_folders_that_are_too_long_are_one_line(tmp_path, monkeypatch)
         status, _, err = call(command[0], tmp_path / ("a" * 300), *command[1:])
         assert (status, err.count("\n")) == (3, 1)
         assert "cannot be read (File name too long)" in err
-    monkeypatch.chdir(tmp_path)
-    for _ in range(1500):
-        Path("d").mkdir()
-        monkeypatch.chdir("d")
-    with pytest.raises(LogError, match="a folder without logs"):
-        sources([tmp_path / "d"])
-    for _ in range(1500):  # which pytest cannot remove
-        monkeypatch.chdir("..")
-        Path("d").rmdir()
+    top = tempfile.mkdtemp()  # not in pytest's folder, which it cannot remove so deep
+    try:
+        monkeypatch.chdir(top)
+        for _ in range(1500):
+            Path("d").mkdir()
+            monkeypatch.chdir("d")
+        with pytest.raises(LogError, match="a folder without logs"):
+            sources([Path(top)])
+    finally:
+        monkeypatch.undo()
+        subprocess.run(["rm", "-rf", top], check=True)

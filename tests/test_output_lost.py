@@ -78,30 +78,6 @@ def test_every_command_ends_with_5_if_the_reader_of_standard_output_is_gone(argu
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("arguments", "limit"),
-    [
-        (["view", demo_run(), "--save"], 300_000),
-        (["live", "--rate", "1000", "--save"], 30_000),
-        (["noise", demo_run(), "--csv"], 10_000),
-        (["export", demo_run(), "-o"], 10_000),
-        (["listen", demo_run(), "-o"], 10_000),
-    ],
-    ids=lambda each: str(each[0]) if isinstance(each, list) else "",
-)
-def test_a_file_that_cannot_be_written_whole_is_one_line_and_leaves_nothing(
-    tmp_path, arguments, limit
-):
-    suffix = {"noise": "csv", "export": "mcap", "listen": "wav"}.get(arguments[0], "rrd")
-    target = tmp_path / f"out.{suffix}"
-    done = run(*arguments, target, limit=limit, stdout=subprocess.PIPE, input=ROWS)
-    assert done.stderr.splitlines()[-1] == f"inspector: {target}: {TOO_LARGE}"
-    assert "Traceback" not in done.stderr
-    assert done.returncode == 5
-    assert os.listdir(tmp_path) == []
-
-
 def test_a_recording_that_is_lost_keeps_the_one_that_it_would_replace(tmp_path):
     target = tmp_path / "out.rrd"
     target.write_text("before")
