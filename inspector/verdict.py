@@ -314,7 +314,8 @@ class Verdict:
     def severity(self) -> tuple[int, int, float]:
         """Sorts runs, the worst first: by status, number of findings that fail it, best score."""
         score = max((event.score for event in self.failing), default=0.0)
-        return list(EXIT).index(self.status), -len(self.failing) - len(self.missing), -score
+        rounded = round(score, 6)  # as it is kept: a resumed verdict ranks as a new one
+        return list(EXIT).index(self.status), -len(self.failing) - len(self.missing), -rounded
 
     @classmethod
     def of(cls, path: Path, analysis: Analysis) -> "Verdict":
