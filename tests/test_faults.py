@@ -41,7 +41,7 @@ FILES = {
     "classify": ("classify", "good", "--write", "json=out/verdicts.json"),
     "resume": ("classify", "good", "--resume", "out/state.jsonl"),
     "smoothness": ("smoothness", "good", "--picture", "out/smoothness.png"),
-    "simulate": ("simulate", "run", "panda", "-o", "out/simulated.npz"),
+    "simulate": ("simulate", "run", "panda", "--duration", "3", "-o", "out/simulated.npz"),
     "live": ("live", "--rate", "1000", "--save", "out/live.rrd"),
 }
 """Commands that write one file, by what it is."""
@@ -207,7 +207,7 @@ def test_a_command_that_was_killed_leaves_a_whole_file_or_none(place, undisturbe
 def test_a_folder_of_a_command_that_was_killed_is_completed(place, undisturbed, arguments):
     status, whole = undisturbed(arguments)
     kill_while_writing(place, arguments)
-    again = arguments if arguments[0] == "import" else (*arguments, "--overwrite")
+    again = arguments if arguments[0] in ("import", "accept") else (*arguments, "--overwrite")
     assert run(place, again)[0] == status
     assert set(finished(place)) == set(whole)
 
