@@ -29,7 +29,7 @@ from noiseclassifier import Event
 from noisemodel import OutputError
 
 ROOT = Path(__file__).parents[1]
-COUNT = 24
+COUNT = 12
 LIBRARY = load_library(model_files())
 
 

@@ -105,7 +105,7 @@ def test_it_stands_sways_squats_and_waves(robot):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "gait"),
-    zip(HUMANOIDS, WALKS, strict=True),
+    list(zip(HUMANOIDS, WALKS, strict=True)),
     ids=lambda each: getattr(each, "name", each),
 )
 def test_every_robot_walks_and_every_gait_is_walked(robot, gait):

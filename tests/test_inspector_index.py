@@ -87,7 +87,7 @@ def test_an_empty_page_is_a_page():
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_browser_shows_the_page_in_both_schemes(tmp_path, scheme):
     (tmp_path / "pictures").mkdir()
-    drawing = Path(__file__).parents[1] / "assets" / "pictures" / "panda-multisine.png"
+    drawing = Path(__file__).parents[1] / "assets" / "pictures" / "inspector.png"
     picture = tmp_path / "pictures" / "loud.png"
     picture.write_bytes(drawing.read_bytes())
     (tmp_path / "index.html").write_text(page([replace(LONG[0], picture=picture), *LONG[1:]]))

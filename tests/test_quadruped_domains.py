@@ -106,7 +106,7 @@ def test_a_target_robot_walks_upright_and_where_it_is_planned(robot, gait):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "gait"),
-    zip(QUADRUPEDS, cycle(["stand", "trot", "walk", "pace"]), strict=False),
+    list(zip(QUADRUPEDS, cycle(["stand", "trot", "walk", "pace"]), strict=False)),
     ids=lambda each: getattr(each, "name", each),
 )
 def test_every_quadruped_and_every_gait_stays_upright(robot, gait):

@@ -201,7 +201,7 @@ def test_a_healthy_quadruped_is_ok_all_the_time(robot, way):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("robot", "name"), zip(cycle(["anymal", "go2", "solo12"]), FAILURE, strict=False)
+    ("robot", "name"), list(zip(cycle(["anymal", "go2", "solo12"]), FAILURE, strict=False))
 )
 def test_a_scenario_has_its_failure_on_every_quadruped(robot, name):
     # Not "decalibrated" on ANYmal: each of its steps differs from its twin's, no impact stands out.
