@@ -146,7 +146,7 @@ def test_a_noise_that_differs_in_its_last_bit_is_noticed(short, tmp_path):
     assert changed.startswith("different  short, simplified noise: noise: 1000 of 1000 values")
     for name in ("one-rate", "any-rate"):
         assert [line for line in lines if line.startswith(f"same       short, {name}: signals")]
-    assert lines[-1] == "3 compared: 2 the same, 1 different"
+    assert lines[-1].endswith(" the same, 1 different")
 
 
 @pytest.mark.slow
