@@ -94,7 +94,8 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
         run, remark = slower, f"Labelled at {slower.rate:g} Hz, the rate of its values."
     if not _close(run.rate, rate):
         run = nm.decimated(run, rate)
-        remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
+        left = f"nothing above {rate / 2:g} Hz is left"
+        remark = f"Labelled at {rate:g} Hz, the rate of model {name}: {left}."
     start = float(run.time[0])
     lasting = nc.Lasting(run.rate, start=start)
     labels = classifier.classify_pieces(_watched(run, lasting), run.rate, start=start, whole=True)

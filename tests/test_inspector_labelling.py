@@ -56,11 +56,16 @@ def test_a_rattle_on_a_smooth_motion_is_found_when_it_happens(rate):
 
 def test_a_faster_run_is_decimated_and_a_slower_one_is_not_classified():
     labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), FIXED)
-    assert labelled.remark == "Labelled at 1000 Hz, the rate of model noise."
+    assert (
+        labelled.remark
+        == "Labelled at 1000 Hz, the rate of model noise: nothing above 500 Hz is left."
+    )
     with pytest.raises(CannotTellError, match="500 Hz"):
         label_run(run_of(np.zeros((2000, 1)), 500.0), FIXED)
     labelled = label_run(run_of(np.zeros((20_000, 1)), 20_000.0), LIBRARY)
-    assert labelled.remark == "Labelled at 10000 Hz, the rate of model general."
+    assert labelled.remark == (
+        "Labelled at 10000 Hz, the rate of model general: nothing above 5000 Hz is left."
+    )
     with pytest.raises(CannotTellError, match="79 Hz"):
         label_run(run_of(np.zeros((2000, 1)), 79.0), LIBRARY)
 

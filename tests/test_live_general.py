@@ -39,7 +39,10 @@ def test_live_motion_of_any_rate_is_labelled_as_it_comes(rate):
 @pytest.mark.parametrize(("rate", "lower"), [(12_000.0, 6000.0), (20_000.0, 10_000.0)])
 def test_live_motion_above_10_khz_is_decimated(rate, lower):
     labeller, found = live(run_at(rate, seconds=1.5))
-    assert labeller.remark == f"Labelled at {lower:g} Hz, the rate of model general."
+    assert labeller.remark == (
+        f"Labelled at {lower:g} Hz, the rate of model general: nothing above {lower / 2:g} Hz is"
+        " left."
+    )
     assert labeller.hop == pytest.approx(0.1)
     assert len(found["start"]) > 5
 

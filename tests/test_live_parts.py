@@ -185,7 +185,10 @@ def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
     batch = model.classify(nm.simplified(lower.velocity), 1000.0)
     labeller = Labeller(library, 2000.0, {"velocity": 3})
     labels = labelled(labeller, velocity)
-    assert labeller.remark == "Labelled at 1000 Hz, the rate of model slow."
+    assert (
+        labeller.remark
+        == "Labelled at 1000 Hz, the rate of model slow: nothing above 500 Hz is left."
+    )
     # The first frame and the last ones touch ends beyond which the whole run was extrapolated.
     np.testing.assert_allclose(labels.start, batch.start[1:-1], atol=1e-9)
     assert np.array_equal(labels.label, batch.label[1:-1])

@@ -2,6 +2,7 @@ import re
 
 import numpy as np
 import pytest
+from commandline import call
 from csvlogs import TIME, jittered, log, swing, write
 
 from inspector import read_log
@@ -45,6 +46,29 @@ def test_a_declared_rate_is_the_rate(tmp_path):
         read_log(log(tmp_path), rate=1000)
     with pytest.raises(InspectorError, match="the rate is 0 Hz; expected a number above 0"):
         read_log(log(tmp_path), rate=0)
+
+
+def test_a_lower_rate_says_which_band_is_lost(tmp_path):
+    lost = ": nothing above 40 Hz is left"
+    for stamps in (TIME, jittered()):
+        (remark,) = read_log(log(tmp_path, stamps), rate=80).remarks
+        assert remark.startswith("log.csv: resampled to 80 Hz")
+        assert remark.endswith(f" ms at most){lost}")
+    _, out, _ = call("import", log(tmp_path), "--rate", "80", "-o", tmp_path / "run.npz")
+    assert lost in out
+    for higher in (log(tmp_path), log(tmp_path, jittered() * 1.005)):
+        assert not any("is left" in each for each in read_log(higher, rate=100).remarks)
+
+
+def test_a_faster_clock_of_desired_motion_loses_a_band_whether_decimated_or_interpolated(tmp_path):
+    measured = log(tmp_path)
+    for rate in (1000, 990):
+        time = np.arange(4 * rate) / rate
+        columns = {"time": time, "elbow.velocity": swing(time)[1]}
+        desired = write(tmp_path / "desired.csv", columns)
+        remarks = read_log(measured, desired=desired).remarks
+        said = f"velocity_desired: decimated from {rate} to 100 Hz: nothing above 50 Hz is left"
+        assert said in remarks
 
 
 def test_resampling_does_not_overshoot(tmp_path):

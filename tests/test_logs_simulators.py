@@ -455,7 +455,7 @@ def test_lerobots_velocities_and_efforts_are_read_where_a_set_has_them(tmp_path)
     )
     expected = (
         "position_desired: each target is held for 5 samples (10 Hz); interpolated from target to"
-        " target"
+        " target: nothing above 5 Hz is left"
     )
     assert expected in remarks
     assert np.array_equal(run.velocity, np.float32(velocity)[: len(run.time)])

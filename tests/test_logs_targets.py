@@ -29,11 +29,15 @@ def held(every, start=0):
 
 @pytest.mark.parametrize(
     ("every", "start", "said"),
-    [(10, 0, "10 samples (50 Hz)"), (7, 3, "7 samples (71.43 Hz)"), (25, 0, "25 samples (20 Hz)")],
+    [
+        (10, 0, "10 samples (50 Hz); {}: nothing above 25 Hz is left"),
+        (7, 3, "7 samples (71.43 Hz); {}: nothing above 35.71 Hz is left"),
+        (25, 0, "25 samples (20 Hz); {}: nothing above 10 Hz is left"),
+    ],
 )
 def test_held_targets_are_interpolated_from_target_to_target(tmp_path, every, start, said):
     run, remarks = read(tmp_path, held(every, start))
-    assert remarks == [f"{HELD}{said}; interpolated from target to target"]
+    assert remarks == [HELD + said.format("interpolated from target to target")]
     inside = slice(2 * every, -2 * every)
     truth = VELOCITY[: len(run.time)][inside]
     error = run.velocity_desired[inside] - truth

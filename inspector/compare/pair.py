@@ -47,7 +47,7 @@ def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
         if run.rate > rate * (1 + SAME_RATE):
             remarks.append(
                 f"The run {which} has {run.rate:g} Hz: decimated to the {rate:g} Hz of the other"
-                " one, its efforts are left out."
+                f" one, nothing above {rate / 2:g} Hz is left, and its efforts are left out."
             )
     before, after = (_at_rate(run, rate) for run in (before, after))
     return before, after, tuple(remarks)

@@ -148,7 +148,10 @@ class Labeller:
         self._lasting = nc.Lasting(rate / ratio)
         if ratio > 1:
             self._decimator = Decimator(ratio, self._signals.columns)
-            self.remark = f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}."
+            self.remark = (
+                f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}: nothing above"
+                f" {rate / ratio / 2:g} Hz is left."
+            )
 
     @property
     def length(self) -> float:

@@ -33,6 +33,8 @@ from noisemodel.run import METHOD, base_velocity, joint_velocity
 from noisemodel.types import Array, Indices, Mask, Real
 
 LARGEST_RATE_RATIO = 1.5
+SAME_RATE = 1.01
+"""Ratio of two rates up to which no band is lost from one to the other."""
 """Largest ratio of the specified rate to that of the stamps, or the inverse."""
 MOST_SAMPLES_PER_STAMP = 20
 """Largest number of the run's samples per logged sample; above it most of the run is gaps."""
@@ -519,7 +521,7 @@ def without_held_targets(tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tu
             remarks.append(
                 f"position_desired: each target is held for {hold:.3g} samples"
                 f" ({plain(each.stamps.clock.nominal / hold, 4)} Hz); interpolated from target to"
-                " target"
+                f" target{_lost(each.stamps.clock.nominal, each.stamps.clock.nominal / hold)}"
             )
         found.append(joined or each)
     return tuple(found), tuple(remarks)
@@ -591,6 +593,7 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
     remarks = [*_remarks(logs, tracks)]
     remarks += [f"{logs[-1].path.name}: {said}"] if said else []
     own = next(t.stamps for t in tracks if t.signal == main.signal and t.joints == main.joints)
+    remarks += _decimated(tracks, own)
     kept, interpolated = without_held_targets(tracks)
     main = next(track for track in kept if track.stamps is own)
     time, valid = common_time(kept, main)
@@ -713,7 +716,7 @@ def _of_clock(stamps: Stamps) -> Iterator[str]:
         yield (
             f"resampled to {clock.rate:g} Hz (the stamps' nominal rate is"
             f" {clock.nominal:g} Hz; their jitter is {clock.jitter_rms * 1e3:.3g} ms rms,"
-            f" {clock.jitter_max * 1e3:.3g} ms at most)"
+            f" {clock.jitter_max * 1e3:.3g} ms at most){_lost(clock.nominal, clock.rate)}"
         )
     if clock.gaps:
         total = sum(stop - start for start, stop in clock.gaps)
@@ -721,6 +724,24 @@ def _of_clock(stamps: Stamps) -> Iterator[str]:
             f"{counted(len(clock.gaps), 'gap')}, {total:.3g} s in all, the first at"
             f" {clock.gaps[0][0]:.6g} s, marked as not valid"
         )
+
+
+def _decimated(tracks: Sequence[Track], own: Stamps) -> Iterator[str]:
+    """What the run's rate takes from signals that were sampled faster, a sentence each clock."""
+    faster: dict[int, list[Track]] = {}
+    for track in tracks:
+        if track.stamps is not own:
+            faster.setdefault(id(track.stamps), []).append(track)
+    for group in faster.values():
+        before = group[0].stamps.clock.nominal
+        if lost := _lost(before, own.clock.rate):
+            names = ", ".join(dict.fromkeys(track.signal for track in group))
+            yield f"{names}: decimated from {before:g} to {own.clock.rate:g} Hz{lost}"
+
+
+def _lost(before: float, after: float) -> str:
+    """What a lower rate leaves of a signal, however it is sampled; nothing if it is no lower."""
+    return f": nothing above {plain(after / 2, 4)} Hz is left" if after < before / SAME_RATE else ""
 
 
 def signals_of(
