@@ -438,12 +438,27 @@ def written(tmp_path, header, *columns):
             "fits no column; columns are a_cmd",
         ),
         ("t,q1,q2", "velocity.{joint}=q", "a pattern has {joint} once on either side"),
+        (
+            "t,a_x,b_x",
+            "position.{joint}={joint}_x velocity.{joint}={joint}_x",
+            "column '{joint}_x' is mapped twice",
+        ),
+        (
+            "t,a_x,a_y",
+            "position.{joint}={joint}_x position.{joint}={joint}_y",
+            "log.csv: 'a_x' and 'a_y' are both mapped to position.a; map one of them",
+        ),
+        (
+            "t,a_x,b_x",
+            "position.{joint}={joint}_x position.a=b_x",
+            "log.csv: 'b_x' and 'a_x' are both mapped to position.a; map one of them",
+        ),
     ],
 )
 def test_a_pattern_that_does_not_fit_is_one_line(tmp_path, header, mapping, message):
     path = written(tmp_path, header, T6, Q6[:, :2])
     with pytest.raises(InspectorError, match=message) as caught:
-        read_log(path, mapping=[mapping])
+        read_log(path, mapping=mapping.split(" "))
     assert "\n" not in str(caught.value)
 
 

@@ -38,6 +38,7 @@ TIME_UNITS = {
 UNITS = {
     **dict.fromkeys(("rad", "radians"), ("position", 1.0)),
     **dict.fromkeys(("deg", "degree", "degrees", "°"), ("position", pi / 180)),
+    "mrad": ("position", 1e-3),
     **dict.fromkeys(("rev", "turns"), ("position", 2 * pi)),
     **dict.fromkeys(("m",), ("position", 1.0)),
     **dict.fromkeys(("mm",), ("position", 1e-3)),
@@ -45,6 +46,7 @@ UNITS = {
     **dict.fromkeys(
         ("deg/s", "deg/sec", "deg_s", "degs", "degps", "dps", "°/s"), ("velocity", pi / 180)
     ),
+    "mrad/s": ("velocity", 1e-3),
     **dict.fromkeys(("rpm", "rev/min"), ("velocity", pi / 30)),
     **dict.fromkeys(("rev/s", "turns/s"), ("velocity", 2 * pi)),
     **dict.fromkeys(("m/s",), ("velocity", 1.0)),
