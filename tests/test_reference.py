@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import sys
 from dataclasses import replace
@@ -386,3 +387,14 @@ def test_findings_in_what_is_accepted_are_warned_of_and_wanted_from_then_on(own,
     assert [each.label for each in place.wanted] == ["impact"]
     assert place.wanted[0].joints == ("upperarm",)
     assert call("classify", own / "now")[0] == 0
+
+
+def test_pages_say_the_evidence_of_each_finding_and_the_reference_of_the_run(own, simulate):
+    simulate.write(own / "now", "chatter")
+    run, page = own / "now" / "pick-1.npz", own / "page.html"
+    assert call("classify", run, "--report", own / "report")[0] == 1
+    assert call("view", run, "--reference", own / "reference", "-o", page)[0] == 0
+    for found in (page, own / "report" / "index.html"):
+        words = " ".join(found.read_text().split())
+        assert re.search(r"\d\d(\.\d)? dB over repetitions", words)
+        assert re.search(r"[Rr]eference: \S*reference, 100% by 3 repetitions of pick", words)

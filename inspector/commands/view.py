@@ -100,8 +100,8 @@ def view(
         from inspector.recording import viewer as browser
 
         browser.free_port(port)
-    if reference and (len(paths) > 1 or (output and output.suffix.lower() == ".html")):
-        raise typer.BadParameter("--reference takes one run, and -o FILE.rrd or FILE.png")
+    if reference and len(paths) > 1:
+        raise typer.BadParameter("--reference takes one run")
     target = output or viewer.scratch_path(_together(paths))
     overwrite = overwrite or output is None
     refuse_existing(target, overwrite=overwrite)
@@ -221,20 +221,31 @@ def _page(
     library: "Library",
     kind: str,
     floor: float | None,
-    *_: object,
+    _at: float | None,
+    _size: str,
+    reference: Path | None,
+    *,
     overwrite: bool,
 ) -> None:
     """Write one HTML page about a run: pictures, tables, sound."""
-    from inspector.analysis import analyse_file
+    from datetime import date
+
+    from inspector.analysis import analyse_file, headline
     from inspector.audit import text
+    from inspector.reference.verdicts import References
     from inspector.report import html
+    from inspector.verdict import Verdict
 
     html.require()
     found = analyse_file(opened(run, reading), library, links=bool(kind), kind=kind)
     assert found.audit is not None
-    seen = text(found.name, found.audit)
-    html.write(found, output, audit=seen, overwrite=overwrite, floor=floor)
-    typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
+    seen, verdict, told = text(found.name, found.audit), None, found.headline
+    if reference is not None:
+        beside = References.found([run], reference, reading)
+        verdict = beside.judge(beside(found, Verdict.of(run, found)), None, date.today())
+        told = headline(verdict.status, verdict.failing, found.reason)
+    html.write(found, output, audit=seen, verdict=verdict, overwrite=overwrite, floor=floor)
+    typer.echo(f"{output}: {told} ({output.stat().st_size / 1e6:.1f} MB)")
 
 
 def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: bool) -> None:

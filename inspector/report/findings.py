@@ -42,6 +42,8 @@ def row(verdict: Verdict, event: Event, runs: str = "") -> Row:
     _, joints, band = words(known) if known else ("", "", "")
     evidence, order = verdict.evidence.get(event), verdict.orders.get(event)
     over = ""
+    if evidence is not None and not evidence.excused:
+        over = "by the general model"
     if evidence is not None and evidence.db is not None and not evidence.excused:
         over = f"{evidence.db:+.0f} dB over {evidence.kind}"
         joints = joints or evidence.joint

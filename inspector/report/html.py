@@ -3,7 +3,7 @@
 import re
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -12,8 +12,10 @@ import numpy as np
 
 from inspector.analysis import Analysis
 from inspector.errors import InspectorError
+from inspector.report.findings import excused
 from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
 from inspector.sound import clip, worst_time
+from inspector.verdict import Verdict
 from noisemodel.extended import vibrating_pieces
 from noisemodel.files import replacing
 from noisemodel.noise import REFERENCE_POWER, decibel
@@ -56,6 +58,7 @@ def write(
     path: Path,
     *,
     audit: str = "",
+    verdict: Verdict | None = None,
     overwrite: bool = False,
     floor: float | None = None,
 ) -> None:
@@ -65,6 +68,7 @@ def write(
         analysis: A run with what was found in it.
         path: The file to write, by convention ``*.html``.
         audit: What the log can show, in lines.
+        verdict: The verdict beside a reference, which replaces that of the analysis.
         overwrite: Whether a file that exists may be replaced.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
 
@@ -73,17 +77,24 @@ def write(
         OutputError: If the file exists or cannot be written.
     """
     require()
-    text = page(analysis, audit=audit, floor=floor)
+    text = page(analysis, audit=audit, verdict=verdict, floor=floor)
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def page(analysis: Analysis, *, audit: str = "", floor: float | None = None) -> str:
+def page(
+    analysis: Analysis,
+    *,
+    audit: str = "",
+    verdict: Verdict | None = None,
+    floor: float | None = None,
+) -> str:
     """Write the page of an inspected run.
 
     Args:
         analysis: A run with what was found in it.
         audit: What the log can show, in lines.
+        verdict: The verdict beside a reference, which replaces that of the analysis.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s].
 
     Returns:
@@ -91,12 +102,20 @@ def page(analysis: Analysis, *, audit: str = "", floor: float | None = None) -> 
     """
     from inspector.report.picture import picture
 
+    if verdict is not None:
+        failing = verdict.failing
+        analysis = replace(analysis, status=verdict.status, findings=failing, spans=failing)
     html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
     add_text(body, "p", spoken(analysis.headline), "verdict")
+    if verdict is not None and verdict.beside is not None:
+        add_text(body, "p", f"Reference: {verdict.beside.path}, {verdict.beside.words}.", "note")
     _add_table(body, facts(analysis))
-    for table in found(analysis):
+    for table in found(analysis, verdict):
         _add_table(body, table)
+    if verdict is not None:
+        _add_list(body, "Missing", [str(each) for each in verdict.missing])
+        _add_list(body, "Does not count", excused(verdict))
     add_text(body, "h2", "Over time")
     image = f"data:image/png;base64,{_encoded(picture(analysis, floor=floor))}"
     ET.SubElement(body, "img", src=image, alt=_described(analysis))
@@ -240,9 +259,10 @@ def _in_words(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def found(analysis: Analysis) -> Iterator[Table]:
+def found(analysis: Analysis, verdict: Verdict | None = None) -> Iterator[Table]:
     """List findings and annotated blocks, those that there are."""
     remark = note(analysis)
+    known = {} if verdict is None else verdict.evidence
     if analysis.findings:
         rows = [
             (
@@ -251,10 +271,18 @@ def found(analysis: Analysis) -> Iterator[Table]:
                 f"{event.stop:.2f}",
                 f"{event.score:.2f}",
                 *localised(analysis, event),
+                *([str(known[event])] if event in known else []),
             )
             for event in analysis.findings
         ]
-        head = ("class", "from [s]", "to [s]", "score", *LOCALISATION)
+        head = (
+            "class",
+            "from [s]",
+            "to [s]",
+            "score",
+            *LOCALISATION,
+            *(["evidence"] if known else []),
+        )
         yield Table("Findings", head, rows, (1, 2, 3), remark)
     if analysis.run.blocks:
         annotated = [

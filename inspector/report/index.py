@@ -190,11 +190,18 @@ def _shared_facts(verdicts: Sequence[Verdict]) -> list[str]:
 def _facts(verdict: Verdict) -> list[str]:
     facts = (
         f"model {verdict.model}" if verdict.model else "",
-        f"expectations: {verdict.expectations}" if verdict.expectations else "",
+        judged_by(verdict),
         verdict.message if verdict.model else "",
         verdict.assumed,
     )
     return [fact for fact in facts if fact]
+
+
+def judged_by(verdict: Verdict) -> str:
+    """By which reference a run was judged, in a line; empty without one."""
+    if verdict.beside is None:
+        return f"reference: {verdict.expectations}" if verdict.expectations else ""
+    return f"reference: {verdict.beside.path}, {verdict.beside.words}"
 
 
 def _add_row(rows: ET.Element, verdict: Verdict, number: int) -> None:
@@ -209,6 +216,8 @@ def _add_row(rows: ET.Element, verdict: Verdict, number: int) -> None:
     told += [f"{len(verdict.excused)} that do not count"] if verdict.excused else []
     failed = verdict.status not in (Status.OK, Status.FINDINGS)
     add_text(row, "td", verdict.message if failed else ", ".join(told), "told")
+    if verdict.beside is not None:
+        add_text(row[-1], "p", judged_by(verdict), "note")
     _add_timeline(ET.SubElement(row, "td", {"class": "line"}), verdict)
 
 
