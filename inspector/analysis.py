@@ -486,8 +486,10 @@ SHOWN = 8
 """Joints and links that have a row in a picture."""
 
 
-def worst_joint(analysis: Analysis) -> int:
-    """Column of the joint that the worst finding is localised at; else that of the loudest."""
+def worst_joint(analysis: Analysis) -> int | None:
+    """Column of the joint of the worst finding, else of the loudest; None of a base alone."""
+    if not analysis.run.joint_names:
+        return None
     moment = worst(analysis)[:1]
     for event, known in analysis.localisations.items() if analysis.findings and moment else ():
         if known.joints and event.start <= moment[0].peak <= event.stop:
@@ -497,12 +499,14 @@ def worst_joint(analysis: Analysis) -> int:
     return int(np.argmax(power))
 
 
-def worst_signal(analysis: Analysis, joint: int) -> Array:
-    """Velocity of a joint above 10 Hz, shape (samples,), in [rad/s] or [m/s].
+def worst_signal(analysis: Analysis, joint: int | None) -> Array:
+    """Velocity of a joint above 10 Hz, shape (samples,), in [rad/s] or [m/s]; else the noise.
 
     The noise is a norm, in which a vibration of 35 Hz has 70 Hz.
     """
     run = analysis.run
+    if joint is None:
+        return np.asarray(vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0])
     own = [run.velocity[rows][:, joint].astype(np.float64) for rows in pieces(run.velocity)]
     return np.asarray(vibrating(np.concatenate(own)[:, None], run.mask, run.rate)[:, 0])
 

@@ -542,7 +542,8 @@ def _log(
 
 def _joint(pair: Pair) -> str:
     """The joint whose spectra are shown: the worst one after, if both runs have it."""
-    name = pair.after.run.joint_names[worst_joint(pair.after)]
+    joint = worst_joint(pair.after)
+    name = "" if joint is None else pair.after.run.joint_names[joint]
     return name if name in pair.before.run.joint_names else ""
 
 

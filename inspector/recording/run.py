@@ -137,7 +137,7 @@ def _log(
         text=text,
         classes=shown_classes,
         curves=curves,
-        joint=run.joint_names[joint],
+        joint="the noise" if joint is None else run.joint_names[joint],
         spectrogram=panels.log_spectrogram(recording, analysis, spectrum, scale),
         orders=panels.log_orders(recording, analysis, scale),
         strips=strips,

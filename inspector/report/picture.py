@@ -76,7 +76,7 @@ def picture(analysis: Analysis, *, floor: float | None = None) -> bytes:
     fast = worst_signal(analysis, worst)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
     scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
-    title = f"{run.joint_names[worst]}\n[Hz]"
+    title = f"{'noise' if worst is None else run.joint_names[worst]}\n[Hz]"
     _spectrum(figure, axes["spectrogram"], spectrum, scale, title)
     if ordered is not None:
         joint, spectrum = ordered
