@@ -245,7 +245,7 @@ class Noise:
         """Fail with the findings, and leave a recording and a picture."""
         __tracebackhide__ = True
         from inspector.recording.run import write
-        from inspector.report.findings import sentence
+        from inspector.report.findings import brief, sentence
 
         stem = name_of(self._node.nodeid)
         recording, picture = self._artefacts(stem if self._count < 2 else f"{stem}-{self._count}")
@@ -260,7 +260,9 @@ class Noise:
             picture.write_bytes(drawn(analysis))
         number = len(events) + len(verdict.missing)
         by = f", {verdict.beside.words}" if verdict.beside else f", by model {analysis.model}"
-        lines = [f"{number} finding{'s' * (number != 1)} in {shown}{by}"]
+        first = brief(verdict, events[0]) if events else str(verdict.missing[0])
+        lines = [f"noise: {first} ({verdict.path})"]
+        lines += [f"{number} finding{'s' * (number != 1)} in {shown}{by}"]
         lines += [f"  {sentence(verdict, event)}" for event in events]
         lines += [f"  {each}" for each in verdict.missing]
         left = {"recording": recording, **({"picture": picture} if picture else {})}

@@ -101,6 +101,10 @@ class Ruled:
         return f"{words}: {self.reason}" if self.reason else words
 
 
+LOG, END = "log of ", "end of the run"
+"""What a scenario without logs, and a run that is cut, lack."""
+
+
 @dataclass(frozen=True)
 class Missing:
     """A finding that is required and was not found.
@@ -120,6 +124,21 @@ class Missing:
     def __str__(self) -> str:
         when = "" if self.start is None else f" from {self.start:.2f} s to {self.stop:.2f} s"
         return f"missing: {self.label}{when}{self.reason and f' (required: {self.reason})'}"
+
+    @property
+    def scenario(self) -> str:
+        """The scenario that has too few logs; empty of another finding."""
+        return self.label.removeprefix(LOG) if self.label.startswith(LOG) else ""
+
+    @property
+    def words(self) -> str:
+        """What that is of its scenario, in a word."""
+        return "MISSING" if self.scenario else "CUT" if self.label == END else "FAIL"
+
+    @property
+    def told(self) -> str:
+        """What is said of it beside its scenario and the word."""
+        return str(self) if self.words == "FAIL" else self.reason
 
 
 @dataclass(frozen=True)

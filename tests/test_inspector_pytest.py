@@ -114,7 +114,8 @@ def test_runs_are_compared_with_accepted_ones(project, tmp_path, processes):
     status, out = project(CHECKED.format(tone=0.05, first=5), *processes)
     assert status == 1
     assert "2 failed" in out
-    assert "dB over repetitions" in out
+    assert "dB over 3 repetitions (reach)" in out
+    assert re.search(r"^noise: \w+ \d+\.\d\d-", out, re.MULTILINE)
     assert "wrist" in out
     assert 'meant to be so? pytest --noise-accept "reason" accepts it' in out
     left = {path.name for path in (tmp_path / "noise-artefacts").iterdir()}

@@ -105,7 +105,7 @@ def test_missing_renamed_cut_and_frozen_scenarios_fail_by_name(runs, tmp_path, s
     assert rows["wave"]["verdict"] == "renamed"
     assert rows["wave"]["reason"] == "is called greet after"
     assert (rows["pick"]["verdict"], rows["place"]["verdict"]) == ("cut", "frozen")
-    assert "2.00 s, pick lasts 6.00 s" in rows["pick"]["reason"]
+    assert "2.0 of 6.0 s" in rows["pick"]["reason"]
 
 
 def test_runs_that_come_are_told_and_pass(runs):

@@ -22,9 +22,8 @@ from inspector.reference.store import Reference, levels_of, of_runs
 from inspector.reference.verdicts import References
 from inspector.status import EXIT, Status, Unknown
 from inspector.status import worst as worst_code
-from inspector.verdict import EXPECTED, Verdict, classify_files
+from inspector.verdict import EXPECTED, Evidence, Verdict, classify_files
 from noiseclassifier import Event
-from noiseclassifier.labels import interval
 from noisemodel.parallel import Jobs
 
 RARE = 3.0
@@ -60,7 +59,7 @@ class Finding:
         event: The finding.
         over: Its loudest exceedance over the other side, in [dB]; None by the general model.
         level: Level of that cell, in [dB re 1 rad/s].
-        words: Joint, signal and octave.
+        evidence: Its joint and octave.
     """
 
     kind: str
@@ -68,11 +67,7 @@ class Finding:
     event: Event
     over: float | None
     level: float | None
-    words: str
-
-    def __str__(self) -> str:
-        span = interval(self.event.start, self.event.stop)
-        return f"{self.kind}: {self.event.label} from {span}, {self.words} [{self.run.name}]"
+    evidence: Evidence
 
 
 @dataclass(frozen=True)
@@ -446,7 +441,7 @@ def _findings(
                 for other in one.events
             )
             named = LOUDER if there and kind == NEW else kind
-            found.append(Finding(named, path, event, known.db, known.level, str(known)))
+            found.append(Finding(named, path, event, known.db, known.level, known))
     return found
 
 

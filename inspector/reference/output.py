@@ -1,8 +1,9 @@
 """A difference as text, JSON, JUnit XML, GitHub annotations and Markdown."""
 
 import json
+import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from inspector.reference.difference import (
@@ -19,41 +20,77 @@ from inspector.reference.difference import (
 from inspector.report import cases
 from inspector.report.cases import DIFF_MARKER, Case, Job
 from inspector.report.cases import Outcome as OfTest
-from inspector.report.findings import table
+from inspector.report.findings import TOGETHER, table
 from inspector.status import EXIT, Status
 from inspector.text import counted
 from inspector.version import program_version
 
-MOST, CHANGES = 5, 3
-"""Findings and changes of a scenario that the text lists."""
+MOST = 5
+"""Findings of a scenario and kind that are listed."""
+SHORT = 0.5
+"""Up to this, in [s], the onset tells when a finding is."""
 
 
 def text(found: Difference) -> str:
-    """A row for each scenario, the worst first, and below what is new and what changed."""
-    rows = [("scenario", "runs", "verdict", "over before [dB]", "findings")]
+    """A row for each scenario, the worst first, with a line for each new finding; remarks last."""
+    rows = []
     for row in found.rows:
-        kinds = Counter(each.kind for each in row.findings)
-        listed = ", ".join(
-            f"{kinds[kind]} {kind}" for kind in (NEW, LOUDER, RESOLVED) if kinds[kind]
-        )
-        score = "" if row.score is None else f"{row.score:+.1f}"
-        runs = f"{len(row.before)} + {len(row.after)}"
-        rows.append((row.name, runs, row.outcome.value, score, listed))
-    lines = [summary(found), "", *table(rows), ""]
-    for row in found.rows:
-        if row.outcome is Outcome.SAME and not row.findings and not row.remarks:
-            continue
-        lines.append(f"{row.name}: {row.outcome}, {row.reason}")
-        lines += [f"  {finding}" for finding in row.findings[:MOST]]
-        if (left := len(row.findings) - MOST) > 0:
-            lines.append(f"  and {counted(left, 'more finding')} (--format json)")
-        if row.outcome is Outcome.WORSE:
-            lines += [f"  {change}" for change in row.changes[:CHANGES]]
-        lines += [f"  {remark}" for remark in row.remarks]
+        fails = found.status(row) is Status.FINDINGS
+        name, word = row.name, row.outcome.upper() if fails else row.outcome.value
+        for line in [*_told(row), *_folded(row, RESOLVED)] or [""]:
+            rows.append((name, word, line))
+            name = word = ""
+    lines = [summary(found), "", *table(rows)]
+    remarks = dict.fromkeys(remark for row in found.rows for remark in row.remarks)
+    lines += [f"note:    {remark}" for remark in remarks]
     bad = [row for row in found.rows if row.outcome is Outcome.WORSE and row.worst is not None]
     if bad and bad[0].worst is not None:
-        lines.append(f"next: inspector view {bad[0].before[0]} {bad[0].worst.run.run}")
+        lines.append(f"next:    inspector view {bad[0].before[0]} {bad[0].worst.run.run}")
     return "\n".join(lines).rstrip()
+
+
+def _told(row: Row) -> list[str]:
+    """What is new in a scenario, a line each; without levels there, what became of it first."""
+    found = [*_folded(row, NEW), *_folded(row, LOUDER)]
+    if row.outcome is Outcome.WORSE and any(each.over is not None for each in row.new):
+        return found
+    change = [str(each) for each in row.changes[:1]] if row.outcome is Outcome.WORSE else []
+    return [row.reason, *change, *found]
+
+
+def _folded(row: Row, kind: str) -> list[str]:
+    """Findings of a kind, one line for what repetitions share, by the class that most have."""
+    groups: list[list[Finding]] = []
+    for each in row.findings:
+        if each.kind == kind:
+            alike = (group for group in groups if _alike(group[0], each))
+            group = next(alike, None)
+            if group is None:
+                groups.append(group := [])
+            group.append(each)
+    side = row.before if kind == RESOLVED else row.after
+    lines = [f"{kind}: {_line(group, len(side))}" for group in groups[:MOST]]
+    left = len(groups) - MOST
+    return lines + ([f"and {left} more {kind} (--format json)"] if left > 0 else [])
+
+
+def _alike(one: Finding, other: Finding) -> bool:
+    same = one.event.label == other.event.label or one.evidence.joint != ""
+    near = abs(one.event.start - other.event.start) <= TOGETHER
+    return same and near and one.evidence.joint == other.evidence.joint and one.run != other.run
+
+
+def _line(group: Sequence[Finding], runs: int) -> str:
+    """Class, time, joint, octave, and how much louder: the loudest of repetitions."""
+    (label, _), *_ = Counter(each.event.label for each in group).most_common(1)
+    worst = max(group, key=lambda each: -math.inf if each.over is None else each.over)
+    start, stop, known = worst.event.start, worst.event.stop, worst.evidence
+    when = f"{start:.2f} s" if stop - start < SHORT else f"{start:.2f}-{stop:.2f} s"
+    band = f"{known.octave[0]:.0f}-{known.octave[1]:.0f} Hz" if known.octave else ""
+    over = "" if worst.over is None else f"{worst.over:+.0f} dB"
+    number = len({each.run for each in group})
+    several = f"{number} of {runs} runs" if runs > 1 else ""
+    return ", ".join(filter(None, [f"{label} {when}", known.joint, band, over, several]))
 
 
 def as_json(found: Difference) -> str:
@@ -190,12 +227,10 @@ def _job(found: Difference) -> Job:
 def _case(found: Difference, row: Row, place: int) -> Case:
     status = found.status(row)
     fails = status is Status.FINDINGS
-    news = [str(each) for each in row.new]
-    changes = list(map(str, row.changes[:CHANGES])) if row.outcome is Outcome.WORSE else []
-    why = [f"{row.outcome}, {row.reason}"] if row.outcome in (*BROKEN, Outcome.WORSE) else []
+    told = _told(row)
     outcomes = {Status.FINDINGS: OfTest.FAILURE, Status.CANNOT_TELL: OfTest.SKIPPED}
     worst = [path for path in row.after if row.worst and str(path) == row.worst.run.run]
-    others = [str(each) for each in row.findings if each.kind == RESOLVED or not fails]
+    others = [*(line for line in told if not fails and line != row.reason), *_folded(row, RESOLVED)]
     return Case(
         name=row.name,
         path=(worst or row.after or row.before)[0],
@@ -203,8 +238,8 @@ def _case(found: Difference, row: Row, place: int) -> Case:
         words=row.outcome,
         outcome=outcomes.get(status, OfTest.PASSED),
         rank=(list(EXIT).index(status), place),
-        kind=row.outcome if why else "new finding",
-        sentences=(*why, *changes, *news) if fails else (),
+        kind=row.outcome if row.outcome in (*BROKEN, Outcome.WORSE) else "new finding",
+        sentences=tuple(told) if fails else (),
         message="" if fails else row.reason,
         notes=(*others, *row.remarks),
         quiet=row.outcome is Outcome.SAME,

@@ -23,7 +23,7 @@ from inspector.reference.judging import (
 from inspector.reference.levels import HOP, Levels, levels
 from inspector.reference.store import NAME, Reference, find, scenario_of
 from inspector.status import Status
-from inspector.verdict import Beside, Evidence, Missing, Ruled, Ruling, Verdict
+from inspector.verdict import END, LOG, Beside, Evidence, Missing, Ruled, Ruling, Verdict
 from noiseclassifier import UNKNOWN, Event, Labels
 
 LOUDER = "louder"
@@ -125,10 +125,10 @@ class References:
             )
             missing = tuple(
                 Missing(
-                    f"log of {each.name}",
-                    reason=f"{names[each.name]} of {each.at_least}"
+                    f"{LOG}{each.name}",
+                    reason=f"{names[each.name]} of {each.at_least} logs"
                     if names[each.name]
-                    else each.reason,
+                    else f"no log; it had {len(each.repetitions)}",
                 )
                 for each in reference.scenarios
                 if each.required
@@ -339,7 +339,7 @@ def _failures(comparison: Comparison, reference: Reference) -> Iterable[tuple[st
     shortest = min(each.duration[0] for each in scenarios)
     names = " and ".join(each.name for each in scenarios)
     if run.duration < shortest - max(0.5, SHORTER * shortest):
-        yield "end of the run", f"{run.duration:.2f} s, {names} lasts {shortest:.2f} s"
+        yield END, f"{run.duration:.1f} of {shortest:.1f} s"
     still = frozen(run, [each for one in scenarios for each in one.repetitions])
     if still is not None:
         yield f"motion from {still:.2f} s on", f"the accepted runs of {names} move"

@@ -1,8 +1,9 @@
 """Findings in a line, alike in all formats, and runs of one scenario folded into a row."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from inspector.report.localisation import words
 from inspector.status import Status
@@ -14,7 +15,7 @@ from noiseclassifier.labels import interval
 REPETITION = re.compile(r"(?P<name>.+?)[-_.](?:run|rep|take|seed)?[-_.]?\d+")
 """Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
 TOGETHER = 0.25
-"""Onsets this close, of one class and joint in repetitions, are one row, in [s]: the hop of frames
+"""Onsets this close, of one class or joint in repetitions, are one row, in [s]: the hop of frames
 is 0.1 s or 0.2 s."""
 WORDS = {
     Status.INTERNAL_ERROR: "internal error",
@@ -45,18 +46,33 @@ def row(verdict: Verdict, event: Event, runs: str = "") -> Row:
     if evidence is not None and not evidence.excused:
         over = "by the general model"
     if evidence is not None and evidence.db is not None and not evidence.excused:
-        over = f"{evidence.db:+.0f} dB over {evidence.kind}"
+        over = f"{evidence.db:+.0f} dB over {_compared(verdict, evidence.kind)}"
         joints = joints or evidence.joint
+        if evidence.octave and not band:
+            band = f"{evidence.octave[0]:.0f}-{evidence.octave[1]:.0f} Hz"
     ruled = f"({verdict.ruled(event)})" if str(verdict.ruled(event)) else ""
     rest = (event.novelty.removeprefix(", "), str(order or ""), over, runs, ruled)
     when = f"{event.start:6.2f} - {event.stop:6.2f} s"
     return when, event.label, joints, band, ", ".join(filter(None, rest)).replace(", (", " (")
 
 
+def _compared(verdict: Verdict, kind: str) -> str:
+    """What a finding is louder than, with the number of repetitions where that is known."""
+    number = verdict.beside.repetitions if verdict.beside else 0
+    return counted(number, "repetition") if number and kind == "repetitions" else kind
+
+
 def sentence(verdict: Verdict, event: Event, runs: str = "") -> str:
     """The same as a sentence."""
     _, label, joints, band, rest = row(verdict, event, runs)
     parts = [f"{label} from {interval(event.start, event.stop)}", joints, band, rest]
+    return ", ".join(filter(None, parts)).replace(", (", " (")
+
+
+def brief(verdict: Verdict, event: Event) -> str:
+    """The same with nothing before what, when and where, for lines that are cut."""
+    _, label, joints, band, rest = row(verdict, event)
+    parts = [f"{label} {event.start:.2f}-{event.stop:.2f} s", joints, band, rest]
     return ", ".join(filter(None, parts)).replace(", (", " (")
 
 
@@ -92,7 +108,8 @@ class Group:
         """Findings that fail their runs, or those that do not, once for those of repetitions.
 
         Returns:
-            Of each, the verdict and the event with the best score, and in how many runs it is.
+            Of each, the verdict and the event with the best score, of the class that most of the
+            repetitions have, and in how many runs it is.
         """
         folded: list[list[tuple[Verdict, Event]]] = []
         for verdict in self.verdicts:
@@ -107,13 +124,22 @@ class Group:
         for each in folded:
             number = len({id(verdict) for verdict, _ in each})
             runs = f"{number} of {counted(several, 'run')}" if several > 1 else ""
-            result.append((*max(each, key=lambda one: one[1].score), runs))
+            (label, _), *_ = Counter(event.label for _, event in each).most_common(1)
+            named = [one for one in each if one[1].label == label]
+            result.append((*max(named, key=lambda one: one[1].score), runs))
         return result
+
+    @property
+    def words(self) -> str:
+        """What became of it: a scenario may be missing or cut."""
+        if self.worst.missing and not self.worst.failing:
+            return self.worst.missing[0].words
+        return WORDS[self.worst.status]
 
     @property
     def missing(self) -> list[str]:
         """Required findings that were not found."""
-        return list(dict.fromkeys(str(each) for one in self.verdicts for each in one.missing))
+        return list(dict.fromkeys(each.told for one in self.verdicts for each in one.missing))
 
     @property
     def sentences(self) -> list[str]:
@@ -129,13 +155,18 @@ class Group:
 def groups(verdicts: Sequence[Verdict]) -> list[Group]:
     """Runs by scenario, the worst first.
 
-    A scenario is what runs of one folder name so, or have one name but for a number. What could not
-    be read stays alone.
+    A scenario is what runs of one folder name so, or have one name but for a number, and one that
+    has no log. What could not be read stays alone.
     """
     found: dict[tuple[str, str], list[Verdict]] = {}
+    absent = []
     for verdict in sorted(verdicts, key=lambda each: each.severity):
-        found.setdefault(_key(verdict), []).append(verdict)
-    return [
+        if verdict.of_run:
+            found.setdefault(_key(verdict), []).append(verdict)
+        else:
+            each_alone = [replace(verdict, missing=(each,)) for each in verdict.missing]
+            absent += [Group(one.missing[0].scenario, [one]) for one in each_alone]
+    return absent + [
         Group(name if len(each) > 1 else str(each[0].path), each)
         for (_, name), each in found.items()
     ]
@@ -144,7 +175,7 @@ def groups(verdicts: Sequence[Verdict]) -> list[Group]:
 def _key(verdict: Verdict) -> tuple[str, str]:
     """Folder and scenario of a run."""
     path, alone = verdict.path, verdict.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR)
-    if alone or not verdict.of_run:
+    if alone:
         return str(path), ""
     repeated = REPETITION.fullmatch(path.stem)
     name = verdict.scenario or (str(path.with_name(repeated["name"])) if repeated else str(path))
@@ -154,8 +185,10 @@ def _key(verdict: Verdict) -> tuple[str, str]:
 def _alike(one: tuple[Verdict, Event], other: tuple[Verdict, Event]) -> bool:
     """Whether two findings of repetitions are one."""
     (first, event), (second, same) = one, other
+    known, other_known = first.evidence.get(event), second.evidence.get(same)
+    joint = known.joint if known and other_known and known.joint == other_known.joint else ""
     return (
-        event.label == same.label
+        (event.label == same.label or bool(joint))
         and abs(event.start - same.start) <= TOGETHER
         and first.ruled(event) == second.ruled(same)
         and (first is not second or event is same)

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shlex
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -33,6 +34,12 @@ SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
 MOST = 20
 """Findings of a scenario that are listed."""
+NOTHING = r"^Nothing stands out[^.]*\.\s*"
+"""The sentence that a row says."""
+REPEATED = r"\d+% by \d+ repetitions? of "
+"""What the line on the reference says for all runs."""
+AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
+"""By what else remarks of runs differ that say the same."""
 RESULTS = 5000
 """GitHub shows no more results of one SARIF file."""
 
@@ -66,10 +73,11 @@ def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
         lines = _one(read[0])
     else:
         lines = table([cells for group in groups(read) for cells in _rows(group)])
+    runs = [each for each in read if each.of_run]
     if verbose:
-        lines += [f"run:     {each.path} [{each.model or 'no model'}]" for each in read]
-    lines += _remarks(read)
-    worst = min(read, key=lambda each: each.severity, default=None)
+        lines += [f"run:     {each.path} [{each.model or 'no model'}]" for each in runs]
+    lines += _remarks(runs, verbose=verbose or len(verdicts) == 1)
+    worst = min(runs, key=lambda each: each.severity, default=None)
     if worst is not None and worst.failing:
         lines.append(f"next:    inspector view {shlex.quote(str(worst.path))}")
     return "\n".join([*lines, summary(verdicts)] if len(verdicts) > 1 else lines)
@@ -90,7 +98,7 @@ def _one(verdict: Verdict) -> list[str]:
 
 def _rows(group: Group) -> Iterator[tuple[str, ...]]:
     """Rows of a scenario: its first finding beside its name, the others below."""
-    name, status = group.name, WORDS[group.worst.status]
+    name, status = group.name, group.words
     number = len(group.verdicts)
     found = [row(*each) for fails in (True, False) for each in group.found(fails=fails)]
     others = group.missing or ([counted(number, "run")] if number > 1 and not found else [])
@@ -104,18 +112,40 @@ def _rows(group: Group) -> Iterator[tuple[str, ...]]:
         yield ("", "", f"and {left} more (--format json)")
 
 
-def _remarks(verdicts: Sequence[Verdict]) -> Iterator[str]:
+def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
     """What limits verdicts, once for all runs that it limits, and what they were compared with."""
     runs: Counter[str] = Counter()
     for verdict in verdicts:
         if verdict.status is not Status.CANNOT_TELL:
-            runs.update(filter(None, [verdict.message]))
-        runs.update([verdict.beside.words] if verdict.beside else [])
-        if len(verdicts) > 1 and verdict.of_run:
-            runs.update([f"by {verdict.expectations}"] if verdict.expectations else [])
+            quiet = NOTHING if len(verdicts) > 1 else ""
+            runs.update(filter(None, [re.sub(quiet, "", verdict.message)]))
+        if verdict.beside and verbose:
+            runs.update([verdict.beside.words])
+        elif verdict.beside:
+            parts = verdict.beside.words.split("; ")
+            runs.update(re.sub(AMOUNT, "", each) for each in parts if not re.match(REPEATED, each))
+        elif len(verdicts) > 1 and verdict.expectations:
+            runs.update([f"by {verdict.expectations}"])
     for message, number in runs.items():
         several = f" ({number} of {len(verdicts)} runs)" if 1 < len(verdicts) != number else ""
         yield f"note:    {message}{several}"
+    if not verbose:
+        yield from _compared(verdicts)
+
+
+def _compared(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    """The repetitions that runs were compared with, in a line for all scenarios."""
+    known = [each.beside for each in verdicts if each.beside and each.beside.repetitions]
+    if not known:
+        return
+    number = len({each.scenarios for each in known})
+    fewest, most = (of(each.repetitions for each in known) for of in (min, max))
+    margins = [each.margins.get("repetitions", 0.0) for each in known]
+    many = counted(most, "repetition") if fewest == most else f"{fewest} to {most} repetitions"
+    each_of = f"each of {number} scenarios" if number > 1 else " and ".join(known[0].scenarios)
+    low, high = f"{min(margins):.1f}", f"{max(margins):.1f}"
+    margin = low if low == high else f"{low} to {high}"
+    yield f"reference: {many} of {each_of}, margin {margin} dB"
 
 
 def as_json(verdicts: Sequence[Verdict]) -> str:
@@ -252,6 +282,7 @@ def _folded(verdicts: Sequence[Verdict]) -> Job:
             replace(
                 case,
                 name=group.name,
+                words=group.words,
                 sentences=tuple(group.sentences),
                 notes=tuple(group.notes),
                 timeline=timeline(group.worst),
