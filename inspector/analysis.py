@@ -312,19 +312,10 @@ def analyse_file(
 
     Args:
         path: A run file, any log that `inspector import` reads, or one that is open already.
-        library: Models to choose from.
         links: Whether to compute the noise link by link, if the run names a robot that is known.
         kind: Kind of the extended noise, see ``noisemodel.extended``.
         terms: Whether to compute the paper's terms A, B and C one by one.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
-
-    Returns:
-        The analysis.
-
-    Raises:
-        RunFileError: If the file is damaged, or holds a run that is wrong.
-        RobotError: If its robot cannot be read, or lacks one of the run's joints.
-        InspectorError: If the robot's shape cannot be had, or a log cannot be read.
     """
     opened = path if isinstance(path, Opened) else open_run(path)
     name, digest = opened.source.shown.stem, opened.sha256

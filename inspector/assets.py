@@ -16,9 +16,6 @@ def folder(kind: str) -> Path:
 
     Args:
         kind: "runs" or "models".
-
-    Raises:
-        InspectorError: If the installation lacks it.
     """
     for place in FOLDERS:
         if any((place / kind).glob("*.npz")):
@@ -36,9 +33,6 @@ def model_files(chosen: Sequence[Path] | None = None) -> tuple[Path, ...]:
 
     Args:
         chosen: Model files, or names of models that ship; None or empty for all of these.
-
-    Raises:
-        InspectorError: If a chosen one is neither a file nor a model that ships.
     """
     shipped = {path.stem: path for path in sorted(folder("models").glob("*.npz"))}
     found = []

@@ -256,9 +256,6 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
     """Audit a run.
 
     Gaps are counted in the whole run; signals are examined in an excerpt of it.
-
-    Raises:
-        UnknownJointError: If the run names a joint that its robot lacks.
     """
     check_joints(run.joint_names, run.robot)
     check_joints(run.desired_joint_names, run.robot)
@@ -351,11 +348,7 @@ LONGEST = 60_000
 
 
 def excerpt(run: Run) -> Run:
-    """Cut out the part of a run around its fastest motion, which limits the cost of long runs.
-
-    Returns:
-        The run itself if it is short; else a part of it with its joints' motion alone.
-    """
+    """Cut out the part of a run around its fastest motion, which limits the cost of long runs."""
     if len(run.time) <= LONGEST:
         return run
     fastest, highest = 0, -1.0

@@ -221,11 +221,7 @@ WHOLE = 0.02
 
 
 def step_of(values: Real) -> float:
-    """Quantisation step of a signal.
-
-    Returns:
-        The step of which all values are multiples, in the signal's unit; 0 if there is none.
-    """
+    """Quantisation step of a signal."""
     thinned = values[:: max(1, len(values) // MOST_SAMPLES)].astype(np.float64)
     distances = np.diff(np.unique(thinned))
     distances = distances[distances > 1e-12 * np.abs(thinned).max()]  # below: a sum's rounding
@@ -340,12 +336,7 @@ class Bandwidth:
 
 
 def bandwidth(run: Run) -> Bandwidth:
-    """Measure the bandwidth of a run.
-
-    Returns:
-        Its bandwidth; without filter and quantisation floor, which require a spectrum, if no
-        stretch between gaps lasts 0.4 s and 128 samples.
-    """
+    """Measure the bandwidth of a run."""
     differentiator, hold = differentiator_of(run), hold_length(run.velocity, run.mask)
     if run.position is not None and differentiator:
         hold = max(hold, hold_length(run.position, run.mask))

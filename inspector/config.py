@@ -45,13 +45,8 @@ class Config:
         """The settings of a command, by the names of its parameters.
 
         Args:
-            name: The command.
             options: The parameter of each setting that the command has.
-            shared: Settings that may stand at the top.
             applied: Those of them that mean in this command what they mean in others.
-
-        Raises:
-            OptionError: If one is not known.
         """
         own = self.own.get(name, {})
         for where, given, known in (
@@ -90,9 +85,6 @@ def find(start: Path | None = None) -> Config | None:
 
     Args:
         start: Where to begin, the working folder unless given.
-
-    Raises:
-        OptionError: If it is no TOML, or a setting is no setting.
     """
     start = (start or Path.cwd()).absolute()
     for folder in (start, *start.parents):

@@ -17,7 +17,6 @@ class FileError(InspectorError):
     """A file of the inspector's own that is wrong; subclasses say what to do about it.
 
     Args:
-        path: The file.
         problem: What is wrong with it, in one line.
     """
 
@@ -32,7 +31,6 @@ class LogError(InspectorError):
     """A log that cannot be read as the motion of a robot.
 
     Args:
-        path: The log.
         problem: What is wrong with it, in one line.
         row: The line of the file where that is (the header is line 1), if it is in one place.
     """

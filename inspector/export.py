@@ -557,18 +557,10 @@ def export(
     """Write noise, labels and scores of a run.
 
     Args:
-        run: The run.
         path: The file to write, ``.mcap``, ``.csv`` or ``.parquet``.
-        library: Models to choose from by rate.
         kind: Kind of the extended noise, see ``noisemodel.extended``.
         overwrite: Whether a file that exists may be replaced.
         layouts: Whether to write layouts for Foxglove and PlotJuggler beside it, see `LAYOUTS`.
-
-    Raises:
-        OptionError: If there is no such format, or layouts for another than MCAP.
-        InspectorError: If the format needs an extra that is not installed.
-        OutputError: If the file exists or cannot be written.
-        NoiseModelError: If there is no such kind of noise, or the robot cannot be read.
     """
     write = WRITERS.get(path.suffix.lower())
     if write is None:

@@ -89,11 +89,7 @@ class History:
 
 
 def read(folder: Path) -> History:
-    """Read the results of a folder; what is no result is named and left out.
-
-    Raises:
-        InspectorError: If there is none.
-    """
+    """Read the results of a folder; what is no result is named and left out."""
     commits, results, problems = [], [], []
     for path in sorted(folder.glob("*.json"), key=_natural):
         try:

@@ -32,11 +32,7 @@ def hold_length(signal: Real, valid: Mask) -> float:
     """Length of the zero-order hold of a signal.
 
     Args:
-        signal: Shape (samples, joints).
         valid: False in gaps, shape (samples,).
-
-    Returns:
-        Samples from jump to jump, 1.0 without a hold.
     """
     return _length(signal, _changes(signal, valid))
 
@@ -45,7 +41,6 @@ def updates(signal: Real, valid: Mask) -> Index | None:
     """Samples at which the values of a signal with a zero-order hold were set.
 
     Args:
-        signal: Shape (samples, joints).
         valid: False in gaps, shape (samples,).
 
     Returns:
@@ -68,15 +63,7 @@ def updates(signal: Real, valid: Mask) -> Index | None:
 
 
 def without_hold(run: Run) -> Run:
-    """The run at the rate of its values: one of each n samples, if each value is there n times.
-
-    Args:
-        run: The run.
-
-    Returns:
-        The run itself unless its measured velocities have a zero-order hold of a whole number of
-        samples throughout.
-    """
+    """The run at the rate of its values: one of each n samples, if each value is there n times."""
     changed = _changes(run.velocity, run.mask)
     hold = _length(run.velocity, changed)
     count = round(hold)

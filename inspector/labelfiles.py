@@ -40,14 +40,8 @@ def write_labels(
     """Write annotated blocks or findings to a file.
 
     Args:
-        spans: Annotated blocks, or findings.
-        path: The file to write.
         format_name: "noisytest", "csv" or "audacity"; by default by the suffix.
         overwrite: Whether a file that exists may be replaced.
-
-    Raises:
-        InspectorError: If there is no such format, or it cannot represent one of the labels.
-        OutputError: If the file exists or cannot be written.
     """
     text = format_of(path, format_name).render(spans, path)
     with replacing(path, overwrite=overwrite) as temporary:
@@ -58,13 +52,7 @@ def read_labels(path: Path, run: Run, *, format_name: str = "") -> tuple[Block, 
     """Annotated blocks of a run, read from a file and checked, in order of time.
 
     Args:
-        path: The file.
-        run: The run of the labels.
         format_name: "noisytest", "csv" or "audacity"; by default by the suffix.
-
-    Raises:
-        InspectorError: If there is no such format, the file cannot be read or is damaged, or a
-            label is reversed, lies outside of the run or overlaps another.
     """
     chosen = format_of(path, format_name)
     try:
@@ -100,13 +88,7 @@ def read_labels(path: Path, run: Run, *, format_name: str = "") -> tuple[Block, 
 def label_paths(
     runs: Sequence[Path], folder: Path, *, format_name: str, overwrite: bool = False
 ) -> dict[Path, Path]:
-    """Label files of runs in a folder, which is made, checked before the runs are classified.
-
-    Raises:
-        InspectorError: If there is no such format, two runs have one name, or the folder cannot be
-            created.
-        OutputError: If a file exists.
-    """
+    """Label files of runs in a folder, which is made, checked before the runs are classified."""
     suffix = format_of(folder, format_name).suffix
     targets: dict[Path, Path] = {}
     for run in dict.fromkeys(runs):
@@ -246,11 +228,7 @@ FORMATS = {
 
 
 def format_of(path: Path, name: str = "") -> Format:
-    """Format of a file, by name, else by its suffix.
-
-    Raises:
-        InspectorError: If there is no such format.
-    """
+    """Format of a file, by name, else by its suffix."""
     if name and name not in FORMATS:
         raise OptionError(f"no format {name!r} of labels; there are {', '.join(FORMATS)}")
     if name:

@@ -121,9 +121,6 @@ def link_levels(noise: LinkNoise) -> tuple[Array, Array]:
 
     The whole motion would not do: a link that moves fast and smoothly would be the loudest.
 
-    Args:
-        noise: The links' power.
-
     Returns:
         Starts of the steps of 50 ms (or of the bins, if these are longer), shape (steps,), in [s],
         and levels of the mean power in each, shape (steps, links), in [dB re 1 pW]; silence is at

@@ -29,9 +29,6 @@ def orders(analysis: Analysis) -> tuple[str, Spectrogram] | None:
     The joint is that of the first finding with an order; else the one that vibrates most while it
     moves.
 
-    Args:
-        analysis: The run.
-
     Returns:
         The joint, and amplitudes whose frequencies are orders, in periods per turn: at most 200
         columns; 0 and not valid in windows in which the joint is at rest or turns back. None if

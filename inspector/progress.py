@@ -12,16 +12,7 @@ EVERY = 10.0
 
 
 def progress(items: Iterable[T], what: str, *, total: int) -> Iterator[T]:
-    """Items as they come, with a progress bar on a terminal, or a line every 10 s elsewhere.
-
-    Args:
-        items: To be passed on.
-        what: Name of the task.
-        total: How many there will be.
-
-    Yields:
-        The items.
-    """
+    """Items as they come, with a progress bar on a terminal, or a line every 10 s elsewhere."""
     if total < 2:
         yield from items
     elif sys.stderr.isatty():

@@ -65,7 +65,6 @@ def level_above(signal: Real, rate: float, frequency: float) -> float | None:
     The high-pass has the gain 1/2 at its frequency.
 
     Args:
-        signal: Shape (samples, joints), in any unit.
         rate: Sample rate, in [Hz].
         frequency: Lowest frequency, in [Hz].
 
@@ -123,7 +122,6 @@ def log_dimensionless_jerk(velocity: Real, rate: float) -> float | None:
     far up as the rate goes, so only logs of one rate and one kind of sensor can be compared.
 
     Args:
-        velocity: Shape (samples, joints), in any unit.
         rate: Sample rate, in [Hz].
 
     Returns:
@@ -145,10 +143,6 @@ def squared_difference(action: Real, *, order: int = 1) -> float | None:
 
     The first difference is the "action rate" that policies are penalised by in reinforcement
     learning; the second one passes constant rates. Both are per action, not per second.
-
-    Args:
-        action: Shape (actions, joints), in any unit.
-        order: Of the difference.
 
     Returns:
         In the square of the unit; None if there are no more than ``order`` actions.
@@ -244,8 +238,6 @@ def scored(
     differences of the positions: the smoothing would take the chatter away.
 
     Args:
-        run: The run.
-        log: Path of its log.
         episode: Its name within a data set, empty in a log of its own.
         source: The argument of the command that it came from.
         library: Models to choose from; None for no labels.
@@ -443,7 +435,6 @@ def ranked(found: Iterable[Episode | Failed], *, by: str = "") -> Ranking:
     """Order episodes from the smoothest to the roughest.
 
     Args:
-        found: Episodes, and what could not be read.
         by: One of ``SCORES``; by default as `default_order` has it.
     """
     each = tuple(found)
@@ -625,12 +616,7 @@ SPREAD = 20.0
 
 
 def draw(episodes: Sequence[Episode], path: Path, *, overwrite: bool = False) -> None:
-    """Draw a histogram of each score that an episode has, as a PNG file, a colour for each input.
-
-    Raises:
-        InspectorError: If matplotlib is not installed, or no episode has a score.
-        OutputError: If the file exists or cannot be written.
-    """
+    """Draw a histogram of each score that an episode has as a PNG file, a colour for each input."""
     require()
     from matplotlib.figure import Figure
 

@@ -180,12 +180,7 @@ class Clip:
 
 
 def sonify(run: nm.Run, settings: Settings | None = None) -> Sound:
-    """Noise of a run as a sound, with remarks on what is inaudible.
-
-    Raises:
-        InspectorError: If the settings do not fit the run, or nothing is audible.
-        NoiseModelError: If the extended noise cannot be computed.
-    """
+    """Noise of a run as a sound, with remarks on what is inaudible."""
     settings = settings or Settings()
     return replace(sound_of(run, settings), remarks=tuple(_remarks(run, settings.speed)))
 
@@ -211,12 +206,7 @@ def common_gain(sounds: Sequence[Sound]) -> float:
 
 
 def output_paths(path: Path, count: int, *, overwrite: bool = False) -> tuple[Path, ...]:
-    """Paths of the files of sounds, checked before these are computed; several get a letter each.
-
-    Raises:
-        OutputError: If a file exists and may not be replaced, or cannot be written.
-        InspectorError: If there are more sounds than letters.
-    """
+    """Paths of the files of sounds, checked before they are computed; several get a letter each."""
     if count > len(ascii_lowercase):
         raise InspectorError(f"{count} runs at once, expected {len(ascii_lowercase)} at most")
     letters = [f".{letter}" for letter in ascii_lowercase[:count]] if count > 1 else [""]
@@ -227,12 +217,7 @@ def output_paths(path: Path, count: int, *, overwrite: bool = False) -> tuple[Pa
 
 
 def save(sounds: Mapping[Path, Sound], gain: float, *, overwrite: bool = False) -> None:
-    """Write sounds as WAV files, all at the same gain in [dB].
-
-    Raises:
-        OutputError: If a file exists or cannot be written.
-        InspectorError: If the sounds are not in one unit.
-    """
+    """Write sounds as WAV files, all at the same gain in [dB]."""
     units = {sound.unit for sound in sounds.values()}
     if len(units) > 1:
         raise InspectorError(f"sounds in {' and '.join(sorted(units))} have no gain in common")
@@ -257,7 +242,6 @@ def clip(run: nm.Run, *, around: float = 0.0, lead: bool = False) -> Clip | None
     """Sound of a run's simplified noise; None if nothing in the run is audible.
 
     Args:
-        run: The run.
         around: Middle of the part that is used if the run is too long, in [s].
         lead: Whether silence replaces what is left out before.
     """
@@ -289,12 +273,6 @@ def mix(
         valid: False in gaps, which are silent, shape (samples,).
         rate: Sampling rate, in [Hz].
         lowest: Cutoff of the high-pass filter, in [Hz].
-
-    Returns:
-        Shape (samples,), in the unit of the signals.
-
-    Raises:
-        InspectorError: If the Nyquist frequency is not well above ``lowest``.
     """
     if rate <= 2.5 * lowest:
         speed = int(np.ceil(8 * lowest / rate))  # two octaves of the log are audible

@@ -51,9 +51,6 @@ def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spe
         rate: Samples per second, in [Hz].
         start: Time of the first sample, in [s].
         valid: False in gaps, shape (samples,).
-
-    Returns:
-        At most 400 columns of Hann windows of about 0.1 s, each freed of its mean.
     """
     length = min(window_length(rate), len(signal))
     hop = max(1, length // 4, -(-(len(signal) - length) // (COLUMNS - 1)))
@@ -74,11 +71,7 @@ def in_bands(frequency: Array, amplitude: Array, edges: Array) -> Array:
 
     Args:
         frequency: In order, shape (bins,).
-        amplitude: Shape (bins, columns).
         edges: Of the bands, in order, in the unit of the frequency, shape (bands + 1,).
-
-    Returns:
-        Shape (bands, columns); a band that is narrower than the bins has that of the nearest one.
     """
     firsts = np.searchsorted(frequency, edges[:-1])
     lasts = np.searchsorted(frequency, edges[1:])
@@ -97,14 +90,7 @@ def window_length(rate: float) -> int:
 
 
 def amplitudes(windows: Array) -> Array:
-    """Amplitude spectra of Hann windows, each freed of its mean.
-
-    Args:
-        windows: Shape (windows, samples).
-
-    Returns:
-        Shape (windows, bins), in the unit of the signal; bin 0, the mean, is left out.
-    """
+    """Amplitude spectra of Hann windows, each freed of its mean."""
     hann = _hann(windows.shape[1])
     centred = windows - windows.mean(axis=1, keepdims=True)
     return np.asarray(np.abs(np.fft.rfft(centred * hann, axis=1))[:, 1:] * 2 / hann.sum())

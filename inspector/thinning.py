@@ -11,7 +11,6 @@ def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
 
     Args:
         time: Shape (samples,), in [s].
-        values: Shape (samples, series).
         points: How many points each series may have at most.
 
     Returns:

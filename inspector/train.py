@@ -61,17 +61,9 @@ def classified(
     annotated block: its failures were too faint to be labelled either way.
 
     Args:
-        inputs: Files, and folders of them, however deep.
         rate: The rate to decimate runs to, in [Hz]; slower ones have no verdict. None: each at its
             own, as a general model takes it.
-        part: The part of these recordings to read.
         bare_too: Whether to yield run files without any annotation, in place of an error.
-
-    Yields:
-        Each recording, and the run that it is of if that is a run file.
-
-    Raises:
-        InspectorError: If a run file has neither blocks nor events, unless ``bare_too``.
     """
     taken: set[str] = set()
 
@@ -292,17 +284,8 @@ def train(
         profile: ``ANY_RATE``, or one of ``PROFILES``.
         rate: Rate of a model of one rate, in [Hz], to which faster runs are decimated; None for
             ``RATE``. A general model takes each run at its own.
-        output: The model file to write.
         part: The part of the recordings to train on.
         overwrite: Whether a file that exists may be replaced.
-
-    Returns:
-        The measures of the model on its own training frames, and the runs that were left out.
-
-    Raises:
-        InspectorError: If there is no such profile, it does not exist at this rate, or all runs
-            are left out.
-        OutputError: If the file exists or cannot be written.
     """
     if profile == ANY_RATE:
         if rate is not None:

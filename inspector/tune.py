@@ -162,12 +162,7 @@ class Tuned:
         ]
 
     def draw(self, path: Path, criterion: Criterion, *, overwrite: bool = False) -> None:
-        """Draw the accuracy along each setting around the best point, as a PNG file.
-
-        Raises:
-            InspectorError: If matplotlib is not installed.
-            OutputError: If the file exists or cannot be written.
-        """
+        """Draw the accuracy along each setting around the best point, as a PNG file."""
         require()
         from matplotlib.figure import Figure
 
@@ -255,16 +250,10 @@ def tune(
     """Measure the points of a grid that a results file does not have yet.
 
     Args:
-        search: The settings of the search.
         output: The results file; the search resumes if it exists.
         model: A model file to write afterwards; if it exists, it is refused before the work.
         jobs: Number of parallel processes, or the address of a Dask scheduler.
         overwrite: Whether to discard the results in the file.
-
-    Raises:
-        InspectorError: If there is no such profile, the file has other results, or a worker dies.
-        ModelsError: If the grid cannot be searched, the recordings cannot be trained on, or some
-            are in both sets.
     """
     if model:
         refuse_existing(model, overwrite=overwrite)
@@ -388,14 +377,7 @@ def opened(
     """Open a results file to resume, or create it.
 
     Args:
-        path: The file.
         settings: The settings of the search, by name, as JSON can hold them.
-        points: All points of the grid.
-        overwrite: Whether to discard what the file holds.
-
-    Raises:
-        InspectorError: If it is no such file, damaged, of other settings, cannot be read or
-            written, or another process is writing it.
     """
     with _locked(path) as file:
         about = os.fstat(file.fileno())

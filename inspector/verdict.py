@@ -420,11 +420,7 @@ class Verdict:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Verdict":
-        """Read what `as_dict` wrote.
-
-        Raises:
-            KeyError, TypeError, ValueError: If it is anything else.
-        """
+        """Read what `as_dict` wrote."""
         from inspector.localisation.order import Order
         from inspector.localisation.stage import Localisation
 
@@ -499,14 +495,9 @@ def classify_file(
     Args:
         path: A run file, any log that `inspector import` reads, or one of NoisyTest's two-column
             logs (``*.log``).
-        library: Models to choose from.
-        reading: How logs are read.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         draw: Draws a picture of an analysis of a file and gives its path, if one is wanted.
         reference: Adds the evidence of a reference, see `inspector.reference.verdicts`.
-
-    Returns:
-        The verdict.
     """
     source = path if isinstance(path, Source) else Source(path)
     begun = perf_counter()
@@ -553,21 +544,12 @@ def classify_files(
     """Classify many files; one bad file never stops the rest.
 
     Args:
-        paths: The files, see `classify_file`.
-        library: Models to choose from.
-        reading: How logs are read.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         draw: Draws a picture of an analysis, see `classify_file`; importable for several jobs.
         reference: Adds the evidence of a reference, see `classify_file`.
         jobs: How many to work on at once, or the address of a Dask scheduler. A run with which a
             worker dies is an internal error.
         resume: A file that keeps the verdicts; those on unchanged runs are taken from it.
-
-    Yields:
-        A verdict per file, in their order; with ``resume`` in no order, first those of the file.
-
-    Raises:
-        InspectorError: If that file cannot be resumed or written.
     """
     one = partial(
         classify_file,
@@ -644,15 +626,7 @@ def exit_status(verdicts: Sequence[Verdict]) -> int:
 
 
 def counts(verdicts: Iterable[Verdict]) -> dict[str, dict[str, int]]:
-    """Count what all outputs state.
-
-    Args:
-        verdicts: What was found in runs.
-
-    Returns:
-        `runs`, by status, and `findings`: those that fail their runs, those that are missing, and
-        the others by what became of them. Each has all its keys.
-    """
+    """Count what all outputs state."""
     runs: Counter[str] = Counter()
     found: Counter[str] = Counter()
     for verdict in verdicts:
@@ -672,11 +646,7 @@ RESULTS = "noise-verdict/3"
 
 
 def read_results(path: Path) -> list[Verdict]:
-    """Read the verdicts of a file that `classify --write json=FILE` wrote.
-
-    Raises:
-        InspectorError: If it is no such file, or of another version.
-    """
+    """Read the verdicts of a file that `classify --write json=FILE` wrote."""
     also_reading([path])
     content = None
     try:
@@ -704,11 +674,7 @@ class State:
     _file: IO[bytes]
 
     def add(self, verdict: Verdict, sha256: str) -> None:
-        """Append a verdict, flushed to the disk.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Append a verdict, flushed to the disk."""
         if verdict.status is not Status.INTERNAL_ERROR:
             row = {"sha256": sha256, **verdict.as_dict(), "lost": list(verdict.lost)}
             _append(self.path, self._file, row)
@@ -719,16 +685,7 @@ def kept(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
     """Open a state file to resume, or create it.
 
     Args:
-        path: The file.
         settings: Models and settings, by name, as JSON can hold them.
-
-    Yields:
-        The state so far.
-
-    Raises:
-        StateError: If the file is no such file, is damaged, or of other models or settings.
-        InspectorError: If another process is writing it.
-        OutputError: If it cannot be written.
     """
     if path.exists() and not path.is_file():
         raise StateError(path, "is no regular file")
@@ -770,11 +727,7 @@ def kept(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
 
 
 def _lock(file: IO[bytes]) -> None:
-    """Lock a file, once the workers of a process that was killed have ended.
-
-    Raises:
-        OSError: If another process still holds it after ``PATIENCE``.
-    """
+    """Lock a file, once the workers of a process that was killed have ended."""
     until = monotonic() + PATIENCE
     while True:
         try:

@@ -35,11 +35,7 @@ def check_joints(joints: Sequence[str], robot: str | None) -> tuple[str, ...]:
     """Joints of a robot that a run lacks, which are assumed stationary.
 
     Args:
-        joints: Names of the run's joints.
         robot: The robot that it names; nothing is checked if that cannot be read.
-
-    Raises:
-        WrongRobotError: If the robot lacks one of the joints, naming the first.
     """
     known = _known(robot)
     for joint in _named(joints, known):
@@ -49,15 +45,7 @@ def check_joints(joints: Sequence[str], robot: str | None) -> tuple[str, ...]:
 
 
 def named(run: Run) -> Run:
-    """Give joints that a run numbers, since its file does not name them, its robot's names.
-
-    Args:
-        run: The run.
-
-    Returns:
-        The run itself unless its joints are called joint1, joint2 and so on, and those of its robot
-        are not; else one with the first names of its robot, in the order of the robot's file.
-    """
+    """Give joints that a run numbers, since its file does not name them, its robot's names."""
     names = _named(run.joint_names, _known(run.robot))
     if names == run.joint_names or len(names) != len(run.joint_names):
         return run
@@ -96,7 +84,6 @@ class LimitWatch:
 
     Args:
         joints: Names of the columns; those that the robot lacks have no limits.
-        robot: Name of the robot.
         limits: Its joints' limits; read from the robot unless given.
     """
 

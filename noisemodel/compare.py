@@ -458,9 +458,6 @@ def medians(rows: Sequence[Array]) -> Array:
 
     Args:
         rows: One or more, each of shape (columns,).
-
-    Returns:
-        Shape (columns,); nan where no row has a number.
     """
     finite = [column[np.isfinite(column)] for column in np.array(rows).T]
     return np.array([np.median(column) if len(column) else np.nan for column in finite])
@@ -679,15 +676,7 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
     scaled down. Joints that mimic another one follow it; the base's pose stays at the origin.
 
     Args:
-        robot: Any robot.
-        seed: Random seed.
         rate: Sample rate, in [Hz]; its Nyquist frequency has to be above that of the shakes.
-
-    Returns:
-        The run, of 6 s; its blocks are the events.
-
-    Raises:
-        NoiseModelError: If the rate is too low or the seed is negative.
     """
     if not 2.0 * SHAKE_HZ[1] < rate < np.inf:
         raise NoiseModelError(

@@ -214,12 +214,8 @@ class Dipole:
     Before its first sample the robot counts as having moved as it does then.
 
     Args:
-        surface: The surface of a robot.
         rate: Sample rate, in [Hz].
         sound_speed: In [m/s].
-
-    Raises:
-        NoiseModelError: If the corner of a link is not below half the rate.
     """
 
     def __init__(self, surface: Surface, *, rate: float, sound_speed: float) -> None:
@@ -468,13 +464,6 @@ def link_noise(
             them.
         geometry: "visual", "collision", "hull" or "auto".
         terms: Whether to add up the paper's terms A, B and C, one by one.
-
-    Returns:
-        The noise; measured and desired motion add up.
-
-    Raises:
-        RobotError: If the robot cannot be read, or lacks one of the run's joints.
-        GeometryError: If its surface cannot be read.
     """
     assert run.robot is not None
     floating = True if run.base_pose is not None else None
@@ -522,7 +511,6 @@ def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
     """The fast part of a motion: without its running mean over a tenth of a second.
 
     Args:
-        velocity: Shape (samples, nv).
         valid: False in gaps, shape (samples,); no mean reaches over one.
         rate: Samples per second, in [Hz].
 
@@ -686,8 +674,6 @@ def by_moments(
     is in the middle of the bin, < nu' M nu > = < v' J' M J v > = sum_jk (J' M J)_jk < v_j v_k >.
 
     Args:
-        robot: The robot.
-        surface: Its surface.
         q: Configuration in the middle of each bin, shape (bins, nq).
         motions: The motions that take place there: one of ``QUADRATIC``, and mean products of
             velocities over each bin, shape (bins, nv, nv).

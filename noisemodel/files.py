@@ -75,11 +75,7 @@ def also_reading(paths: Iterable[Path]) -> None:
 
 
 def refuse_read(path: str | Path) -> None:
-    """Refuse an output that is a file that is read, or lies in a log that is a folder.
-
-    Raises:
-        OutputError: If it does, by device and inode, whatever its name is.
-    """
+    """Refuse an output that is a file that is read, or lies in a log that is a folder."""
     real = Path(os.path.realpath(path))
     if not _read or not real.exists():
         return
@@ -98,9 +94,6 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     A link stays, and what it leads to is written. Of several that write one file at once and may
     not replace it, one succeeds. Temporary files that no process holds are deleted from the folder:
     after a minute without a change, or after a day if another machine may hold them.
-
-    Raises:
-        OutputError: If ``path`` exists and may not be replaced, or cannot be written.
     """
     path = Path(path)
     refuse_existing(path, overwrite=overwrite)
@@ -127,12 +120,7 @@ def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
     """Refuse an output before long work is done for it.
 
     Args:
-        path: The file that will be written.
         overwrite: Whether a file that exists may be replaced.
-
-    Raises:
-        OutputError: If ``path`` exists and may not be replaced, is a folder, a device or a pipe, is
-            read (`reading`), or has no folder.
     """
     path = Path(path)
     if path.is_dir():
@@ -211,11 +199,7 @@ def _is_left(path: str) -> bool:
 
 
 def limit(name: str) -> int:
-    """A limit of ``LIMITS``, or what the environment has instead.
-
-    Raises:
-        NoiseModelError: If the environment has no whole number.
-    """
+    """A limit of ``LIMITS``, or what the environment has instead."""
     stated = os.environ.get(f"{PREFIX}{name.upper()}", "")
     if stated and not (stated.isascii() and stated.isdecimal() and len(stated) < 16):
         raise NoiseModelError(f"{PREFIX}{name.upper()} is {stated!r}, expected a whole number")
@@ -228,12 +212,7 @@ def beyond(name: str) -> str:
 
 
 def parsed_xml(text: bytes) -> ET.Element:
-    """Root element of XML in any encoding.
-
-    Raises:
-        ValueError: If the text has a document type (which may define entities, bombs among them),
-            is nested too deeply, has an element of too many attributes, or is not XML.
-    """
+    """Root element of XML in any encoding."""
     parser = expat.ParserCreate()
     depth = 0
 
@@ -296,11 +275,7 @@ def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
 
 
 def cache_folder() -> Path:
-    """The folder of cached surfaces (which need not exist).
-
-    Raises:
-        RuntimeError: If the user has no home folder.
-    """
+    """The folder of cached surfaces (which need not exist)."""
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if not base.is_absolute():  # as the XDG base directory specification has it
         base = Path.home() / ".cache"

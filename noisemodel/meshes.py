@@ -55,9 +55,6 @@ def read(path: Path) -> Array:
 
     Returns:
         Its triangles, shape (triangles, 3 corners, 3). Polygons are cut into fans.
-
-    Raises:
-        MeshError: If the file is of another kind, cut off or damaged, or has no triangles.
     """
     data = _content(path)
     if path.suffix.lower() == ".stl":  # as fast as what would be kept of it
@@ -67,20 +64,12 @@ def read(path: Path) -> Array:
 
 
 def hull(path: Path) -> Array:
-    """Wrap a mesh in its convex hull, shape (triangles, 3 corners, 3).
-
-    Raises:
-        MeshError: As in `read`, or if the mesh is flat.
-    """
+    """Wrap a mesh in its convex hull, shape (triangles, 3 corners, 3)."""
     return _kept("hull", path, _content(path), lambda: _wrapped(path, read(path)))
 
 
 def check_whole(path: Path) -> None:
-    """Refuse a file of a known kind that is cut off, without reading all of it.
-
-    Raises:
-        MeshError: If it is empty, cut off or not of the kind of its suffix, or cannot be read.
-    """
+    """Refuse a file of a known kind that is cut off, without reading all of it."""
     try:
         size = path.stat().st_size
         with path.open("rb") as stream:

@@ -99,14 +99,9 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
     """Read an MJCF.
 
     Args:
-        path: The file.
         roots: Folders that the files it names have to lie in.
         floating_base: Whether the base moves freely; None as in the file, where a free joint that
             comes first says so.
-
-    Raises:
-        RobotError: If MuJoCo is not installed or cannot read the file, a file that it includes is
-            missing or lies elsewhere, or a joint is a ball joint.
     """
     folders = _check(path, roots)
     try:
@@ -143,11 +138,7 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
 
 
 def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
-    """Refuse what is no MJCF, or names files outside of its folders, before MuJoCo opens any.
-
-    Returns:
-        The folders of the file and of those that it includes or attaches.
-    """
+    """Refuse what is no MJCF, or names files outside of its folders, before MuJoCo opens any."""
     folders, below, named = list[Path](), {""}, set[str]()
     for part, root in _parts(path, roots):
         folders.append(part.parent)

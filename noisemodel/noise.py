@@ -228,7 +228,6 @@ def sound_power(
     Args:
         mean_square: Mean-square speed of each surface, in [m²/s²].
         area: Of each surface, in [m²].
-        efficiency: Radiation efficiency of each surface.
         density: Of the air, in [kg/m³].
         sound_speed: In [m/s].
     """

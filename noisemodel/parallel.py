@@ -68,19 +68,10 @@ def as_done(
     """Results of a function as they are ready.
 
     Args:
-        function: What to call; importable where it runs.
-        items: Its arguments.
         jobs: Number of processes; 1 is this one, which nothing survives. Or the address of a Dask
             scheduler, ``tcp://HOST:PORT``.
         died: The result of an item with which a process died; it may raise.
         work: About how long all items take one after the other, in [s].
-
-    Yields:
-        The index of an item, and its result.
-
-    Raises:
-        ClusterError: If the Dask scheduler cannot be reached, or is lost, or has no workers, or
-            some with other software or without the client's folder.
     """
     if isinstance(jobs, str):
         if items:

@@ -493,9 +493,6 @@ def package_roots(name: str | Path, package_root: str | Path | None = None) -> t
             robots, their folders are taken.
         package_root: A further folder; unless given, that of the environment variable
             ``NOISE_PACKAGE_ROOT``, if any.
-
-    Raises:
-        RobotError: If ``package_root`` is no folder, or the file cannot be read.
     """
     named = package_root or os.environ.get(PACKAGE_ROOT)
     further = () if not named else (Path(named).resolve(),)
@@ -785,7 +782,6 @@ def chunk_twists(joints: Sequence[Joint], q: Real, v: Real, *, out: Array) -> No
     """Compute the link twists of a few thousand samples.
 
     Args:
-        joints: The joints, parents first.
         q: Configurations, shape (samples, nq).
         v: Velocities, shape (samples, nv).
         out: Takes the twists in each joint's axes, shape (njoints, 6, samples),

@@ -276,9 +276,6 @@ def part(run: Run, first: int, stop: int, **changes: Any) -> Run:
     """Samples of a run from a first one to the one after the last, without its blocks.
 
     ``changes`` are other fields of the part, as ``dataclasses.replace`` takes them.
-
-    Raises:
-        RunError: If the part has fewer than two samples, or gaps alone.
     """
     samples = slice(first, stop)
     fields: dict[str, Any] = {
@@ -296,7 +293,6 @@ def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
     the run, and the fields ``MOTION`` alone.
 
     Args:
-        run: The run.
         samples: Of a piece; what is megabytes unless given.
     """
     whole: dict[str, Any] = {
@@ -565,12 +561,6 @@ def with_velocities(
 
     Args:
         signals: Arrays of a run file by name, ``time`` among them.
-
-    Returns:
-        The signals with velocities added, and by the name of each added one how it was made.
-
-    Raises:
-        RunError: If positions do not fit the time, or are not finite.
     """
     time, filled = signals["time"], dict(signals)
     valid = signals.get("valid", np.ones(len(time), dtype=bool))

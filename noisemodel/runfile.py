@@ -110,12 +110,7 @@ def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
     """Read the arrays of a run file; integers become floating-point where numbers are expected.
 
     Args:
-        path: The file.
         on_demand: Whether large arrays stay in the file, see `OnDemand`.
-
-    Raises:
-        RunFileError: If the file cannot be read, is no archive of plain arrays, names an
-            unknown array, holds another kind of array, or is of another version.
     """
     try:
         for name in names_in(path):
@@ -185,9 +180,6 @@ def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
 
     Compression hardly makes the noise of a log smaller, and to undo it takes most of the time of
     loading: what it would not make smaller by a fifth is left as it is, and the quickest will do.
-
-    Raises:
-        OutputError: If the file exists or cannot be written.
     """
     with replacing(path, overwrite=overwrite) as temporary:
         try:
@@ -221,7 +213,6 @@ class OnDemand(NDArrayOperatorsMixin):
 
     Args:
         shape: Its shape, rows first.
-        dtype: Type of its numbers.
         read: Reads rows from a first one up to the one after the last.
 
     Attributes:
@@ -311,16 +302,10 @@ def read_npz(
     """Read the arrays of an .npz file by their names.
 
     Args:
-        path: The file.
         names: Those that are read, all unless given.
         on_demand: Larger arrays stay in the file, in bytes: an `OnDemand` stands in for each,
             unless it has one axis or is packed column by column. They raise ArchiveError or OSError
             where they are read.
-
-    Raises:
-        ArchiveError: If it is no archive of plain arrays, has two of one name, is damaged, or
-            unpacks to more than `check_unpacked` allows.
-        OSError: If it cannot be opened.
     """
 
     def arrays(archive: zipfile.ZipFile) -> dict[str, NDArray[Any]]:
@@ -349,11 +334,7 @@ def names_in(path: Path) -> tuple[str, ...]:
 
 
 def read_array(stream: IO[bytes], name: str, size: int) -> NDArray[Any]:
-    """Read an array of NumPy's format from so many bytes, once its header agrees with them.
-
-    Raises:
-        ArchiveError: If it is no array, holds objects, or states another size than it has.
-    """
+    """Read an array of NumPy's format from so many bytes, once its header agrees with them."""
     shape, fortran, dtype = _header(stream, name, size)
     held = size - stream.tell()
     content = np.empty(held, dtype=np.uint8)
@@ -510,24 +491,14 @@ def _check(members: Iterable[zipfile.ZipInfo], packed: int) -> None:
 
 
 def check_regular(path: Path) -> None:
-    """Refuse a device, pipe or socket, which may have no end.
-
-    Raises:
-        ArchiveError: If it is one.
-        OSError: If there is no such file.
-    """
+    """Refuse a device, pipe or socket, which may have no end."""
     mode = path.stat().st_mode
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise ArchiveError("is no regular file; save what it holds to one")
 
 
 def read_text(path: Path) -> str:
-    """Text of a regular file in UTF-8 of up to ``TEXT`` bytes.
-
-    Raises:
-        ArchiveError: If it is no regular file, too long, or not text in UTF-8.
-        OSError: If it cannot be read.
-    """
+    """Text of a regular file in UTF-8 of up to ``TEXT`` bytes."""
     check_regular(path)
     if (size := path.stat().st_size) > TEXT:
         raise ArchiveError(f"{size} bytes, the limit is {TEXT}")
@@ -538,11 +509,7 @@ def read_text(path: Path) -> str:
 
 
 def check_unpacked(unpacked: int, packed: int) -> None:
-    """Refuse what would unpack to more than ``UNPACKED`` bytes and ``RATIO`` times its size.
-
-    Raises:
-        ArchiveError: If it would.
-    """
+    """Refuse what would unpack to more than ``UNPACKED`` bytes and ``RATIO`` times its size."""
     stated = os.environ.get(MAX_UNPACKED, str(UNPACKED))
     if not stated.isdecimal():
         raise ArchiveError(f"{MAX_UNPACKED} is {stated!r}, expected bytes")

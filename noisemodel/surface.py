@@ -86,15 +86,10 @@ def triangles(
     """Draw all links of a robot with triangles.
 
     Args:
-        robot: The robot.
         geometry: "visual" or "collision", as the URDF or MJCF has them; "hull", the convex hull of
             every visual by itself; or "auto", the visual or, of a link that has none, the
             collision.
         missing: What to do about a mesh that is not there: "error", or "skip" it with a warning.
-
-    Raises:
-        GeometryError: If there is no such geometry, or a shape of the URDF is wrong.
-        MeshError: If a mesh cannot be found or read, or has no surface.
     """
     for name, word, known in (
         ("geometry", geometry, tuple(GEOMETRIES)),
@@ -138,11 +133,7 @@ def triangles(
 
 
 def shapes_of(robot: Robot, use: str) -> Sequence[LinkShape]:
-    """The geometry of all links as the URDF or MJCF has it; ``use`` is "visual" or "collision".
-
-    Raises:
-        GeometryError: If a shape of the URDF is wrong.
-    """
+    """The geometry of all links as the URDF or MJCF has it; ``use`` is "visual" or "collision"."""
     if robot.mjcf is None:
         return shapes_in(robot.path, use)
     return robot.mjcf.visual if use == "visual" else robot.mjcf.collision
@@ -161,9 +152,6 @@ def pieces(robot: Robot) -> Iterator[tuple[int, LinkShape, Array]]:
     Yields:
         Index of the joint that moves a piece in Pinocchio, 0 if none does; the piece as the file
         has it; and its triangles in the joint's axes, shape (triangles, 3 corners, 3), in [m].
-
-    Raises:
-        GeometryError: As `triangles`.
     """
     places, _ = _links(robot)
     mesh = _reader(robot, hull=False)

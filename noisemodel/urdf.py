@@ -72,12 +72,7 @@ class LinkShape:
 
 
 def checked(path: Path) -> ET.Element:
-    """Root of a URDF that Pinocchio can be given.
-
-    Raises:
-        RobotError: If it cannot be read, is no URDF, is larger than the limits, or holds a
-            number that is not finite or an axis of length 0.
-    """
+    """Root of a URDF that Pinocchio can be given."""
     try:
         if path.stat().st_size > MAX_BYTES:
             raise RobotError(f"{path}: larger than {MAX_BYTES} bytes, no URDF is")
@@ -174,11 +169,7 @@ def shapes_in(urdf: Path, use: str) -> list[LinkShape]:
     """Read the geometry of all links of a URDF that was checked.
 
     Args:
-        urdf: The URDF.
         use: "visual" or "collision".
-
-    Raises:
-        GeometryError: If a shape is unknown, or a size or a scale is no number that can be.
     """
     root = ET.parse(urdf).getroot()  # noqa: S314
     return [
@@ -344,14 +335,8 @@ def find_mesh(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
     Args:
         address: As the URDF has it: ``package://`` (two slashes or three), ``file://``, or a path
             relative to the URDF.
-        urdf: The URDF.
         roots: Folders that ``package://`` addresses are searched in: packages, or folders of
             packages. Meshes lie in one of these.
-
-    Raises:
-        MissingMeshError: If there is no such file.
-        MeshError: If there is no address, or the file lies outside of the robot's folders or
-            cannot be reached.
     """
     if not address:
         raise MeshError("''", f"{urdf.name} names a mesh without a file")

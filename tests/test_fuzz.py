@@ -109,7 +109,7 @@ def test_commands_handle_malformed_files(tmp_path):
     names = ("run, stored noise", "labels, NoisyTest", "CSV", "HDF5", "URDF", "live rows, JSON")
     chosen = [each for name in names for each in ("--only", name)]
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.fuzz.malformed", "--count", "5", *chosen],
+        [sys.executable, "-m", "benchmarks.fuzz.malformed", "--count", "2", *chosen],
         cwd=ROOT,
         capture_output=True,
         check=False,
@@ -126,7 +126,7 @@ GROUPS = ("labels", "settings", "rows", "tables", "arrays", "models", "bags", "r
 @pytest.mark.parametrize("group", GROUPS)
 def test_fuzzing_finds_nothing(tmp_path, group):
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.fuzz.run", "--group", group, "--seconds", "15"],
+        [sys.executable, "-m", "benchmarks.fuzz.run", "--group", group, "--seconds", "5"],
         cwd=ROOT,
         capture_output=True,
         check=False,

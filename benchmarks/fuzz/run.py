@@ -32,7 +32,7 @@ GROUPS = {
     "settings": ("mapping", "reference.toml", "resume state", "tune state", "dataset.json"),
     "rows": ("live rows, CSV", "live rows, JSON"),
     "tables": ("CSV", "CSV, semicolons", "Parquet", "HDF5", "LeRobot info", "LeRobot data"),
-    "arrays": ("run", "run, in pieces", "npz of arrays", "MuJoCo's npz", "npy", "sample"),
+    "arrays": ("run", "run, in pieces", "npz of arrays", "MuJoCo's npz", "npy"),
     "models": ("model, small",),
     "bags": tuple(name for name in READERS if name.startswith(("MCAP", "ROS"))),
     "robots": ("URDF", "MJCF", "STL", "STL, text", "OBJ", "DAE"),

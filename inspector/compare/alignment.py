@@ -75,12 +75,8 @@ def align(before: Run, after: Run, how: Align = Align.AUTO) -> Alignment:
     """Find where a run lies on the time axis of another.
 
     Args:
-        before: A run.
         after: Another at the same rate; both have desired velocities, or none has.
         how: By their motion, from their starts, or by their clocks.
-
-    Returns:
-        The alignment; from the starts where the motions correlate too little, or as well elsewhere.
     """
     rate = before.rate
     if how is Align.START:

@@ -243,9 +243,6 @@ def changes(pair: Pair) -> tuple[Change, ...]:
     Findings of one class that overlap in time, whichever run they are of, are one failure. If both
     runs have a part in it, it is louder or quieter by 3 dB or more, or else unchanged; otherwise it
     is new or resolved.
-
-    Returns:
-        Changes in order of time; of annotated blocks, unless both runs could be labelled.
     """
     found = [
         Change(_kind(kind, level := within(pair, start, stop)), label, start, stop, level)

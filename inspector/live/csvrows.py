@@ -29,11 +29,7 @@ class CsvReader:
     """Reads rows under a header such as ``time,elbow.velocity,elbow.position``.
 
     Args:
-        head: The header.
         names: Names of the joints in the order that is wanted; by default that of the columns.
-
-    Raises:
-        LiveError: If the header names no velocity, or a joint lacks a signal that others have.
     """
 
     def __init__(self, head: bytes, names: tuple[str, ...]) -> None:
@@ -69,12 +65,7 @@ class CsvReader:
         """Read whole lines; the others are counted.
 
         Args:
-            lines: The lines.
-            first: Number of the first, for warnings.
             note: Called with each row that cannot be read.
-
-        Yields:
-            The rows at once.
         """
         table = self._read_numbers(lines)
         if table is None:

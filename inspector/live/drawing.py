@@ -128,9 +128,6 @@ class SpectrogramStream:
             velocity: Shape (samples, joints), in [rad/s] or [m/s].
             valid: False in gaps, shape (samples,); windows that touch one are dark.
             end: Time after the last sample, in [s].
-
-        Returns:
-            Columns, once there are some.
         """
         samples = np.concatenate((self._samples.reshape(-1, velocity.shape[1]), velocity))
         valid = np.concatenate((self._valid, valid))

@@ -25,8 +25,6 @@ class Gate:
     """Prints findings while they come.
 
     Args:
-        tell: Prints a line.
-        as_json: Whether lines are of JSON.
         reference: What the stream is compared with at its end; None leaves it to the model.
 
     Attributes:

@@ -13,11 +13,7 @@ from inspector.live.samples import SIGNALS
 
 
 class JsonReader:
-    """Reads objects such as ``{"time": 0.1, "velocity": [0.2, 0.3]}``.
-
-    Args:
-        names: Names of the joints.
-    """
+    """Reads objects such as ``{"time": 0.1, "velocity": [0.2, 0.3]}``."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names
@@ -26,12 +22,7 @@ class JsonReader:
         """Read whole lines; the others are counted.
 
         Args:
-            lines: The lines.
-            first: Number of the first, for warnings.
             note: Called with each row that cannot be read.
-
-        Yields:
-            Stretches of rows that have the same signals, of the same widths.
         """
         samples = []
         for number, line in enumerate(lines.splitlines(), start=first):

@@ -70,9 +70,6 @@ class LinkLevels:
             time: Shape (samples,), in [s].
             signals: Velocities and positions, shape (samples, joints), and a base's velocity, shape
                 (samples, 6), if there is one. A sample that is not finite begins anew.
-
-        Returns:
-            Levels of the steps that are complete now.
         """
         velocity = np.zeros((len(time), self._robot.nv))
         velocity[:, self._columns] = signals["velocity"]

@@ -96,7 +96,6 @@ class SampleBuffer:
 
         Args:
             kept: Which of those that do not wait, shape (held - waiting,).
-            waiting: How many stay, the latest.
         """
         decided, rest = len(kept), slice(len(kept), len(kept) + waiting)
         received = self._received[:decided][kept]

@@ -31,8 +31,6 @@ def band(
     70 % of it.
 
     Args:
-        run: The run.
-        failure: A finding, or an annotated block.
         failures: All failures of the run, found and annotated.
 
     Returns:

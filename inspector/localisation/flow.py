@@ -36,15 +36,7 @@ class Flow:
 
 
 def flow(run: Run, part: slice) -> Flow:
-    """Gather the stages of a run, for the joints that all of them have.
-
-    Args:
-        run: The run.
-        part: Samples of it.
-
-    Returns:
-        The stages; the measured one alone if the run has no other.
-    """
+    """Gather the stages of a run, for the joints that all of them have."""
     own = list(range(len(run.joint_names)))
     stages = [(name, signal, own) for name, signal in run.stages.items()]
     joints = own

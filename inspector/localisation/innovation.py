@@ -85,15 +85,7 @@ class QuietStatistics:
 
 
 def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatistics:
-    """Fit the prediction to the quiet stretches of a run, and measure its residual there.
-
-    Args:
-        run: The run.
-        failures: All of its failures, found and annotated.
-
-    Returns:
-        The statistics; all 0 without quiet stretches, so that every change is an innovation.
-    """
+    """Fit the prediction to the quiet stretches of a run, and measure its residual there."""
     parts = quiet_stretches(run, failures, length=LENGTH + WARM, most=PARTS)
     stretches = [flow(run, part) for part in parts]
     first = stretches[0] if stretches else flow(run, slice(0, 1))
@@ -126,9 +118,6 @@ def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatis
 
 def changes(stages: Flow) -> Array:
     """Sudden changes at each stage.
-
-    Args:
-        stages: A stretch of a run.
 
     Returns:
         Shape (stages, samples, joints), in [rad/s²]; 0 next to gaps.

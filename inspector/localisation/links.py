@@ -37,13 +37,8 @@ def fault_links(
     largest excess.
 
     Args:
-        links: The noise of the run's links.
-        failure: The failure.
         others: All failures of the run, found and annotated.
         known: Its localisation, if there is one: onset and joints are used.
-
-    Returns:
-        Up to three links and their shares of the robot's whole excess, the largest first.
     """
     excess = _excess(links, failure, others, None if known is None else known.onset)
     ranked = [index for index in np.argsort(-excess, kind="stable").tolist() if excess[index] > 0.0]

@@ -21,13 +21,8 @@ def localise(
     """Localise each failure of a run.
 
     Args:
-        run: The run.
-        found: Its findings.
         frame: Duration of the frames that they consist of, in [s]: a finding may set in at any
             time of its first.
-
-    Returns:
-        The localisation of each finding, and of each block that is annotated as a failure.
     """
     annotated = [block for block in run.blocks if block.label != "ok"]
     failures: list[Event | Block] = [*found, *annotated]

@@ -96,10 +96,6 @@ class Piece(NamedTuple):
 def order(run: Run, failure: Event | Block) -> Order | None:
     """Order of the vibration of the joint that vibrates most in a failure.
 
-    Args:
-        run: The run.
-        failure: A finding, or an annotated block.
-
     Returns:
         The order; None if a line at an order does not explain the vibration, or hardly better than
         one at a frequency does.
@@ -113,10 +109,6 @@ def best_lines(run: Run, failure: Event | Block) -> tuple[Order | None, float, f
 
     The vibration is the measured velocity less the desired one, or the measured one of a joint
     without, above 10 Hz.
-
-    Args:
-        run: The run.
-        failure: A finding, or an annotated block.
 
     Returns:
         The order, its share of the joint's vibration, and that of the best line of a fixed

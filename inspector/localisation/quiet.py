@@ -17,13 +17,7 @@ def quiet_stretches(
     """Pick stretches without failures or gaps, spread evenly over a run.
 
     Args:
-        run: The run.
-        failures: All of its failures, found and annotated.
         length: Length of a stretch, in [s].
-        most: Most stretches that are picked.
-
-    Returns:
-        Samples of each stretch; none if the failures leave no room.
     """
     size = max(1, round(length * run.rate))
     free = run.mask.copy()

@@ -105,9 +105,6 @@ def first_stage(
     """Find the stage in which a failure shows first.
 
     Args:
-        run: The run.
-        quiet: Statistics of its quiet stretches.
-        failure: A finding, or an annotated block.
         reach: How long after its start it may have set in, in [s].
 
     Returns:
@@ -213,13 +210,7 @@ def rise(level: Array, first: int, last: int, *, rate: float) -> int:
     """Find where a level first rises: 10 ms against the 50 ms before, both as mean squares.
 
     Args:
-        level: Shape (samples,), in any unit.
-        first: First sample of the search.
-        last: The one after the last.
         rate: Samples per second, in [Hz].
-
-    Returns:
-        The top of the first rise that is a quarter as steep as the steepest, as a sample.
     """
     ahead, back = (max(1, round(time * rate)) for time in (AHEAD, BACK))
     energy = np.concatenate(([0.0], np.cumsum(np.square(level))))
@@ -240,8 +231,6 @@ def onset(level: Array, moment: int, *, rate: float, least: float = 0.0) -> int 
     """Find the onset of a blow or jump.
 
     Args:
-        level: Shape (samples,), in any unit.
-        moment: Its approximate time, as a sample.
         rate: Samples per second, in [Hz].
         least: Peak that has to be exceeded in any case, in the same unit.
 

@@ -118,12 +118,7 @@ def log_of(
     controller: str = "",
     not_read: Sequence[str] = (),
 ) -> Log:
-    """Log of the arrays of one episode.
-
-    Raises:
-        LogError: If none of them is known to hold motion, their lengths differ, or there are no
-            stamps and no rate.
-    """
+    """Log of the arrays of one episode."""
     arrays = dict(_unpacked(arrays))
     options = options.for_columns(path, [*arrays])
     mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
@@ -231,9 +226,6 @@ def episodes_of(arrays: Arrays) -> dict[str, slice]:
 
     Args:
         arrays: Arrays by name, of which those of ``EPISODE_ENDS`` are looked at.
-
-    Returns:
-        The samples of each by its number; all samples by "" if the file has a single one.
     """
     ends = [each.ravel() for name, each in arrays.items() if name.lower() in EPISODE_ENDS]
     if not ends or len({len(each) for each in ends}) > 1:
@@ -257,11 +249,7 @@ def single_numbers(items: Mapping[str, Any]) -> dict[str, float]:
 
 
 def followed(command: Real, position: Real) -> int:
-    """Number of leading columns of a command that are targets of the positions beside them.
-
-    Returns:
-        0 if they are not targets of half of the joints, or if no joint moves.
-    """
+    """Number of leading columns of a command that are targets of the positions beside them."""
     count = moving = 0
     for wanted, actual in zip(command.T, position.T, strict=False):
         extent, asked = float(np.ptp(actual)), float(np.ptp(wanted))

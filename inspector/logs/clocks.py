@@ -58,14 +58,7 @@ BLOCK = 500_000
 def unit_of(
     path: Path, steps: NDArray[Any], rate: float | None, *, name: str = "", first: float = 0.0
 ) -> str:
-    """Unit of stamps: by their column's name, the epoch, the log's rate, or their median step.
-
-    Returns:
-        A key of ``UNITS``, or ``SAMPLES`` of whole numbers that grow by one, but for some holes.
-
-    Raises:
-        LogError: If it is ambiguous.
-    """
+    """Unit of stamps: by their column's name, the epoch, the log's rate, or their median step."""
     known = TIME_UNITS.get(without_unit(name)[1], "")
     start = {unit: first * float(UNITS[unit]) for unit in UNITS}
     absolute = any(EPOCH[0] < each < EPOCH[1] for each in start.values())
@@ -109,11 +102,7 @@ def is_counter(steps: NDArray[Any], first: float) -> bool:
 
 
 def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -> Stamps:
-    """Stamps from an array of numbers.
-
-    Raises:
-        LogError: If they are not finite, or in an unknown unit.
-    """
+    """Stamps from an array of numbers."""
     if values.dtype.kind == "M":
         values = values.astype("datetime64[ns]").astype(np.int64)
     if values.dtype.kind not in "iuf" or values.ndim != 1 or len(values) < 2:
@@ -159,11 +148,7 @@ def counted_stamps(
     velocity: Real | None,
     stated: tuple[str, float | None] = ("", None),
 ) -> Stamps:
-    """Stamps in seconds of samples that are only counted: at a rate that is known or found.
-
-    Raises:
-        LogError: If the rate is not known, or contradicts positions and velocities.
-    """
+    """Stamps in seconds of samples that are only counted: at a rate that is known or found."""
     found = None
     if position is not None and velocity is not None and position.shape == velocity.shape:
         holes = np.concatenate(([False], np.diff(stamps.time) != 1))
@@ -232,13 +217,6 @@ def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], dic
     """Tracks without the samples whose stamps are not later than all before.
 
     Tracks that share stamps still do afterwards.
-
-    Returns:
-        The tracks, the numbers of "duplicates" and "backward" stamps if there are any, and a
-        sentence on them.
-
-    Raises:
-        LogError: If a tenth of the samples or more is out of order.
     """
     kept: dict[int, tuple[Stamps, Mask]] = {}
     counts = {"duplicates": 0, "backward": 0}
@@ -453,8 +431,6 @@ class ClockError(LogError):
     """Two clocks that cannot be synchronised.
 
     Args:
-        path: The log of the desired motion.
-        problem: What is wrong with the stamps.
         offset: The estimate, if a joint moved.
     """
 
@@ -476,15 +452,7 @@ def synchronise(
     rate: float | None = None,
     offset: float | None = None,
 ) -> tuple[tuple[Track, ...], str, Offset | None]:
-    """Tracks on the clock of the measured motion, whose time starts at 0.
-
-    Returns:
-        The tracks, a sentence on the desired motion's clock if it has one of its own, and the
-        offset that was applied to it, if any.
-
-    Raises:
-        ClockError: If the stamps do not overlap and the offset cannot be estimated.
-    """
+    """Tracks on the clock of the measured motion, whose time starts at 0."""
     measured = {id(track.stamps) for track in tracks if not track.is_desired}
     start = main.stamps.start
     clocks = {

@@ -102,12 +102,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 
 def read(path: Path, options: ReadOptions, progress: Progress) -> Log:
-    """Log with the columns whose signal is known.
-
-    Raises:
-        LogError: If the file cannot be read or has no header, a row has more or fewer cells than
-            the header, or a cell of a column that is read holds text.
-    """
+    """Log with the columns whose signal is known."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             return _read(path, stream, options, progress)
@@ -476,6 +471,8 @@ def _no_header(path: Path, delimiter: str, skip: int, row: int) -> LogError:
             cells = [cell.replace(",", ".") for cell in _split(line, delimiter)]
             rows.append([float(cell) for cell in (cells if cells[-1:] != [""] else cells[:-1])])
     width = len(rows[0]) if rows else 0
+    if not width:
+        return LogError(path, "there is no row of numbers", row)
     table = np.array([each for each in rows if len(each) == width])
     names, how = suggested(table.reshape(-1, width))
     return LogError(

@@ -67,11 +67,7 @@ REFERENCES = "#refs#"
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
-    """Reader of an HDF5 file.
-
-    Raises:
-        LogError: If it cannot be read.
-    """
+    """Reader of an HDF5 file."""
     try:
         with h5py.File(path) as file:
             home, episodes = _episodes(path, file)

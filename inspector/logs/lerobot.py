@@ -45,11 +45,7 @@ UNKNOWN = (
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
-    """Reader of a data set, or of one of its files.
-
-    Raises:
-        LogError: If its info file or its data cannot be read.
-    """
+    """Reader of a data set, or of one of its files."""
     folder = path if path.is_dir() else _folder(path)
     info = _info(folder)
     files = sorted((folder / "data").rglob("*.parquet")) if path.is_dir() else [path]

@@ -108,11 +108,7 @@ class ReadOptions:
             return ()
 
     def for_columns(self, path: Path, names: Sequence[str]) -> "ReadOptions":
-        """Options whose patterns are replaced by the columns that they fit.
-
-        Raises:
-            LogError: If a pattern fits no column, or two entries the same one.
-        """
+        """Options whose patterns are replaced by the columns that they fit."""
         patterns = [entry for entry in self.entries if entry.is_pattern]
         if not patterns:
             return self
@@ -145,11 +141,7 @@ class ReadOptions:
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Options from a saved mapping.
-
-        Raises:
-            InspectorError: If it cannot be read, or has unknown settings.
-        """
+        """Options from a saved mapping."""
         try:
             saved = from_toml(text_of(path))
         except OSError as error:
@@ -175,11 +167,7 @@ class ReadOptions:
             raise InspectorError(f"{path}: {error}") from error
 
     def save(self, path: Path, *, overwrite: bool = False) -> None:
-        """Write the options as TOML, to be loaded again.
-
-        Raises:
-            OutputError: If the file exists or cannot be written.
-        """
+        """Write the options as TOML, to be loaded again."""
         lines = [f'format = "{FORMAT}"']
         for field in fields(self):
             value = getattr(self, field.name)
@@ -201,9 +189,6 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
             names a part. ``velocity.{joint}={joint}_actual`` maps all columns of that form.
             Signals of the base may name a convention of ``CONVENTIONS``:
             ``base_pose.wxyz=root_pose``.
-
-    Raises:
-        OptionError: If an entry is not of that form, or a column or target is named twice.
     """
     parsed: list[Entry] = []
     for text in entries:
@@ -238,11 +223,7 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
 def read_options(
     mapping: Sequence[str] = (), *, saved: str | Path | None = None, **options: Any
 ) -> ReadOptions:
-    """Options of reading a log, combined with a saved mapping.
-
-    Raises:
-        InspectorError: If one of them is not valid.
-    """
+    """Options of reading a log, combined with a saved mapping."""
     before = ReadOptions.load(Path(saved)) if saved else ReadOptions()
     given = {name: value for name, value in options.items() if value is not None}
     for name in {"joints", "topics", "columns"} & set(given):
@@ -308,13 +289,7 @@ class _Choice(NamedTuple):
 def tracks_of(
     log: Log, options: ReadOptions, robot: Robot | None
 ) -> tuple[tuple[Track, ...], tuple[str, ...], tuple[str, ...]]:
-    """Tracks of a log; the mapping takes precedence over the names of columns.
-
-    Raises:
-        LogError: If two columns hold the same signal, none is known to hold motion, or a mapping
-            does not fit the arrays.
-        UnknownJointError: If the robot has none of the joints, or lacks one of the mapping.
-    """
+    """Tracks of a log; the mapping takes precedence over the names of columns."""
     names = [field.name for field in log.fields]
     options = options.for_columns(log.path, [name for name in names if name != log.time])
     joints = robot.joint_names if robot else ()

@@ -43,11 +43,7 @@ OBJECTS = (
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
-    """Reader of a file of version 5.
-
-    Raises:
-        LogError: If it cannot be read.
-    """
+    """Reader of a file of version 5."""
     variables = _variables(path)
     return LogReader(
         "MATLAB 5",

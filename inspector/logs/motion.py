@@ -59,13 +59,7 @@ class Imported:
 
 
 def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
-    """A log's signals in SI units, finite, with increasing stamps, in place of its fields.
-
-    Raises:
-        LogError: If it holds no motion, an infinite value, an angle in an unknown unit,
-            or stamps that do not increase.
-        RobotError: If the robot lacks the joints that the log names.
-    """
+    """A log's signals in SI units, finite, with increasing stamps, in place of its fields."""
     path = log.path
     if log.units and not options.units:
         raise LogError(path, log.units)
@@ -315,12 +309,7 @@ def in_radians(
     *,
     normalised_grippers: bool = False,
 ) -> tuple[Track, ...]:
-    """Tracks with angles in radians, and which of their columns are angles.
-
-    Raises:
-        LogError: If no unit is specified and a value is too large for radians, or if the unit is
-            normalised and the range of a joint is not known.
-    """
+    """Tracks with angles in radians, and which of their columns are angles."""
     found = list(tracks)
     if units == "degrees":
         found = [
@@ -350,9 +339,6 @@ def from_degrees(
 
     Positions are if half of the joints that move reach beyond a turn, to and fro; velocities if
     they match them. Without velocities, positions have to reach beyond ``NORMALISED``.
-
-    Returns:
-        The tracks, and "position" and "velocity" if these were in degrees.
     """
     found = _in_degrees(tracks, robot)
     converted = (_to_radians(t, robot) if t.quantity in found else t for t in tracks)
@@ -577,9 +563,6 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
     uniform are resampled to the specified rate, or to the nearest round one; ``valid`` is False
     in gaps. The run is cut to the time that all signals cover. Missing velocities are
     differentiated from positions.
-
-    Raises:
-        LogError: If no run can be made of the logs.
     """
     _check_mapping(logs, options)
     if len(logs) > 1:
@@ -755,10 +738,6 @@ def signals_of(
         parts: Signals, the joints of their columns, and values, shape (samples, columns).
         time: Uniform, shape (samples,), in [s].
         valid: False in gaps, shape (samples,).
-
-    Returns:
-        Arguments of ``noisemodel.Run`` by name; the method by the name of each differentiated
-        velocity; what was differentiated or left out, a sentence each.
     """
     signals: dict[str, Any] = {}
     differentiated: dict[str, str] = {}

@@ -29,11 +29,7 @@ ALONE = "array"
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
-    """Reader of an archive.
-
-    Raises:
-        LogError: If it is not an archive of plain arrays.
-    """
+    """Reader of an archive."""
     arrays = _arrays(path)
     if str(arrays.get("format", "")).startswith(SAMPLE):
         raise LogError(path, SAMPLE_PROBLEM)

@@ -35,11 +35,7 @@ EPISODE = "episode_index"
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
-    """Reader of a Parquet file.
-
-    Raises:
-        LogError: If it cannot be read.
-    """
+    """Reader of a Parquet file."""
     schema = schema_of(path)
     return LogReader(
         "Parquet",
@@ -50,11 +46,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 
 def schema_of(path: Path) -> Any:
-    """Names and types of the columns.
-
-    Raises:
-        LogError: If the file is damaged; the schema is at its end.
-    """
+    """Names and types of the columns."""
     try:
         check_regular(path)
         return pyarrow.parquet.read_schema(path)
@@ -65,11 +57,7 @@ def schema_of(path: Path) -> Any:
 
 
 def table_of(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any:
-    """Table of some columns, of one episode if there are several.
-
-    Raises:
-        LogError: If a file is damaged, or holds more than is read.
-    """
+    """Table of some columns, of one episode if there are several."""
     filters = [(EPISODE, "==", int(episode))] if episode else None
     try:
         for path in paths:
@@ -97,11 +85,7 @@ def _check_size(path: Path, columns: Collection[str]) -> None:
 
 
 def episodes_of(path: Path) -> tuple[str, ...]:
-    """Episodes in a file.
-
-    Raises:
-        LogError: If the file is damaged, or they are not numbered.
-    """
+    """Episodes in a file."""
     schema = schema_of(path)
     if EPISODE not in schema.names:
         raise LogError(path, f"there is no column {EPISODE!r}; it has {listed(schema.names)}")
@@ -115,11 +99,7 @@ def episodes_of(path: Path) -> tuple[str, ...]:
 
 
 def values_of(path: Path, name: str, column: Any) -> NDArray[Any] | None:
-    """Column as an array, shape (samples, columns); None if it holds no numbers.
-
-    Raises:
-        LogError: If its lists are of different lengths.
-    """
+    """Column as an array, shape (samples, columns); None if it holds no numbers."""
     kind, lists = column.type, False
     while _is_list(kind):
         kind, lists = kind.value_type, True
@@ -198,11 +178,7 @@ UNPACKED, PACKED = 2, 3
 
 
 def unpacked_size(path: Path, columns: Collection[str]) -> tuple[int, int]:
-    """Bytes that columns unpack to, by what states more, their pages or the end of the file.
-
-    Raises:
-        ValueError: If the file is damaged.
-    """
+    """Bytes that columns unpack to, by what states more, their pages or the end of the file."""
     stated = held = width = 0
     with path.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as data:
         length = int.from_bytes(data[-8:-4], "little")

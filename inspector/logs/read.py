@@ -54,12 +54,7 @@ SUFFIXES = frozenset(
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
-    """Reader of a log, chosen by its first bytes, or by the files in a folder.
-
-    Raises:
-        LogError: If there is no such file, it cannot be read, or a library that reads such logs is
-            not installed.
-    """
+    """Reader of a log, chosen by its first bytes, or by the files in a folder."""
     module = _of_folder(path) if _is_folder(path) else _of_file(path)
     libraries, extra = NEEDS.get(module, ((), ""))
     for library in libraries:
@@ -244,11 +239,7 @@ def jobs_of(
 
 
 def listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
-    """Contents of a log, a line each.
-
-    Raises:
-        LogError: If it cannot be read.
-    """
+    """Contents of a log, a line each."""
     opened = open_log(path, options)
     return (f"{path}: {opened.kind}", *(f"  {line}" for line in opened.listing()))
 
@@ -373,15 +364,7 @@ def open_run(
 
     Args:
         path: A run file, any log that `inspector import` reads, or a folder with one of them.
-        reading: How to read it.
         progress: Wraps what is read, to show how much is done.
-
-    Returns:
-        The run, and what was assumed.
-
-    Raises:
-        InspectorError: If it cannot be read, or holds several runs.
-        NoiseModelError: If it makes no run.
     """
     reading = reading or Reading()
     found, _ = sources([Path(path)], reading)
@@ -397,12 +380,7 @@ def open_run(
 def open_source(
     source: Source, reading: Reading | None = None, *, progress: Progress = without_progress
 ) -> Opened:
-    """Open what `sources` found.
-
-    Raises:
-        InspectorError: If it cannot be read.
-        NoiseModelError: If it makes no run.
-    """
+    """Open what `sources` found."""
     reading = reading or Reading()
     if printable(str(source.path)) != str(source.path):
         raise LogError(source.shown, "its name has control characters; rename it")
@@ -434,9 +412,6 @@ def sources(
     """List the runs in files, data sets and folders of them, however deep.
 
     Hidden files are left out. What cannot be read is listed too: `open_source` says why.
-
-    Raises:
-        InspectorError: If a folder holds no log, or a desired log is named for several.
     """
     reading = reading or Reading()
     found: list[Source] = []
@@ -457,11 +432,7 @@ def sources(
 
 
 def logs_in(path: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
-    """List the logs of a folder and of the folders in it, and its other files.
-
-    Raises:
-        LogError: If the folder holds no log, or a folder in it cannot be listed.
-    """
+    """List the logs of a folder and of the folders in it, and its other files."""
     if not _is_folder(path) or is_one_log(path):
         return (path,), ()
     logs: list[Path] = []
@@ -618,10 +589,6 @@ def import_logs(
     """Write a run file for each run of some logs.
 
     In a folder, those that an interrupted call of the same logs and options has written are kept.
-
-    Raises:
-        InspectorError: If the output does not fit the logs, or a single log cannot be read.
-        NoiseModelError: If an output exists, or a single log makes no run.
     """
     logs = [log for path in logs for log in logs_in(path)[0]]
     also_reading(logs)

@@ -711,7 +711,6 @@ def log_heat(
     """Log a heat map of bands over time, with its axis and its scale.
 
     Args:
-        path: Entity path below which the bands lie.
         time: Middles of the columns, shape (columns,), in [s].
         edges: Of the bands, shape (bands + 1,).
         level: Shape (bands, columns), in [dB]; nothing is drawn where it is NaN.

@@ -221,15 +221,8 @@ def difference(
     """Compare the runs of a folder with those of another.
 
     Args:
-        before: Runs before the change.
-        after: Runs after it.
-        library: Models to choose from.
         margin: Least margin from which a run is louder, in [dB].
-        unknown: What becomes of frames out of distribution.
         jobs: How many runs to work on at once.
-
-    Raises:
-        InspectorError: If a folder has no log, or nothing is in common.
     """
     failed: list[Failed] = []
     found = [sources([path])[0] for path in (before, after)]

@@ -182,7 +182,6 @@ def margin_of(scores: Sequence[float], repetitions: int) -> Margin:
 
     Args:
         scores: Leave-one-out scores, in [dB].
-        repetitions: Repetitions that a run is compared with.
     """
     found = np.sort([score for score in scores if np.isfinite(score)])
     if len(found) < 2:
@@ -309,12 +308,7 @@ class Comparison:
 
 
 def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
-    """Compare a run with its reference.
-
-    Args:
-        run: Its levels.
-        scenarios: Accepted runs.
-    """
+    """Compare a run with its reference."""
     known = [each for each in scenarios if _robot_fits(run, each)]
     joints, octaves, remarks = _common(run, known, scenarios)
     frames = len(run.guide)

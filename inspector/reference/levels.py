@@ -95,12 +95,6 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
 
     Args:
         run: The run; what stays in its file is read piece by piece.
-        name: Its scenario.
-        file: Its file, as people read it.
-        sha256: SHA-256 of that.
-
-    Returns:
-        The levels, with no frame if the run is shorter than one, or no octave at a low rate.
     """
     bands = octaves(run.rate)
     of_sample = np.floor(np.arange(len(run.time)) / (run.rate * HOP) + 1e-9).astype(np.int64)
@@ -141,7 +135,6 @@ class LevelStream:
     """Measures the levels of a run while it comes, 6 s at a time, so that no sample is kept.
 
     Args:
-        joint_names: Names of the joints.
         rate: In [Hz].
         robot: The robot's name; empty without.
     """

@@ -119,9 +119,6 @@ def find(run: Path) -> Path | None:
     """The store that is nearest to a run: beside it, or beside a folder above it.
 
     The search ends at the top of a repository.
-
-    Raises:
-        StoreError: If something that is no store has its name.
     """
     folder = run if run.is_dir() else run.parent
     return _nearest(folder.resolve())
@@ -145,8 +142,6 @@ def scenario_of(run: Run, path: Path, root: Path | None = None) -> str:
     """Name of the scenario of a run: from its meta, or its file without a number at the end.
 
     Args:
-        run: The run.
-        path: Its file.
         root: The folder that it was found in; names below it contain their folders.
     """
     known = run.meta.get("scenario")
@@ -161,15 +156,7 @@ def scenario_of(run: Run, path: Path, root: Path | None = None) -> str:
 
 
 def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Levels]:
-    """Measure the levels of runs.
-
-    Args:
-        paths: Runs, and folders of them.
-        reading: How they are read.
-
-    Raises:
-        InspectorError: If one cannot be read.
-    """
+    """Measure the levels of runs."""
     found = []
     for path in paths:
         for source in sources([path], reading)[0]:
@@ -181,12 +168,7 @@ def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Leve
 
 
 def levels_of(source: Source, root: Path | None, reading: Reading | None = None) -> Levels:
-    """Measure the levels of a run that was found in a folder.
-
-    Raises:
-        InspectorError: If it cannot be read.
-        NoiseModelError: If it makes no run.
-    """
+    """Measure the levels of a run that was found in a folder."""
     opened = open_source(source, reading)
     name = scenario_of(opened.run, source.shown, root)
     return levels(opened.run, name=name, file=str(source.shown), sha256=opened.sha256)
@@ -238,12 +220,7 @@ def accept_into(
     by: str,
     renames: bool = True,
 ) -> "tuple[Reference, list[Change]]":
-    """Accept runs into a store, which is made if it does not exist, while nobody else does.
-
-    Raises:
-        StoreError: If the store is damaged.
-        OutputError: If it cannot be written.
-    """
+    """Accept runs into a store, which is made if it does not exist, while nobody else does."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         held = os.open(folder, os.O_RDONLY)
@@ -302,16 +279,7 @@ def accepted(
     stay; runs that differ replace them. A scenario whose motion has another name is renamed.
 
     Args:
-        reference: What was accepted before.
-        runs: The runs.
-        wanted: Findings in them, by scenario.
-        reason: Why they are accepted.
-        by: Who accepts them.
-        today: When.
         renames: Whether a scenario whose logs are gone may have got another name.
-
-    Returns:
-        The reference, and what changes.
     """
     home = reference.path.absolute().parent
     kept = {each.name: each for each in reference.scenarios}
@@ -369,12 +337,7 @@ def accepted(
 def wanted_in(
     runs: Sequence[Levels], events: Mapping[str, Sequence[Event]]
 ) -> dict[str, list[Expected]]:
-    """Findings in runs that are accepted, as wanted from then on, by scenario.
-
-    Args:
-        runs: The runs.
-        events: Findings by file.
-    """
+    """Findings in runs that are accepted, as wanted from then on, by scenario."""
     spans: dict[tuple[str, str], list[list[Any]]] = defaultdict(list)
     for run in runs:
         for event in events.get(run.run, ()):
@@ -421,15 +384,7 @@ def _margin(scenario: Scenario) -> float:
 
 
 def save(reference: Reference, folder: Path) -> None:
-    """Write a store: first the levels, then the TOML that names them, each whole or not at all.
-
-    Args:
-        reference: What is accepted.
-        folder: The folder.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
+    """Write a store: first the levels, then the TOML that names them, each whole or not at all."""
     lines = [
         "# What is normal for each scenario, written by `inspector accept`; the levels are in the",
         "# .npz files. People may edit what is required, wanted and waived.",

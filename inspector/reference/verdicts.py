@@ -53,12 +53,7 @@ class References:
     def found(
         cls, runs: Iterable[Path], given: Path | None = None, reading: Reading | None = None
     ) -> "References":
-        """Load the given reference, or the nearest store of each run.
-
-        Raises:
-            StoreError: If a store is damaged.
-            InspectorError: If a good run cannot be read.
-        """
+        """Load the given reference, or the nearest store of each run."""
         of = {run: given or find(run) for run in runs}
         known = {run: path for run, path in of.items() if path is not None}
         return cls(
@@ -106,12 +101,7 @@ class References:
         return judge(verdict, None if path is None else self.loaded[path], gate=gate, today=today)
 
     def absent(self, verdicts: Sequence[Verdict], folders: Iterable[Path]) -> list[Verdict]:
-        """Verdicts on stores whose required scenarios have too few logs.
-
-        Args:
-            verdicts: Those on all runs.
-            folders: Folders all of whose runs these are.
-        """
+        """Verdicts on stores whose required scenarios have too few logs."""
         found = []
         given = [folder.resolve() for folder in folders]
         for path, reference in self.loaded.items():
@@ -379,14 +369,9 @@ def judge(
     """Apply what a reference wants and waives, and a gate, to what was found in a run.
 
     Args:
-        verdict: What was found, with its evidence.
         reference: Its reference, if there is one.
         gate: The findings that fail a run, all unless given; missing ones always do.
         today: The day on which waivers are still valid or not.
-
-    Returns:
-        The verdict with what became of each finding, with what is missing, and with the status
-        that follows.
     """
     if verdict.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
         return verdict

@@ -179,10 +179,7 @@ def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
     known, and else its file is named.
 
     Args:
-        job: The job.
-        head: Head of the table, with three columns.
         notes: Title of what does not fail its case.
-        marker: The first line.
     """
     ranked = job.ranked
     shown = [case for case in ranked if case.outcome or not case.quiet]
@@ -213,7 +210,6 @@ def published(picture: Path | None, folder: Path | None, address: str) -> str:
     """Address of a picture; empty if it will not be published, or there is none.
 
     Args:
-        picture: The picture.
         folder: The folder of the report that it lies in, however deep.
         address: Where that folder is published; empty if it is not.
     """

@@ -35,8 +35,6 @@ def row(verdict: Verdict, event: Event, runs: str = "") -> Row:
     """A finding as cells of a table.
 
     Args:
-        verdict: The verdict that it is of.
-        event: The finding.
         runs: In how many repetitions it is, in words.
     """
     known = verdict.localisations.get(event)
@@ -105,12 +103,7 @@ class Group:
         return self.verdicts[0]
 
     def found(self, *, fails: bool) -> list[tuple[Verdict, Event, str]]:
-        """Findings that fail their runs, or those that do not, once for those of repetitions.
-
-        Returns:
-            Of each, the verdict and the event with the best score, of the class that most of the
-            repetitions have, and in how many runs it is.
-        """
+        """Findings that fail their runs, or those that do not, once for those of repetitions."""
         folded: list[list[tuple[Verdict, Event]]] = []
         for verdict in self.verdicts:
             for event in verdict.failing if fails else verdict.excused:

@@ -65,7 +65,6 @@ def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
     the command line prints them on stderr.
 
     Args:
-        verdicts: What was found in runs.
         verbose: Whether to name the runs of each scenario, and their models.
     """
     read = [each for each in verdicts if each.status not in UNREAD]

@@ -44,11 +44,7 @@ li { margin: .2rem 0; }
 
 
 def require() -> None:
-    """Refuse a page before long work is done for it.
-
-    Raises:
-        InspectorError: If matplotlib is not installed.
-    """
+    """Refuse a page before long work is done for it."""
     if find_spec("matplotlib") is None:
         raise InspectorError('a report needs matplotlib; `pip install "noise-inspector[report]"`')
 
@@ -67,14 +63,9 @@ def write(
     Args:
         analysis: A run with what was found in it.
         path: The file to write, by convention ``*.html``.
-        audit: What the log can show, in lines.
         verdict: The verdict beside a reference, which replaces that of the analysis.
         overwrite: Whether a file that exists may be replaced.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
-
-    Raises:
-        InspectorError: If matplotlib is not installed.
-        OutputError: If the file exists or cannot be written.
     """
     require()
     text = page(analysis, audit=audit, verdict=verdict, floor=floor)
@@ -93,12 +84,8 @@ def page(
 
     Args:
         analysis: A run with what was found in it.
-        audit: What the log can show, in lines.
         verdict: The verdict beside a reference, which replaces that of the analysis.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s].
-
-    Returns:
-        HTML.
     """
     from inspector.report.picture import picture
 
@@ -191,13 +178,7 @@ def _add_list(body: ET.Element, title: str, lines: tuple[str, ...] | list[str]) 
 
 
 def document(title: str, style: str, policy: str) -> tuple[ET.Element, ET.Element]:
-    """An HTML page without content, and its body.
-
-    Args:
-        title: Its title.
-        style: Its style sheet.
-        policy: Its content security policy.
-    """
+    """An HTML page without content, and its body."""
     html = ET.Element("html", lang="en")
     head = ET.SubElement(html, "head")
     ET.SubElement(head, "meta", charset="utf-8")
@@ -212,8 +193,6 @@ def add_text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
     """Add an element with a text to another one.
 
     Args:
-        parent: The other one.
-        tag: Its name.
         text: Its text; what HTML cannot write is replaced.
         kind: Its class in the style, empty without.
     """

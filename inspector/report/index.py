@@ -68,9 +68,6 @@ def prepare(folder: Path, *, overwrite: bool = False) -> None:
     Args:
         folder: The folder; it is created if it does not exist.
         overwrite: Whether a page in it may be replaced.
-
-    Raises:
-        InspectorError: If it cannot be made, or holds a page already.
     """
     try:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
@@ -88,13 +85,6 @@ def draw(analysis: Analysis, path: Path, *, folder: Path) -> Path:
     Args:
         analysis: The run with what was found in it.
         path: The file that it is of: the picture is named after it.
-        folder: The folder.
-
-    Returns:
-        The picture.
-
-    Raises:
-        OutputError: If it cannot be written.
     """
     from inspector.report.picture import picture
 
@@ -122,13 +112,6 @@ def write(verdicts: Sequence[Verdict], folder: Path) -> Path:
 
     Args:
         verdicts: What was found in runs, with their pictures.
-        folder: The folder.
-
-    Returns:
-        The page.
-
-    Raises:
-        OutputError: If it cannot be written.
     """
     path = folder / PAGE
     with replacing(path, overwrite=True) as temporary:
@@ -141,10 +124,6 @@ def page(verdicts: Sequence[Verdict]) -> str:
 
     Args:
         verdicts: What was found in runs; their pictures lie in the folder of the page.
-
-    Returns:
-        HTML: the counts, a row for each run with its findings over time, then each run with its
-        picture; the worst first.
     """
     html, body = document(f"Noise: {summary(verdicts)}", STYLE + ROWS, POLICY)
     add_text(body, "h1", "Noise of the joints")

@@ -12,7 +12,6 @@ def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
     """A localisation in words.
 
     Args:
-        found: The localisation of a failure.
         quote: Mark around the names of stages, say a backtick in Markdown.
 
     Returns:

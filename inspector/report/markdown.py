@@ -27,10 +27,6 @@ def report(analysis: Analysis) -> str:
 
     Args:
         analysis: The run with what was found in it.
-
-    Returns:
-        Markdown: the status, a line for each finding, the run in a line, what is annotated, and
-        what is missing.
     """
     run = analysis.run
     facts = [

@@ -38,9 +38,6 @@ def picture(analysis: Analysis, *, floor: float | None = None) -> bytes:
     Args:
         analysis: A run with what was found in it.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
-
-    Returns:
-        A PNG file.
     """
     from matplotlib.figure import Figure
 

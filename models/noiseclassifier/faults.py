@@ -20,11 +20,7 @@ def fault(time: Array, kind: str, frequency: float, seed: int, *, start: float) 
         kind: One of ``KINDS``: a tone or noise an octave wide for ``LONG``, or a blow, a decaying
             tone of level 1 in its first ``SHORT``.
         frequency: Of the tone, or the middle of the octave, in [Hz].
-        seed: Random seed of the noise.
         start: When it starts, in [s].
-
-    Returns:
-        Shape (samples,).
     """
     since = time - start
     if kind == "blow":
@@ -47,11 +43,7 @@ def with_fault(signals: Mapping[str, Real], joint: int, added: Array) -> dict[st
 
     Args:
         signals: By name, those that go joint by joint among them.
-        joint: Its number among the joints.
         added: Shape (samples,), in [rad/s].
-
-    Returns:
-        The same signals: measured velocities and errors, joint by joint, and their norms differ.
     """
     found = dict(signals)
     for name, sign, norms in (("measured", 1.0, ("measured", NOISE)), ("error", -1.0, ("error",))):

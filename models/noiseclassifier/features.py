@@ -48,7 +48,6 @@ def rounded(samples: Real, profile: Profile) -> Array:
 
     Args:
         samples: A noise signal, any shape.
-        profile: Defines whether samples are 32-bit numbers.
     """
     if profile.single_precision:
         samples = samples.astype(np.float32, copy=False)
@@ -60,7 +59,6 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
 
     Args:
         windows: Samples of the windows, shape (rows, ..., window).
-        profile: What to compute.
         resolution: The one of the profile's that the windows are of.
 
     Returns:
@@ -103,7 +101,6 @@ def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
     Args:
         energies: For each of the profile's resolutions, log-band energies of the frames' windows,
             shape (frames, time, energies).
-        profile: What to compute.
 
     Returns:
         Features, not yet standardised, shape (frames, features).
@@ -128,7 +125,6 @@ def standard(plain: Real, profile: Profile) -> tuple[Array, Array]:
 
     Args:
         plain: Features of the training set, NaN where they are missing, shape (frames, features).
-        profile: Least standard deviation.
 
     Returns:
         Mean and scale of each feature, shape (features,) each.
@@ -145,8 +141,6 @@ def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
 
     Args:
         frames: Stretches of noise signal, shape (frames, length).
-        window: Samples of the periodic Hann window.
-        stride: Samples from one transform to the next.
 
     Returns:
         Amplitudes, shape (frames, time, frequency).
@@ -191,7 +185,6 @@ def band_shares(rate: float, resolution: Resolution) -> Array:
 
     Args:
         rate: Sample rate of the signal, in [Hz].
-        resolution: With band edges.
 
     Returns:
         Shares, each column summing to 1, shape (frequency, bands).

@@ -33,14 +33,6 @@ def frame_features(
         signal: The noise estimate, shape (samples,), or signals by name.
         profile: How it is framed, and what to compute.
         valid: False in gaps, shape (samples,); frames that touch a gap are left out.
-        reference: As `FrameFeatures` takes it.
-
-    Returns:
-        First sample of each frame, and its features.
-
-    Raises:
-        SignalError: If the signal is too short for a frame, or not finite, or not 1-D, or the
-            profile needs another one.
     """
     return _joined([*frames_of([(signal, valid)], profile, reference)])
 
@@ -56,13 +48,6 @@ def frames_of(
         pieces: The noise estimate, shape (samples,), or signals by name, and False in gaps, shape
             (samples,); one piece or more.
         profile: How it is framed, and what to compute.
-        reference: As `FrameFeatures` takes it.
-
-    Yields:
-        First sample of each frame that a piece completes, and its features.
-
-    Raises:
-        SignalError: As `frame_features`.
     """
     frames = None
     for signal, valid in pieces:
@@ -116,9 +101,6 @@ class FrameFeatures:
         Args:
             samples: Any number of them, also none, shape (samples,) or (rows, samples).
             valid: False in gaps, shape (samples,); frames that touch a gap are left out.
-
-        Raises:
-            SignalError: If the samples are not finite, or their shape does not fit; none is taken.
         """
         if samples.ndim > 1 and len(samples) != len(self._samples):
             raise SignalError(
@@ -145,11 +127,7 @@ class FrameFeatures:
         self._lose(samples - min(samples, length) - jump)
 
     def finish(self) -> Frames:
-        """End the signal; what is pushed next begins another one.
-
-        Returns:
-            The last frame, flush with the end, if the profile asks for one where no hop leads.
-        """
+        """End the signal; what is pushed next begins another one."""
         profile, found = self._profile, self._nothing
         last = self._count - profile.length
         flush = profile.flush_end and last > self._first

@@ -44,7 +44,6 @@ def pad_end(signal: Real, *, length: int) -> Real:
 
     Args:
         signal: The signal, shape (..., samples), at least one sample.
-        length: Samples of the result.
 
     Returns:
         The signal reflected at its last sample in time and in amplitude (paper, Sec. III-A),

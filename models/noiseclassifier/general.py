@@ -257,12 +257,8 @@ def kept(truth: Words, thin: int, *, first: bool = True) -> Index:
 
     Args:
         truth: True class of each frame, `UNCLEAR` where that is not known, shape (frames,).
-        thin: Of `ok` frames.
         first: Whether they are of the first input that a recording feeds; of the others, every
             other frame is enough.
-
-    Returns:
-        Their indices.
     """
     ok = truth == OK
     known = np.flatnonzero((truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0)))

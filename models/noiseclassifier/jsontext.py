@@ -27,10 +27,6 @@ def text_of(path: str | Path) -> str:
 
     Args:
         path: A regular file: a device or a pipe may have no end.
-
-    Raises:
-        ValueError: If it is no regular file, too long, or not text in UTF-8.
-        OSError: If it cannot be read.
     """
     path = Path(path)
     about = path.stat()
@@ -45,15 +41,7 @@ def text_of(path: str | Path) -> str:
 
 
 def from_json(text: str | bytes) -> Any:
-    """Value of a JSON text.
-
-    Args:
-        text: The text.
-
-    Raises:
-        ValueError: If it is not JSON, too long, nested too deeply, or has an integer of more than
-            64 bits.
-    """
+    """Value of a JSON text."""
     _check_length(text)
     try:
         return json.loads(text, parse_int=_whole)
@@ -62,14 +50,7 @@ def from_json(text: str | bytes) -> Any:
 
 
 def from_toml(text: str) -> dict[str, Any]:
-    """Table of a TOML text.
-
-    Args:
-        text: The text.
-
-    Raises:
-        ValueError: As `from_json`.
-    """
+    """Table of a TOML text."""
     _check_length(text)
     if LONG_KEY.search(text):
         raise ValueError(f"a key of more than {PARTS} parts")
@@ -88,11 +69,7 @@ def from_toml(text: str) -> dict[str, Any]:
 
 
 def toml_shown(value: object) -> str:
-    """A value of a TOML text about as it stands there, for messages.
-
-    Args:
-        value: As `from_toml` gives it.
-    """
+    """A value of a TOML text about as it stands there, for messages."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, date | time):  # of a day with a time, too

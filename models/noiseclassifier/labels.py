@@ -239,7 +239,6 @@ def confirmed(suspect: Mask, evidence: Mask, apart: Mask, *, least: int = CONFIR
         suspect: Whether a frame is not `ok` by itself, shape (frames,).
         evidence: Whether it is evidence of a finding, shape (frames,).
         apart: Whether a frame and the next neither overlap nor touch, shape (frames - 1,).
-        least: How many frames of evidence are enough.
 
     Returns:
         The frames that are kept, shape (frames,).

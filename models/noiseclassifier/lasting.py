@@ -238,7 +238,6 @@ def spectrum(window: Array, rate: float) -> tuple[Array, Array]:
     """Mean square of the line at each frequency of a Hann window.
 
     Args:
-        window: Shape (..., samples).
         rate: Sample rate, in [Hz].
 
     Returns:

@@ -74,13 +74,8 @@ def write(
     """Write a model file, whole or not at all.
 
     Args:
-        path: The file to write.
         manifest: What is known of the model, as JSON can hold it.
-        arrays: The arrays that the module's docstring lists.
         overwrite: Whether a file that exists may be replaced.
-
-    Raises:
-        OutputError: If the file exists or cannot be written.
     """
     text = json.dumps({"format": FORMAT, **manifest}, sort_keys=True, allow_nan=False)
     content = io.BytesIO()
@@ -142,15 +137,8 @@ def _place(temporary: Path, path: Path) -> None:
 def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
     """Manifest and arrays of a model file, once its table of contents is checked.
 
-    Args:
-        path: The file.
-
     Returns:
         The manifest and the arrays, which are finite and of the shapes that it asks for.
-
-    Raises:
-        FileError: If the file is missing, damaged, no model file, of another version, or
-            contradicts itself.
     """
     try:
         if not stat.S_ISREG(Path(path).stat().st_mode) and not Path(path).is_dir():

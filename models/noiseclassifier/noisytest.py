@@ -137,13 +137,6 @@ def read_folder(folder: str | Path, *, rate: float | None = None) -> Iterator[Re
     Args:
         folder: Folder that holds a ``.toml`` beside each ``.log``.
         rate: Sample rate that all must have, in [Hz]; by default, each has its own.
-
-    Yields:
-        Recordings with their annotations, named after their files.
-
-    Raises:
-        FileError: If there is no ``.log``, or a file cannot be understood.
-        RateError: If a recording has another rate.
     """
     logs = sorted(Path(folder).glob("*.log"))
     if not logs:
@@ -159,14 +152,6 @@ def read_recording(log: str | Path, *, rate: float | None = None) -> Recording:
     Args:
         log: The ``.log``; the annotations are in the ``.toml`` of the same name.
         rate: Sample rate that it must have, in [Hz]; by default, that of its times.
-
-    Returns:
-        The recording, named after the file, with the hash of the file.
-
-    Raises:
-        FileError: If a file is missing or cannot be understood.
-        RateError: If the recording has another rate.
-        RecordingError: If the annotations do not fit the signal.
     """
     log = Path(log)
     blocks = read_annotations(log.with_suffix(".toml"))

@@ -28,11 +28,6 @@ def pooled(energies: Sequence[Array], profile: Profile) -> Array:
         energies: For each of the profile's resolutions, log-band energies of the frames' windows,
             shape (frames, time, energies).
         profile: Whether energies are relative to the level of the frame.
-
-    Returns:
-        Mean, maximum and standard deviation (for a profile with a reference, the first two) of each
-        band, spectrum by spectrum; if the profile is relative, the level of the frame comes last,
-        and is subtracted from the energies of the signals. Shape (frames, features).
     """
     rows = [
         _by_spectrum(pool(each, statistics(profile)), len(resolution.edges) - 1)
@@ -78,7 +73,6 @@ def pool(energies: Array, count: int = POOLED) -> Array:
     """Mean, maximum and standard deviation over time of each log-band energy.
 
     Args:
-        energies: Shape (frames, time, energies).
         count: How many of these statistics, 2 or 3.
 
     Returns:

@@ -57,17 +57,11 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
     """Signals as rows of one array.
 
     Args:
-        signals: The noise, or signals by name.
         names: Those to stack, norms first. ``noise`` is computed from ``measured`` and ``desired``
             where it is missing.
 
     Returns:
         One norm as it is, shape (samples,); several signals as rows, shape (rows, samples).
-
-    Raises:
-        MissingSignalError: If one is not there.
-        SignalError: If one is of another shape than its name requires, or they differ in length
-            or in their joints.
     """
     there = named(signals)
     if lacking := [name for name in names if name not in there]:
@@ -96,12 +90,7 @@ def check(samples: Real, valid: Mask | None, *, first: int) -> None:
     """Check the input of a classifier.
 
     Args:
-        samples: Shape (samples,) or (rows, samples).
         valid: False in gaps; None if there are none.
-        first: Number of the first sample.
-
-    Raises:
-        SignalError: If the shapes do not fit, or a value is not finite.
     """
     count = samples.shape[-1]
     if valid is not None and valid.shape != (count,):

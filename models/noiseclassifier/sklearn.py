@@ -100,10 +100,6 @@ class NoiseFeatures(ClassNamePrefixFeaturesOutMixin, TransformerMixin, _Framed):
         Args:
             X: Frames of the noise, shape (frames, length); of several signals one after the other,
                 shape (frames, signals * length).
-            y: Not used.
-
-        Raises:
-            ModelsError: If the profile does not exist, or does not fit the frames.
         """
         frames = validate_data(self, X, dtype=np.float64, ensure_min_features=LEAST_SAMPLES)
         self.profile_ = _profile(self.profile, self.rate, self.settings, frames.shape[1])
@@ -129,7 +125,6 @@ class NoiseClassifier(ClassifierMixin, _Framed):  # type: ignore[misc]
     the debouncing of `noiseclassifier.Classifier` are for the frames of a whole signal.
 
     Args:
-        profile: As of `NoiseFeatures`.
         rate: Sample rate of the frames, in [Hz].
         settings: Settings of the profile that differ, by name: ``{"estimator": "svm"}``.
 
@@ -151,14 +146,9 @@ class NoiseClassifier(ClassifierMixin, _Framed):  # type: ignore[misc]
         """Train on labelled frames.
 
         Args:
-            X: Frames, as of `NoiseFeatures.fit`.
             y: Class of each frame, shape (frames,).
             groups: Group of each frame, shape (frames,); runs of a group share their motion. By
                 default all frames are one group, and probabilities are not calibrated.
-
-        Raises:
-            ModelsError: If the profile does not exist, or does not fit the frames.
-            ValueError: If there are fewer than two classes.
         """
         frames, labels = validate_data(
             self, X, y, dtype=np.float64, ensure_min_features=LEAST_SAMPLES

@@ -68,12 +68,7 @@ CLOSE = 1e-5
 
 @dataclass(frozen=True)
 class Grid:
-    """Settings of a profile, and the values of each, sorted as ``SETTINGS`` are.
-
-    Raises:
-        ProfileError: If a setting cannot be tuned, has no values or one of them twice, or the
-            points are too many.
-    """
+    """Settings of a profile, and the values of each, sorted as ``SETTINGS`` are."""
 
     axes: Mapping[str, tuple[Value, ...]]
 
@@ -121,10 +116,6 @@ class Grid:
         Args:
             texts: ``paper``, or a setting and its values; a later text replaces the values that
                 an earlier one gave the same setting.
-            kernel: Kernel of the profile that is tuned.
-
-        Raises:
-            ProfileError: If a text cannot be understood, or the grid cannot be searched.
         """
         axes: dict[str, tuple[Value, ...]] = {}
         for text in texts:
@@ -144,12 +135,7 @@ class Grid:
             yield dict(zip(self.axes, values, strict=True))
 
     def profiles(self, base: Profile) -> list[Profile]:
-        """Profile of each point; all other settings are those of ``base``.
-
-        Raises:
-            ProfileError: If a setting makes no sense with this profile, a value is out of its
-                range, or two do not fit together.
-        """
+        """Profile of each point; all other settings are those of ``base``."""
         estimator = base.estimator if base.estimator in OWN else "support vector machines"
         for name in self.axes:
             foreign = name in ESTIMATOR_SETTINGS and name not in OWN[estimator]
@@ -338,12 +324,6 @@ def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
 
     Args:
         profiles: Points that share their features; it pays if those of one gamma follow each other.
-        trial: Training and test recordings.
-
-    Raises:
-        DatasetError: If there are fewer than two classes, or a test class that some split has no
-            training frame of.
-        ModelsError: If a recording does not fit the profile.
     """
     known = trial.examples(profiles[0], training=True)
     fresh = trial.examples(profiles[0], training=False)
@@ -466,9 +446,6 @@ def balanced_log_loss(margins: Array, truth: Index) -> float:
     Args:
         margins: Margins of the classes, shape (frames, classes).
         truth: Class of each frame, as an index, shape (frames,).
-
-    Returns:
-        The loss in nats: 0 if all is certain and right, log(classes) if all margins are equal.
     """
     from scipy.optimize import brentq
 

@@ -20,8 +20,6 @@ class Windows:
 
     Args:
         samples: Buffer of the signal, shape (rows, samples).
-        profile: What to compute.
-        resolution: One of the profile's.
     """
 
     def __init__(self, samples: Array, profile: Profile, resolution: Resolution) -> None:
@@ -56,7 +54,6 @@ class Windows:
         """Transform the windows that are complete.
 
         Args:
-            count: Samples so far.
             base: Index of the first one in the buffer.
         """
         hops, phase = divmod(count - self._resolution.window, self._profile.hop)
@@ -81,18 +78,11 @@ class Windows:
 
         Args:
             frames: Their numbers, in hops, shape (frames,).
-
-        Returns:
-            Shape (frames, time, energies).
         """
         windows = (frames * len(self._phases))[:, None] + self._of_frame
         return self._energies.take(windows, axis=0, mode="wrap")
 
     def of_place(self, place: int) -> Array:
-        """Log-band energies of the frame that starts at a place in the buffer.
-
-        Returns:
-            As `of_frames`, for one frame.
-        """
+        """Log-band energies of the frame that starts at a place in the buffer."""
         windows = self._windows[:, place + self._in_frame]
         return log_band_energies(windows, self._profile, self._resolution)[None]

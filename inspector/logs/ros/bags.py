@@ -134,12 +134,7 @@ def _listing(path: Path) -> tuple[str, ...]:
 
 
 def _intact(path: Path) -> Bag:
-    """Bag that is open for reading by rosbags.
-
-    Raises:
-        DamagedError: If rosbags cannot open it, or not read it.
-        ArchiveError: If it unpacks to more than is read, then or when messages are read.
-    """
+    """Bag that is open for reading by rosbags."""
     from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
 

@@ -84,11 +84,7 @@ def begin(path: Path) -> None:
 
 
 def unpack(method: str, data: bytes) -> bytes:
-    """Unpack a chunk.
-
-    Raises:
-        ArchiveError: If the bag unpacks to more than `noisemodel.runfile.check_unpacked` allows.
-    """
+    """Unpack a chunk."""
     if method not in METHODS:
         return data
     with Unpacking(method, BytesIO(data)) as stream:
@@ -135,11 +131,7 @@ METHODS: dict[str, Callable[[BinaryIO], Any]] = {"bz2": bz2.open, "lz4": _lz4, "
 
 
 def open_bag(path: Path, problem: str) -> Bag:
-    """Bag with the intact records of one that rosbags cannot open, or not read to its end.
-
-    Raises:
-        LogError: If no topic can be read.
-    """
+    """Bag with the intact records of one that rosbags cannot open, or not read to its end."""
     files = sorted(each for each in path.iterdir() if storage_of(each)) if path.is_dir() else [path]
     storages = {storage_of(file) for file in files}
     if len(storages) != 1 or storages == {""}:

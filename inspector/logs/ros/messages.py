@@ -128,11 +128,7 @@ class Decoder:
         return stores
 
     def __call__(self, data: bytes) -> Any:
-        """Deserialise a message.
-
-        Raises:
-            LogError: If the message is not of the topic's type.
-        """
+        """Deserialise a message."""
         problem: Exception | None = None
         for store in self._stores:
             parse = store.deserialize_ros1 if self.ros1 else store.deserialize_cdr

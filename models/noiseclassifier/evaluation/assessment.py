@@ -203,13 +203,9 @@ def measure(
     """Assessment of predictions.
 
     Args:
-        predictions: Of a model, on recordings.
         unanswered: Recordings without a verdict.
         copies: Recordings that were left out, and the equal one of each.
         known: Recordings that the model was trained on, and what of them.
-
-    Raises:
-        DatasetError: If there is no annotated frame, or no recording has a verdict.
     """
     if unanswered and not predictions:
         first = unanswered[0]
@@ -256,7 +252,6 @@ def table(assessment: Assessment, by: str = "") -> str:
     """Table of an assessment, as text, in lines of up to 140 characters.
 
     Args:
-        assessment: The measures.
         by: ``robot``, ``domain`` or ``scenario``: the one table of parts to print, whole.
     """
     protocol = assessment.protocol

@@ -160,11 +160,7 @@ class Resampling:
 
 
 def garwood(events: float) -> tuple[float, float]:
-    """Exact bounds of the mean of a Poisson distribution.
-
-    Returns:
-        Lower and upper bound with 95 %.
-    """
+    """Exact bounds of the mean of a Poisson distribution."""
     from scipy.special import gammaincinv
 
     # F. Garwood, Fiducial limits for the Poisson distribution, Biometrika 28 (1936)

@@ -156,9 +156,6 @@ def one_to_one(met: Mask) -> Array:
 
     Args:
         met: Whether findings meet faults, shape (cases, findings, faults).
-
-    Returns:
-        Shape (cases,).
     """
     matched: Array = (_partners(met) >= 0).sum(axis=1).astype(np.float64)
     return matched
@@ -188,7 +185,6 @@ def truth_of(start: Array, stop: Array, blocks: Iterable[Block], *, step: float)
     Args:
         start: Of each frame, shape (frames,), in [s].
         stop: Of each frame, shape (frames,), in [s].
-        blocks: Annotations, in order, with a finite stop.
         step: Time from one sample to the next, in [s].
     """
     blocks = list(blocks)
@@ -319,12 +315,7 @@ def predict(
     failure, each failure is an anomaly.
 
     Args:
-        classifier: The model.
-        recording: Annotated noise at its rate.
         localise: Estimates onset and end of the findings; else they last as their frames do.
-
-    Raises:
-        ModelsError: If the recording does not fit the model.
     """
     try:
         # Frames that are cut from blocks, as the paper does for validation.
@@ -475,10 +466,6 @@ def failure_score(scores: Array, classes: Sequence[str]) -> Array:
 
     Args:
         scores: Of all classes, shape (frames, classes).
-        classes: Their names, `ok` among them.
-
-    Returns:
-        Shape (frames,).
     """
     ok = list(classes).index(OK)
     if are_probabilities(scores):
