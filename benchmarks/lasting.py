@@ -168,7 +168,8 @@ def on_logs(logs: Sequence[nm.Run], library: Library, *, each: int = 6) -> Itera
     """Findings in logs of good motion, and short tones put into them."""
     generator = np.random.default_rng(35)
     for run in logs:
-        yield f"{run.meta.get('name', run.robot)}: {len(findings(run, library))} findings"
+        name = run.meta.get("name", f"{run.robot} (real)")
+        yield f"{name}: {len(findings(run, library))} findings"
         counts = []
         for above in (*ABOVE, np.inf):
             found = 0

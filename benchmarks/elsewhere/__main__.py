@@ -8,7 +8,7 @@ Writes run files `OUT/<domain>/<robot>/<scenario>-<90000 + seed>.npz`: for each 
 good run and two with faults, of one kind each, at 1 kHz; for every other seed also a good run at
 the simulator's own rate, and for the first one a run with faults. Files that exist are kept. A run
 in which the robot falls or the simulation diverges is named, and leaves
-`<scenario>-<seed>.dropped.json` instead. docs/elsewhere.md describes the domains.
+`<scenario>-<seed>.dropped.json` instead.
 """
 
 import argparse
