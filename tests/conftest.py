@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -10,6 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+os.environ.pop(
+    "CI", None
+)  # `accept` writes nothing where it is set; tests of that set it themselves
 SHARED = Path(__file__).parents[2] / "shared"
 
 

@@ -2,7 +2,7 @@
 
 A tone, a blow or noise is added to one joint of a good run. Its level is that of the loudest tenth
 of a second of the run in the band of the model, as a touchdown has, or `FLOOR` if the run is
-quieter there: how faint a fault a model finds is measured elsewhere (docs/measured.md), that it
+quieter there: how faint a fault a model finds is measured elsewhere (docs/accuracy.md), that it
 finds a loud one is a law.
 """
 
@@ -31,7 +31,7 @@ rule of the scenarios takes for felt."""
 LOUDER = (1.0, 3.0, 10.0, 100.0, 1000.0)
 ABOVE = {"go2": 3.0, "talos": 2.0}
 """Times the loudest tenth of a second, of robots with legs: a blow on one joint, as loud as the
-touchdowns of all, is one more touchdown to the model (docs/measured.md)."""
+touchdowns of all, is one more touchdown to the model (docs/accuracy.md)."""
 SECONDS = 3.0
 
 LIBRARY = load_library()
@@ -41,7 +41,7 @@ LIBRARY = load_library()
 def good_run(robot, rate):
     """Seconds of the first simulated run in which nothing is wrong and nothing is found, at a rate.
 
-    Models raise false alarms in some trots (docs/measured.md); the law is about the rest.
+    Models raise false alarms in some trots (docs/accuracy.md); the law is about the rest.
     """
     for seed in range(9001, 9031):
         run = simulated(robot, "straight", seed)

@@ -151,7 +151,8 @@ FEW = 0.1
 def _believable(path: Path, tracks: Sequence[Track], remarks: list[str]) -> Iterator[Track]:
     """Tracks in which nan takes the place of values that no unit explains."""
     for track in tracks:
-        values = np.abs(track.values)
+        # Numbers of 16 bits cannot hold the limits that they are compared with.
+        values = np.abs(track.values).astype(np.result_type(track.values, np.float32), copy=False)
         if (
             track.quantity not in LARGEST
             or not (far := np.isfinite(values) & (values > ABSURD)).any()

@@ -103,11 +103,11 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
     sizes = np.diff(np.append(firsts, len(of_sample)))
     frames = max(0, int(count - (sizes[-1] < 0.9 * run.rate * HOP)) - BINS + 1)
     energy = _energies(run, bands, of_sample, count)
-    power = (
-        _framed(energy, frames)
-        / np.maximum(_framed(sizes.astype(float), frames), 1.0)[:, None, None, None]
-    )
-    level = np.maximum(10 * np.log10(np.maximum(power, 1e-30)), LEAST_DB).astype(np.float32)
+    samples = np.maximum(_framed(sizes.astype(float), frames), 1.0)[:, None, None]
+    level = np.empty((frames, *energy.shape[1:]), np.float32)
+    for place in range(len(bands)):  # one by one: all at once take several times the memory
+        power = _framed(energy[..., place].astype(np.float64), frames) / samples
+        level[..., place] = np.maximum(10 * np.log10(np.maximum(power, 1e-30)), LEAST_DB)
     lost = np.add.reduceat((~run.mask).astype(np.int64), firsts) > 0
     # The filters still ring a frame after a gap.
     level[_framed(np.convolve(lost, np.ones(BINS + 1))[:count], frames) > 0] = np.nan
@@ -266,12 +266,12 @@ def _has_desired(run: Run) -> NDArray[np.bool_]:
 
 def _energies(
     run: Run, bands: tuple[tuple[float, float], ...], of_sample: NDArray[np.int64], count: int
-) -> Array:
+) -> NDArray[np.float32]:
     """Energy of each bin, shape (bins, joints, 2, octaves)."""
     from numpy import fft
 
     joints, settling = len(run.joint_names), round(SETTLING * run.rate)
-    energy = np.zeros((count, 2 * joints, len(bands)))
+    energy = np.zeros((count, 2 * joints, len(bands)), np.float32)
     before = np.zeros((2 * joints, settling))
     for rows, signals in _signals(run):
         # The filters start from rest, or from the end of the piece before; zeros let them ring out.

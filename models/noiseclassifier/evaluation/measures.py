@@ -1,7 +1,7 @@
 """Measures of a model on recordings: its findings as they are reported, and its frames.
 
 All figures of the protocol are of one operating point: the findings as they are reported. Nothing
-is chosen on the runs that are measured. `matching` defines the terms; `docs/evaluation.md` has all
+is chosen on the runs that are measured. `matching` defines the terms; `docs/metrics.md` has all
 measures, each with its source. A measure of a model is the unweighted mean over robots, so that
 neither the robot with most runs nor that with most time decides. Medians of delays are averaged
 likewise.
