@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-os.environ.pop(
-    "CI", None
-)  # `accept` writes nothing where it is set; tests of that set it themselves
+# `accept` writes nothing where CI is set; the tests of that set it themselves.
+os.environ.pop("CI", None)
 SHARED = Path(__file__).parents[2] / "shared"
 
 

@@ -396,5 +396,5 @@ def test_pages_say_the_evidence_of_each_finding_and_the_reference_of_the_run(own
     assert call("view", run, "--reference", own / "reference", "-o", page)[0] == 0
     for found in (page, own / "report" / "index.html"):
         words = " ".join(found.read_text().split())
-        assert re.search(r"\d\d(\.\d)? dB over \d repetitions", words)
+        assert re.search(r"\d\d(\.\d)? dB over (\d )?repetitions", words)
         assert re.search(r"[Rr]eference: \S*reference, 100% by 3 repetitions of pick", words)
