@@ -463,7 +463,7 @@ def _intervals(axes: "Axes", assessment: Assessment) -> None:
         ("balanced accuracy", frames.balanced_accuracy, (0, 0, 0)),
         ("failure recall", frames.failure_recall, (0, 0, 0)),
         ("faults found", found["recall_injected"], (0, 0, 0)),
-        ("faults found, if felt", found["recall_felt"], (0, 0, 0)),
+        ("faults found, detectable", found["recall_felt"], (0, 0, 0)),
         ("found with the right class", found["class_recall"], (0, 0, 0)),
         ("ok time flagged", found["ok_flagged"], (0, 0, 0)),
     ]

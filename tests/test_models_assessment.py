@@ -303,7 +303,7 @@ def test_the_table_of_one_key_takes_the_place_of_the_others():
 
 WHOLE = """\
 5 runs in 4 groups (runs of a group share their motion) of 3 robots (a1, go2, talos) in 3 domains (field, soft, stiff)
-10 injected faults (9 felt), 0.00456 h of ok time, 0.00145 h unlabelled
+10 injected faults (9 detectable), 0.00456 h of ok time, 0.00145 h unlabelled
 NOT A TEST: 1 of these runs were trained on, or share their motion with such:
   talos/blow-000: a recording of this name
 left out, since they equal others bit for bit:
@@ -316,7 +316,7 @@ False alarms per hour of ok time      277 [33.5, 2229]          439 [53.2, 1586]
 Ok time flagged                       12.7%                     9.8%
 Alarms per hour of unlabelled time    1084 [27.5, 6042]         691 [17.5, 3850]                      1
 Faults found, of all injected         23.8%                     20.0%                     10.9%       2 of 10
-Faults found, of those felt           32.1%                     22.2%                     10.3%       2 of 9
+Faults found, of detectable           32.1%                     22.2%                     10.3%       2 of 9
 Onset right within 0.2 s, of found    50.0%                     50.0%                     31.5%       1 of 2
 Events by class, precision            12.5%                     20.0%                     2.8%        1 of 5
   recall                              16.7%                     10.0%                     3.8%        1 of 10
@@ -333,26 +333,26 @@ Runs without a verdict                16.7%                                     
 not answered: 1 run (rate 50 Hz < 80 Hz) of a1
 
 The worst 2 of robot and scenario, by injected faults found
-  go2 blow                            0.0%                      0 of 6 injected, 0 of 6 felt
-  talos blow                          33.3%                     1 of 3 injected, 1 of 2 felt
+  go2 blow                            0.0%                      0 of 6 injected, 0 of 6 detectable
+  talos blow                          33.3%                     1 of 3 injected, 1 of 2 detectable
 The worst 1 of robot and domain, by alarms per hour of ok time
   talos stiff                         800 per hour              2 in 0.0025 h
 The worst 1 of robot and domain, by alarms per hour of unlabelled time
   talos soft                          4337 per hour             1 in 0.000231 h
 
-By robot                             runs     ok h  false/h  ok flagged  unlab./h    found  felt found  F1 class    delay
+By robot                             runs     ok h  false/h  ok flagged  unlab./h    found  detectable  F1 class    delay
 a1                                    0+1        0        -           -         -        -           -         -        -
 go2                                     2 0.000944        0       17.6%         0    14.3%       14.3%      0.0%   1.45 s
 talos                                   3  0.00361      554        7.7%      2169    33.3%       50.0%     28.6%   0.47 s
 (+n: runs without a verdict)
 
-By domain                            runs     ok h  false/h  ok flagged  unlab./h    found  felt found  F1 class    delay      AUC     pAUC
+By domain                            runs     ok h  false/h  ok flagged  unlab./h    found  detectable  F1 class    delay      AUC     pAUC
 field                                 0+1        0        -           -         -        -           -         -        -        -        -
 soft                                    3  0.00206        0        8.1%       822    11.1%       12.5%      0.0%   1.45 s        -        -
 stiff                                   2   0.0025      800       11.1%         0   100.0%      100.0%     50.0%   0.47 s   100.0%   100.0%
 (+n: runs without a verdict)
 
-Missed, of the faults that are felt
+Missed, of the detectable faults
   impact in talos/blow-001, 2.03 s to 2.20 s
   impact in go2/blow-003, 0.10 s to 0.20 s
   impact in go2/blow-003, 0.60 s to 0.70 s
@@ -393,7 +393,7 @@ Brackets are 95 % confidence intervals over groups of runs.
 Measures of fewer than 5 groups have none.
 """  # noqa: E501
 BY_SCENARIO = """\
-By scenario                          runs     ok h  false/h  ok flagged  unlab./h    found  felt found  F1 class    delay
+By scenario                          runs     ok h  false/h  ok flagged  unlab./h    found  detectable  F1 class    delay
 blow                                    3   0.0025        0        0.0%       711    11.1%       12.5%     18.2%   0.47 s
 good                                    1  0.00139     1440       20.0%         -        -           -      0.0%        -
 swing                                   1 0.000667        0       25.0%         0   100.0%      100.0%      0.0%   1.45 s

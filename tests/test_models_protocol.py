@@ -468,7 +468,7 @@ def test_the_table_has_one_line_for_each_robot_domain_or_scenario():
     (table,) = (lines for lines in lines_of(found, "scenario") if lines[0].startswith("By "))
     assert [line.split()[0] for line in table[1:]] == ["blow", "good", "swing"]
     worst = next(lines for lines in lines_of(found) if lines[0].startswith("The worst"))
-    assert " ".join(worst[1].split()) == "go2 blow 0.0% 0 of 1 injected, 0 of 1 felt"
+    assert " ".join(worst[1].split()) == "go2 blow 0.0% 0 of 1 injected, 0 of 1 detectable"
 
 
 @pytest.mark.parametrize(

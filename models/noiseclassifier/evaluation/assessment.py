@@ -43,7 +43,7 @@ ROWS = (
     ("Ok time flagged", "ok_flagged", ""),
     ("Alarms per hour of unlabelled time", "alarms_in_unlabelled_per_hour", "alarms_in_unlabelled"),
     ("Faults found, of all injected", "recall_injected", "found/faults"),
-    ("Faults found, of those felt", "recall_felt", "found_felt/felt"),
+    ("Faults found, of detectable", "recall_felt", "found_felt/felt"),
     ("Onset right within 0.2 s, of found", "onset_within", "onset_close/found"),
     ("Events by class, precision", "class_precision", "matched_by_class/findings"),
     ("  recall", "class_recall", "matched_by_class/faults"),
@@ -58,7 +58,7 @@ COLUMNS = (
     ("ok flagged", "ok_flagged"),
     ("unlab./h", "alarms_in_unlabelled_per_hour"),
     ("found", "recall_injected"),
-    ("felt found", "recall_felt"),
+    ("detectable", "recall_felt"),
     ("F1 class", "class_f1"),
     ("delay", "delay"),
 )
@@ -286,7 +286,7 @@ def _head(assessment: Assessment) -> list[str]:
         f"{_many(assessment.runs, 'run')} in {_many(assessment.groups, 'group')} (runs of a group"
         f" share their motion) of {_named(by['robot'], 'robot')} in"
         f" {_named(by['domain'], 'domain')}",
-        f"{_many(int(counts['faults']), 'injected fault')} ({counts['felt']:.0f} felt),"
+        f"{_many(int(counts['faults']), 'injected fault')} ({counts['felt']:.0f} detectable),"
         f" {counts['ok_hours']:.3g} h of ok time, {counts['unlabelled_hours']:.3g} h unlabelled",
     ]
     if assessment.seen:
@@ -355,7 +355,7 @@ def _worst(protocol: Protocol) -> list[str]:
             counts = cases[key].counts
             found = (
                 f"{counts['found']:.0f} of {counts['faults']:.0f} injected,"
-                f" {counts['found_felt']:.0f} of {counts['felt']:.0f} felt"
+                f" {counts['found_felt']:.0f} of {counts['felt']:.0f} detectable"
             )
             share = _share(cases[key].measures["recall_injected"])
             lines.append(_line("  " + _short(" ".join(key)), [share], [found]))
@@ -409,7 +409,7 @@ def _order(part: Part) -> float:
 def _errors(protocol: Protocol) -> list[str]:
     lines = []
     for title, errors in (
-        ("Missed, of the faults that are felt", [e for e in protocol.missed() if e["felt"]]),
+        ("Missed, of the detectable faults", [e for e in protocol.missed() if e["felt"]]),
         ("False alarms", protocol.alarms(FALSE)),
     ):
         if errors:
