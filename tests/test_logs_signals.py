@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from csvlogs import TIME, log, write
@@ -113,3 +116,15 @@ def test_numbered_columns_get_the_robots_joints_in_order(tmp_path):
     path = write(tmp_path / "log.csv", {"timestamp": TIME, "actual_qd_6": TIME})
     with pytest.raises(LogError, match=r"'actual_qd_6' has number 6, the robot's joints are 0 to"):
         read_log(path, robot="ur5")
+
+
+HANGS = """
+from inspector.logs.names import Naming
+for word in ("r", "rr", "l_", "1", "shoulder", "1shoulder", "joint", "q", "_", "[(", "error"):
+    for end in ("", "!", "1x"):
+        Naming.of([(word * 300)[:297] + end, "wrist"])
+"""
+
+
+def test_names_that_can_be_read_in_many_ways_do_not_hold_up_the_reader():
+    subprocess.run([sys.executable, "-c", HANGS], check=True, timeout=60)

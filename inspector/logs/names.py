@@ -155,12 +155,15 @@ PARTS = (
     r"|haa|hfe|kfe|abad|gripper|finger|thumb"
 )
 BARE = re.compile(
-    rf"(?:(?:{LIMBS}){GAP}?)*(?:(?:{JOINT_WORD}|servo|j|(?-i:A))[ _]?\d+|(?<=[a-z][ _.-])\d+)"
+    rf"(?:(?:{LIMBS}){GAP}?){{0,4}}(?:(?:{JOINT_WORD}|servo|j|(?-i:A))[ _]?\d+|(?<=[a-z][ _.-])\d+)"
     rf"|(?=.*(?:{PARTS}))(?:(?:{LIMBS}|{PARTS}|{JOINT_WORD}|lift|pan|tilt|flex|rotate|rotation"
-    rf"|roll|pitch|yaw|[xyz]|\d+)(?:{GAP}|(?=\d)|$))+",
+    rf"|roll|pitch|yaw|[xyz]|\d+(?!\d))(?:{GAP}|(?=\d)|$))+",
     re.IGNORECASE,
 )
-"""Names of joints without a quantity: ``Joint1``, ``FL_0``, ``shoulder_lift``, ``wrist_1``."""
+"""Names of joints without a quantity: ``Joint1``, ``FL_0``, ``shoulder_lift``, ``wrist_1``.
+
+What repeats has one reading or a bound: ``rrrr`` is `r` four times or `rr` twice.
+"""
 SIDED = re.compile(
     rf"(?:(?P<before>{DESIRED}|{MEASURED}){GAP})?(?P<joint>.+?)"
     rf"(?:{GAP}(?P<after>{DESIRED}|{MEASURED}))?",
