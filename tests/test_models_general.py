@@ -16,7 +16,6 @@ from noiseclassifier.framefeatures import frame_features
 from noiseclassifier.general import LEARNT
 from noiseclassifier.logbands import HIGHEST, INPUTS, LOWEST
 from noiseclassifier.pooling import columns
-from noiseclassifier.reference import Reference
 from noiseclassifier.signals import JOINTS, MOTION, NOISE
 
 GIVEN = {
@@ -162,24 +161,6 @@ def test_a_general_model_is_nearer_than_one_of_a_lower_rate_and_yields_to_more_s
     assert (name, chosen.profile.signals) == ("general", ("measured",))
     with pytest.raises(nc.RateError, match="logged at 50 Hz, the model needs 80 Hz or more"):
         nc.nearest(library, 50.0)
-
-
-def test_a_reference_of_good_motion_takes_the_place_of_the_run_itself():
-    names, rate = (*MOTION, *JOINTS), 500.0
-    model = trained()
-    _, good = frame_features(signals(rate, "ok", seed=20), model.at(rate, names).profile)
-    reference = Reference.of(good[:, : good.shape[1] // 2])
-    bound = model.at(rate, names, reference=reference)
-    shaken = signals(rate, "oscillations", seed=21)
-    starts, features = frame_features(shaken, bound.profile, None, reference)
-    half = features.shape[1] // 2
-    np.testing.assert_array_equal(features[:, half:], reference.relative(features[:, :half]))
-    whole = bound.classify(shaken, rate)
-    np.testing.assert_array_equal(
-        whole.scores, bound.labels(bound.decide(features), starts, rate, start=0.0).scores
-    )
-    for name, each in streamed(bound, shaken, (13, 700, 701)).items():
-        np.testing.assert_array_equal(each, getattr(whole, name), err_msg=name)
 
 
 # --- training

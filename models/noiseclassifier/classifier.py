@@ -17,7 +17,7 @@ from noiseclassifier.features import features, standard
 from noiseclassifier.framefeatures import frames_of
 from noiseclassifier.labels import UNKNOWN, Labels
 from noiseclassifier.profile import NOMINAL, Profile
-from noiseclassifier.reference import Reference, Rest, reference_of
+from noiseclassifier.reference import Rest
 from noiseclassifier.signals import Signals, feeds
 from noiseclassifier.types import Array, Index, Mask, Real, Words
 
@@ -36,8 +36,6 @@ class Classifier:
         metrics: Measures of the training set, and of a validation set if one was given.
         versions: Of the software that trained it.
         sha256: SHA-256 of the file that it was loaded from; empty if it was not.
-        reference: What features are relative to, in a profile with a reference; the signal itself
-            unless there is one.
     """
 
     profile: Profile
@@ -49,7 +47,6 @@ class Classifier:
     metrics: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     sha256: str = ""
-    reference: Reference | None = None
 
     @classmethod
     def train(
@@ -220,7 +217,7 @@ class Classifier:
         starts: list[Index] = []
         decisions: list[Array] = []
         waiting = np.empty((0, len(self.mean)))
-        rest = Rest() if whole and self.profile.reference and self.reference is None else None
+        rest = Rest() if whole and self.profile.reference else None
 
         def decide(plain: Array) -> None:
             decisions.append(self.decide(plain))
@@ -228,7 +225,7 @@ class Classifier:
                 own = plain[:, : plain.shape[1] // 2]  # the other half is relative to the past
                 rest.add(own, self._choose(decisions[-1]) != "ok")
 
-        for first, plain in frames_of(pieces, self.profile, self.reference):
+        for first, plain in frames_of(pieces, self.profile):
             starts.append(first)
             waiting = np.concatenate((waiting, plain)) if len(waiting) else plain
             # The rounding of a decision depends on how many frames are decided at once.
@@ -315,8 +312,6 @@ class Classifier:
             "versions": dict(self.versions),
         }
         arrays = {**self.estimator.arrays(), "mean": self.mean, "scale": self.scale}
-        if self.reference is not None:
-            arrays |= {"location": self.reference.location, "spread": self.reference.spread}
         modelfile.write(path, manifest, arrays, overwrite=overwrite)
 
     @classmethod
@@ -345,7 +340,6 @@ class Classifier:
             ESTIMATORS[profile.estimator].of(arrays, profile),
             arrays["mean"],
             arrays["scale"],
-            reference=reference_of(arrays),
             runs=manifest["runs"],
             metrics=manifest["metrics"],
             versions=manifest["versions"],

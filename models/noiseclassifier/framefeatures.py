@@ -8,7 +8,7 @@ import numpy as np
 from noiseclassifier.errors import SignalError
 from noiseclassifier.features import feature_count, rounded, temporal_pooling
 from noiseclassifier.profile import Profile
-from noiseclassifier.reference import Reference, RunningReference
+from noiseclassifier.reference import RunningReference
 from noiseclassifier.signals import Signals, check, stacked
 from noiseclassifier.types import Array, Index, Mask, Real
 from noiseclassifier.windows import Windows
@@ -21,12 +21,7 @@ Frames: TypeAlias = tuple[Index, Array]
 (frames, features)."""
 
 
-def frame_features(
-    signal: Signals,
-    profile: Profile,
-    valid: Mask | None = None,
-    reference: Reference | None = None,
-) -> Frames:
+def frame_features(signal: Signals, profile: Profile, valid: Mask | None = None) -> Frames:
     """Features of all frames of a whole signal.
 
     Args:
@@ -34,14 +29,10 @@ def frame_features(
         profile: How it is framed, and what to compute.
         valid: False in gaps, shape (samples,); frames that touch a gap are left out.
     """
-    return _joined([*frames_of([(signal, valid)], profile, reference)])
+    return _joined([*frames_of([(signal, valid)], profile)])
 
 
-def frames_of(
-    pieces: Iterable[tuple[Signals, Mask | None]],
-    profile: Profile,
-    reference: Reference | None = None,
-) -> Iterator[Frames]:
+def frames_of(pieces: Iterable[tuple[Signals, Mask | None]], profile: Profile) -> Iterator[Frames]:
     """Features of all frames of a signal that comes in pieces, the same as of the whole one.
 
     Args:
@@ -53,7 +44,7 @@ def frames_of(
     for signal, valid in pieces:
         samples = stacked(signal, profile.signals)
         if frames is None:
-            frames = FrameFeatures(profile, len(samples) if samples.ndim > 1 else 1, reference)
+            frames = FrameFeatures(profile, len(samples) if samples.ndim > 1 else 1)
         yield frames.push(samples, None if valid is None else np.asarray(valid, bool))
     assert frames is not None
     least = profile.drop_first_sample + profile.length
@@ -73,12 +64,10 @@ class FrameFeatures:
     Args:
         profile: How the signal is framed, and what to compute.
         rows: Number of norms, and of joints of all signals that go joint by joint.
-        reference: What features are relative to, in a profile with a reference; the signal itself
-            as far as it has come, unless given.
     """
 
-    def __init__(self, profile: Profile, rows: int, reference: Reference | None = None) -> None:
-        self._profile, self._reference = profile, reference
+    def __init__(self, profile: Profile, rows: int) -> None:
+        self._profile = profile
         # Room for a frame, and for as much as is taken at once.
         self._at_once = AT_ONCE * profile.length
         self._samples = np.zeros((rows, profile.length + self._at_once))
@@ -143,7 +132,7 @@ class FrameFeatures:
         self._held = 0  # samples in the buffer
         self._first = int(self._profile.drop_first_sample)
         self._frame = self._first  # start of the next frame
-        self._relative = self._reference or RunningReference()
+        self._relative = RunningReference()
         for windows in self._windows:
             windows.begin()
         self._due = self._next_due(0)  # count with which there is work to do
@@ -193,7 +182,7 @@ class FrameFeatures:
         return [(whole, self._features(energies))]
 
     def _features(self, energies: list[Array]) -> Array:
-        """Features of frames, in order, as they are, and relative to the reference."""
+        """Features of frames, in order, as they are, and relative to those so far."""
         features = temporal_pooling(energies, self._profile)
         if not self._profile.reference:
             return features

@@ -27,14 +27,13 @@ from noiseclassifier.logbands import HIGHEST, INPUTS, LOWEST, LogBands
 from noiseclassifier.pooling import RELATIVE
 from noiseclassifier.profile import TOLERANCE
 from noiseclassifier.recording import Recording, group_of
-from noiseclassifier.reference import Reference
 from noiseclassifier.signals import NOISE, feeds, named
 from noiseclassifier.types import Array, Index, Real, Words
 
 LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
 """Of the inputs, those that training takes of each log: the others lack features of the first."""
 UNBOUNDED = 1e9
-"""Highest value of features relative to a reference: they say nothing of novelty."""
+"""Highest value of features relative to the run: they say nothing of novelty."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,19 +137,12 @@ class General:
         names = np.array((*self.classes, UNKNOWN))
         return Evaluation.of(frames.labels, names[self.estimator.choose(decisions)], self.classes)
 
-    def at(
-        self,
-        rate: float,
-        signals: Collection[str] = (NOISE,),
-        *,
-        reference: Reference | None = None,
-    ) -> Classifier:
+    def at(self, rate: float, signals: Collection[str] = (NOISE,)) -> Classifier:
         """Bind the model to a rate and to the signals of a log.
 
         Args:
             rate: Sample rate, in [Hz]; above ``HIGHEST``, the log has to be decimated to that.
             signals: Names of the signals that there are.
-            reference: What features are relative to; by default, the signal itself.
 
         Returns:
             A classifier of that rate, which takes as many of the signals as it can.
@@ -176,7 +168,6 @@ class General:
             metrics=self.metrics,
             versions=self.versions,
             sha256=self.sha256,
-            reference=reference,
         )
 
     @classmethod

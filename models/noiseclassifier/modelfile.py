@@ -3,8 +3,8 @@
 Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the estimator, as
 its ``DIMENSIONS`` list them. Nothing in it is ever unpickled; sizes are checked before an array is
 made. The same model is the same bytes. Of a general model, ``recipe`` is in the manifest, and the
-profile is that of its highest rate. A model with a reference of its own has ``location`` and
-``spread``, too. Versions 4 and 5 are read too: they know no missing features and no reference.
+profile is that of its highest rate. Versions 4 and 5 are read too: they know no missing features
+and no reference.
 """
 
 import hashlib
@@ -40,13 +40,13 @@ LARGEST = 512 * 1024**2
 
 ACCEPT = "that is replaced; accept these runs (`inspector accept`), and classify without this model"
 """What becomes of models that earlier versions learnt from good runs alone."""
-_REFERENCE = {"location": 1, "spread": 1}
+_ADAPTED = {"location": 1, "spread": 1}
 
 _KINDS = [
     {"manifest": 0, "mean": 1, "scale": 1, **estimator.DIMENSIONS}
     for estimator in ESTIMATORS.values()
 ]
-_KINDS += [{**kind, **_REFERENCE} for kind in _KINDS] + [
+_KINDS += [{**kind, **_ADAPTED} for kind in _KINDS] + [
     {name: count for name, count in kind.items() if name != "missing"}
     for kind in _KINDS
     if "missing" in kind

@@ -2,16 +2,13 @@
 
 How loud good motion is differs from robot to robot by orders of magnitude. Relative to a reference,
 it differs far less: each feature less its location there, divided by its spread. The reference is
-good motion of the robot, or else the signal itself as far as it has come. A failure that fills a
-whole signal is invisible relative to the signal itself; therefore the features as they are stay
-beside.
+the signal itself as far as it has come; of a whole signal, also the rest of it. A failure that
+fills a whole signal is invisible relative to the signal itself; therefore the features as they are
+stay beside.
 
 Conventions: spreads are those of a normal distribution, 1.48 times a median absolute deviation
 (P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5.1).
 """
-
-from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,29 +27,6 @@ FIRST = 0.3
 FIRST_FRAMES = 10
 BOUND = 1.5
 """Spreads by which a frame moves a running location at most, times its share."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """Location and spread of the features of good motion.
-
-    Attributes:
-        location: Median of each feature, shape (features,).
-        spread: 1.48 times the median absolute deviation, shape (features,).
-    """
-
-    location: Array
-    spread: Array
-
-    @classmethod
-    def of(cls, good: Array) -> "Reference":
-        """Reference of the features of good frames, shape (frames, features), one or more."""
-        location = np.median(good, axis=0)
-        return cls(location, NORMAL * np.median(np.abs(good - location), axis=0))
-
-    def relative(self, features: Array) -> Array:
-        """Features relative to the reference, bounded, shape (frames, features)."""
-        return _relative(features, self.location, self.spread)
 
 
 class RunningReference:
@@ -137,17 +111,13 @@ class Rest:
         own = flagged[self._place]
         if self._features is None or not own.any() or np.count_nonzero(~own) < FEWEST:
             return None
-        reference = Reference.of(self._features[~own])
-        features = self._features[own]
-        both = np.concatenate((features, reference.relative(features)), axis=1)
+        others, features = self._features[~own], self._features[own]
+        location = np.median(others, axis=0)
+        spread = NORMAL * np.median(np.abs(others - location), axis=0)
+        both = np.concatenate((features, _relative(features, location, spread)), axis=1)
         return self._place[own], both
 
 
 def _relative(features: Array, location: Array, spread: Array) -> Array:
     found = (features - location) / (spread + LEAST)
     return np.maximum(np.minimum(found, MOST, out=found), -MOST, out=found)
-
-
-def reference_of(arrays: Mapping[str, Array]) -> Reference | None:
-    """The reference among the arrays of a model file, None if there is none."""
-    return Reference(arrays["location"], arrays["spread"]) if "spread" in arrays else None

@@ -48,7 +48,7 @@ class Stream:
             )
         profile = classifier.profile
         rows = profile.norms + (len(profile.signals) - profile.norms) * joints
-        self._frames = FrameFeatures(profile, rows, classifier.reference)
+        self._frames = FrameFeatures(profile, rows)
         nothing = np.empty((0, classifier.estimator.width))
         self._nothing = classifier.labels(nothing, np.empty(0, np.intp), self.rate, start=start)
 
