@@ -608,8 +608,8 @@ def noise_level(run: Run, estimate: Estimate) -> NoiseLevel:
     if not np.isfinite(pressure).all():
         sample = int(np.argmin(np.isfinite(pressure)))
         raise InspectorError(
-            f"the {estimate.kind} noise is {pressure[sample]:g} at {run.time[sample]:.6g} s: the"
-            " run's motion or the size of the robot is no robot's"
+            f"the {estimate.kind} noise is {pressure[sample]:g} at {run.time[sample]:.6g} s:"
+            " no robot moves so fast, or is so large"
         )
     energy = estimate.power[run.mask].sum(axis=0)
     shares = energy / (energy.sum() or 1.0)

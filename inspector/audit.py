@@ -323,14 +323,13 @@ def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
     if reach.floor_from is not None:
         unit = "rad" if reach.differentiator else "rad/s"
         yield (
-            f"above {plain(reach.floor_from)} Hz the spectrum is at the quantisation floor"
-            f" (step {reach.step:.2g} {unit}), which masks oscillations up to"
-            f" {reach.floor_amplitude:.2g} rad/s"
+            f"above {plain(reach.floor_from)} Hz the quantisation (step {reach.step:.2g} {unit})"
+            f" masks oscillations up to {reach.floor_amplitude:.2g} rad/s"
         )
     elif reach.quiet_from is not None:
         yield (
-            f"above {plain(reach.quiet_from)} Hz the level is below any encoder's noise: filtered,"
-            " or simulated without sensor noise"
+            f"above {plain(reach.quiet_from)} Hz the level is below any encoder's noise: filtered"
+            " or simulated"
         )
 
 

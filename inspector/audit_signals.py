@@ -618,8 +618,8 @@ def _coarse(run: Run) -> str:
     if noise <= FAINTEST:
         return ""
     return (
-        f"the desired velocity has {noise:.2g} rad/s of noise, since it was differentiated from"
-        f" positions in steps of {step:.2g} rad"
+        f"the desired velocity, differentiated from positions in steps of {step:.2g} rad, has"
+        f" {noise:.2g} rad/s of noise"
     )
 
 

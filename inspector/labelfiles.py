@@ -79,8 +79,8 @@ def read_labels(path: Path, run: Run, *, format_name: str = "") -> tuple[Block, 
     for (before, after), where in zip(pairwise(blocks), places[1:], strict=False):
         if after.start < before.stop - step:
             raise InspectorError(
-                f"{where}: {after.label!r} starts at {after.start:g} s, before {before.label!r}"
-                f" stops at {before.stop:g} s; the blocks of a run do not overlap"
+                f"{where}: blocks overlap: {after.label!r} starts at {after.start:g} s, before"
+                f" {before.label!r} stops at {before.stop:g} s"
             )
     return tuple(sorted(blocks))
 

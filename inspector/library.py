@@ -200,8 +200,8 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
         raise CannotTellError(str(error)) from error
     if not _close(rate, classifier.rate):
         raise CannotTellError(
-            f"a noise of {rate:g} Hz cannot be decimated to the {classifier.rate:g} Hz of"
-            f" model {name} without joint velocities"
+            f"without joint velocities, {rate:g} Hz cannot be decimated to the"
+            f" {classifier.rate:g} Hz of model {name}"
         )
     labels = classifier.classify(noise, rate, start=float(time[0]))
     return _counted(Labelled(labels, name, alarm=_alarm(classifier, labels)))

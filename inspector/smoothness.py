@@ -564,10 +564,7 @@ def _notes(ranking: Ranking) -> Iterator[str]:
         yield remark if count == len(episodes) else f"{count} of {len(episodes)}: {remark}"
     rates = sorted({episode.rate for episode in episodes})
     if len(rates) > 1:
-        yield (
-            f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only;"
-            " they count all up to half of it."
-        )
+        yield (f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only.")
     yield f"SPARC: cut-off {CUTOFF:g} Hz. SPARC and LDLJ: higher is smoother; others: lower."
     yield from _roughest(ranking)
 

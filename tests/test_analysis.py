@@ -284,8 +284,8 @@ def test_a_desired_velocity_made_of_coarse_positions_is_left_out():
     run, remark = without_placeholder(stepping(0.01))
     assert run.velocity_desired is None
     assert remark == (
-        "The desired velocity has 1.5 rad/s of noise, since it was differentiated from positions in"
-        " steps of 0.01 rad: it was left out."
+        "The desired velocity, differentiated from positions in steps of 0.01 rad, has 1.5 rad/s of"
+        " noise: it was left out."
     )
     assert without_placeholder(stepping(1e-4))[1] == ""
 
@@ -529,9 +529,7 @@ def test_noise_that_is_not_finite_names_its_time():
 
     power = np.ones((10, 1))
     power[4:6] = np.inf
-    text = (
-        "the paper noise is inf at 2.004 s: the run's motion or the size of the robot is no robot's"
-    )
+    text = "the paper noise is inf at 2.004 s: no robot moves so fast, or is so large"
     with pytest.raises(InspectorError, match=f"^{text}$"):
         noise_level(still_and_fast(), Estimate("paper", "√W", power, ("a",)))
     gap = still_and_fast(valid=~np.isin(np.arange(10), [4, 5]))

@@ -72,13 +72,9 @@ def test_a_faster_run_is_decimated_and_a_slower_one_is_not_classified():
 
 def test_a_scalar_noise_cannot_be_decimated():
     time = np.arange(20_000) / 5000.0
-    with pytest.raises(
-        CannotTellError, match="5000 Hz cannot be decimated to the 1000 Hz of model"
-    ):
+    with pytest.raises(CannotTellError, match="5000 Hz cannot be decimated to the 1000 Hz of"):
         label_noise(time, np.ones(20_000), FIXED)
-    with pytest.raises(
-        CannotTellError, match="20000 Hz cannot be decimated to the 10000 Hz of model"
-    ):
+    with pytest.raises(CannotTellError, match="20000 Hz cannot be decimated to the 10000 Hz of"):
         label_noise(time / 4.0, np.ones(20_000), LIBRARY)
 
 

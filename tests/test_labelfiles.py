@@ -139,14 +139,22 @@ def reading(tmp_path, name, content):
         ("l.txt", "3\t4\ta\tb\n", r"line 1: 'a\\tb' is not a label; .* cannot be printed"),
         ("l.txt", "3\t12\tok\n", "line 1: 'ok' from 3 s to 12 s lies outside of the run"),
         ("l.txt", "-1\t2\tok\n", "line 1: 'ok' from -1 s to 2 s lies outside of the run"),
-        ("l.txt", "3\t5\tb\n1\t4\ta\n", "line 1: 'b' starts at 3 s, before 'a' stops at 4 s"),
+        (
+            "l.txt",
+            "3\t5\tb\n1\t4\ta\n",
+            "line 1: blocks overlap: 'b' starts at 3 s, before 'a' stops at 4 s",
+        ),
         ("l.txt", b"\xff\xfe\x00", "not text in UTF-8"),
         ("l.csv", "", "line 1: there is no column 'start'; expected start, stop, label"),
         ("l.csv", "start,end,label\n", "line 1: there is no column 'stop'"),
         ("l.csv", "start,stop,label\n1,2\n", "line 2: 2 cells where the header names 3 columns"),
         ("l.csv", 'start,stop,label\n1,2,"a\nb"\n', "line 3: .* cannot be printed"),
         ("l.csv", 'start,stop,label\n1,2,"a\n', "line 2: not CSV"),
-        ("l.csv", "start,stop,label\n1,2,a\n1.5,3,b\n", "line 3: 'b' starts at 1.5 s, before 'a'"),
+        (
+            "l.csv",
+            "start,stop,label\n1,2,a\n1.5,3,b\n",
+            "line 3: blocks overlap: 'b' starts at 1.5 s, before 'a'",
+        ),
         ("l.toml", "[data\n", r"not TOML \(.*line 1"),
         ("l.toml", "", "lacks the lists chunk_ranges and chunk_labels"),
         ("l.toml", "data = 3\n", "lacks the lists"),
@@ -174,7 +182,7 @@ def reading(tmp_path, name, content):
         (
             "l.toml",
             '[data]\nchunk_ranges = [[0, 5], [4, -1]]\nchunk_labels = ["ok", "impact"]\n',
-            "chunk 2: 'impact' starts at 4 s, before 'ok' stops at 5 s",
+            "chunk 2: blocks overlap: 'impact' starts at 4 s, before 'ok' stops at 5 s",
         ),
     ],
 )

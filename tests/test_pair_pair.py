@@ -287,9 +287,7 @@ def test_the_faster_run_is_decimated_and_both_have_one_level(tmp_path):
     assert pair.rate == 1000.0
     assert whole(pair).change == pytest.approx(0.0, abs=0.1)
     (remark,) = [r for r in pair.remarks if "decimated" in r]
-    assert remark.startswith(
-        "The run before has 4000 Hz: decimated to the 1000 Hz of the other one"
-    )
+    assert remark.startswith("The run before is decimated from 4000 Hz to the 1000 Hz of the other")
 
 
 def test_a_decimated_run_keeps_the_positions_of_its_links(tmp_path):

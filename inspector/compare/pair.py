@@ -46,8 +46,8 @@ def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
     for which, run in (("before", before), ("after", after)):
         if run.rate > rate * (1 + SAME_RATE):
             remarks.append(
-                f"The run {which} has {run.rate:g} Hz: decimated to the {rate:g} Hz of the other"
-                f" one, nothing above {rate / 2:g} Hz is left, and its efforts are left out."
+                f"The run {which} is decimated from {run.rate:g} Hz to the {rate:g} Hz of the"
+                " other, without its efforts."
             )
     before, after = (_at_rate(run, rate) for run in (before, after))
     return before, after, tuple(remarks)
@@ -114,10 +114,7 @@ class PairError(InspectorError):
 
 
 SIDES = ("before", "after")
-TIMED = (
-    "Findings at the same time are matched; `inspector diff` matches those of different motions by"
-    " their class, at any time."
-)
+TIMED = "Findings at the same time are matched; for runs of other motions, use `inspector diff`."
 
 
 @dataclass(frozen=True, eq=False)
