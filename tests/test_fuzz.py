@@ -1,5 +1,6 @@
 """Laws of every reader: any bytes give a result or one typed error of one line."""
 
+import os
 import re
 import subprocess
 import sys
@@ -64,7 +65,7 @@ def test_any_bytes_give_a_result_or_one_error(name, whole):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
 def test_many_bytes_give_a_result_or_one_error(name, whole):
-    laws(name, whole, examples=150)
+    laws(name, whole, examples=60)
 
 
 def test_damage_is_of_every_kind_and_reproducible():
@@ -118,21 +119,18 @@ def test_commands_handle_malformed_files(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-GROUPS = ("labels", "settings", "rows", "tables", "arrays", "models", "bags", "robots")
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("atheris") is None, reason="needs atheris (the extra `fuzz`)")
-@pytest.mark.parametrize("group", GROUPS)
-def test_fuzzing_finds_nothing(tmp_path, group):
+def test_fuzzing_finds_nothing():
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.fuzz.run", "--group", group, "--seconds", "5"],
+        [sys.executable, "-m", "benchmarks.fuzz.run", "--executions", "2000"],
         cwd=ROOT,
+        env={**os.environ, "PYTHONHASHSEED": "0"},
         capture_output=True,
         check=False,
         text=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr[-2000:]
-    counts = re.findall(r"^(.+): (\d+) executions$", done.stdout, re.M)
-    assert counts
-    assert sum(int(count) for _, count in counts) > 100
+    counts = dict(re.findall(r"^(.+): (\d+) executions$", done.stdout, re.M))
+    assert set(counts) == set(READERS)
+    assert sum(map(int, counts.values())) == 2000

@@ -1,10 +1,12 @@
 """Fuzz the readers with atheris, which needs the extra `fuzz`.
 
     python -m benchmarks.fuzz.run "live rows, JSON" "reference.toml" --seconds 15
-    python -m benchmarks.fuzz.run --group text --seconds 600 --found found/
+    python -m benchmarks.fuzz.run --group labels --seconds 600 --found found/
+    python -m benchmarks.fuzz.run --executions 2000  # all readers
 
 The corpus begins with a whole file of each reader and with damaged ones. An error that is not
 expected is kept by its place, and fuzzing goes on; the exit status is 1 if there is one.
+`--executions` instead of `--seconds` gives the same inputs on any machine (PYTHONHASHSEED=0).
 """
 
 import argparse
@@ -50,27 +52,26 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("readers", nargs="*", metavar="READER", help=", ".join(READERS))
     parser.add_argument("--group", choices=GROUPS)
-    parser.add_argument("--seconds", type=int, default=15)
+    end = parser.add_mutually_exclusive_group()
+    end.add_argument("--seconds", type=int, default=15)
+    end.add_argument("--executions", type=int, help="end after so many, however long they take")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--found", type=Path, help="folder for inputs that raise what is not expected"
     )
     options = parser.parse_args()
-    names = tuple(options.readers) + GROUPS.get(options.group, ())
-    if not names or set(names) - set(READERS):
+    names = tuple(options.readers) + GROUPS.get(options.group, ()) or tuple(READERS)
+    if set(names) - set(READERS):
         parser.error(f"name some of {', '.join(READERS)}, or a --group")
     with tempfile.TemporaryDirectory(
         dir="/dev/shm" if Path("/dev/shm").is_dir() else None
     ) as folder:
-        fuzz(names, Path(folder), options.seconds, options.seed, options.found)
+        fuzz(names, Path(folder), options)
 
 
-def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: Path | None) -> None:
-    """Fuzz some readers; ends the process.
-
-    Args:
-        seconds: How long, in [s].
-    """
+def fuzz(names: tuple[str, ...], folder: Path, options: argparse.Namespace) -> None:
+    """Fuzz some readers; ends the process."""
+    found = options.found
     corpus, paths = folder / "corpus", []
     corpus.mkdir()
     if found:
@@ -88,11 +89,24 @@ def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: P
             data = damaged(whole, READERS[name].kind, Random(f"{name} {number}"))
             if len(data) < LONGEST:
                 (corpus / f"{place}-{number}").write_bytes(bytes((place,)) + data)
-    one = target(names, paths, time.monotonic() + seconds, found, folder)
+    until = time.monotonic() + options.seconds
+
+    def ended(executions: int) -> bool:
+        if options.executions is None:
+            return time.monotonic() > until
+        return executions >= options.executions
+
+    one = target(names, paths, ended, found, folder)
     atheris.Setup(
         [
-            *("fuzz", str(corpus), f"-seed={seed}", "-verbosity=0", "-rss_limit_mb=2048"),
-            *("-timeout=20", f"-max_len={LONGEST}", "-len_control=0", "-print_final_stats=0"),
+            *("fuzz", str(corpus), f"-seed={options.seed}", "-verbosity=0", "-rss_limit_mb=2048"),
+            *(
+                "-timeout=60",
+                "-reload=0",
+                f"-max_len={LONGEST}",
+                "-len_control=0",
+                "-print_final_stats=0",
+            ),
             f"-artifact_prefix={found or folder}/",
         ],
         one,
@@ -101,13 +115,17 @@ def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: P
 
 
 def target(
-    names: tuple[str, ...], paths: list[Path], until: float, found: Path | None, folder: Path
+    names: tuple[str, ...],
+    paths: list[Path],
+    ended: Callable[[int], bool],
+    found: Path | None,
+    folder: Path,
 ) -> Callable[[bytes], None]:
     """A function that gives an input to one of the readers, and notes what it raises."""
     counts, places = Counter[str](), dict[str, str]()
 
     def one(data: bytes) -> None:
-        if time.monotonic() > until:
+        if ended(counts.total()):
             for name in names:
                 print(f"{name}: {counts[name]} executions")
             for where, text in places.items():
