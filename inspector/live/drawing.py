@@ -2,18 +2,19 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, TypeAlias
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 from rerun.blueprint import Blueprint
 
 from inspector import colors
 from inspector.levels import SPECTRUM
 from inspector.live.robot import KEY
 from inspector.recording import axes, unstable
-from inspector.recording.axes import TIMELINE, Label, Panel, at, log_events, scalars, style_lines
+from inspector.recording.axes import TIMELINE, Label, Panel, log_events, scalars, style_lines
 from inspector.recording.camera import Camera
 from inspector.recording.panels import (
     BANDS,
@@ -34,14 +35,8 @@ from noiseclassifier.labels import interval
 from noisemodel.noise import decibel
 from noisemodel.types import Array, Mask
 
-
-class Change(NamedTuple):
-    """A class that begins, or lasts."""
-
-    time: float
-    """When, in [s]."""
-    state: str
-    """The class; empty where nothing is known."""
+Change: TypeAlias = tuple[float, str]
+"""When a class begins, in [s], or until when it lasts so far; it is empty where none is known."""
 
 
 class Lane:
@@ -64,9 +59,9 @@ class Lane:
             if begin > self._end + self._hop / 2:
                 changes += self.end()
             if label != self._state:
-                changes.append(Change(begin, label))
+                changes.append((begin, label))
             self._state, self._end = label, begin + self._hop
-        return [*changes, Change(self._end, self._state)] if len(labels) else changes
+        return [*changes, (self._end, self._state)] if len(labels) else changes
 
     def expire(self, now: float) -> list[Change]:
         """End the lane if its next frame is overdue.
@@ -78,22 +73,9 @@ class Lane:
 
     def end(self) -> list[Change]:
         """End what the lane shows."""
-        changes = [Change(self._end, "")] if self._state else []
+        changes = [(self._end, "")] if self._state else []
         self._state = ""
         return changes
-
-
-COLUMNS_AT_ONCE = 4
-"""Columns that are handed out at once, every tenth of a second."""
-
-
-class Columns(NamedTuple):
-    """Columns of a spectrogram."""
-
-    time: Array
-    """Centres of the windows, shape (columns,), in [s]."""
-    level: Array
-    """From 0 to 1, shape (bands, columns)."""
 
 
 class SpectrogramStream:
@@ -119,47 +101,36 @@ class SpectrogramStream:
         self._samples = np.empty((0, 0))
         self._valid = np.empty(0, dtype=bool)
         self._gap = False
-        self._waiting: list[Columns] = []
 
-    def push(self, velocity: Array, valid: Mask, end: float) -> Columns | None:
+    def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
         """Take samples.
 
         Args:
             velocity: Shape (samples, joints), in [rad/s] or [m/s].
             valid: False in gaps, shape (samples,); windows that touch one are dark.
             end: Time after the last sample, in [s].
+
+        Returns:
+            Centres of the windows that are complete now, shape (columns,), in [s], and levels from
+            0 to 1, shape (columns, bands).
         """
         samples = np.concatenate((self._samples.reshape(-1, velocity.shape[1]), velocity))
         valid = np.concatenate((self._valid, valid))
         count = max(0, (len(samples) - self._length) // self._hop + 1)
-        used = count * self._hop
-        if count:
-            if self._gap:
-                before = end - (len(samples) - self._length / 2 + self._hop) / self._rate
-                dark = np.zeros((len(self.centres), 1))
-                self._waiting.append(Columns(np.array([before]), dark))
-                self._gap = False
-            starts = self._hop * np.arange(count)
-            times = np.asarray(end - (len(samples) - starts - self._length / 2) / self._rate)
-            self._waiting.append(Columns(times, self._levels(samples, valid, count)))
-        self._samples, self._valid = samples[used:], valid[used:]
-        if sum(len(columns.time) for columns in self._waiting) < COLUMNS_AT_ONCE:
-            return None
-        return self.flush()
+        self._samples, self._valid = samples[count * self._hop :], valid[count * self._hop :]
+        if not count:
+            return np.empty(0), np.empty((0, BANDS))
+        starts = self._hop * np.arange(-1 if self._gap else 0, count)  # a dark one ends a gap
+        time = np.asarray(end - (len(samples) - starts - self._length / 2) / self._rate)
+        level = np.zeros((len(starts), BANDS))
+        level[-count:] = self._levels(samples, valid, count)
+        self._gap = False
+        return time, level
 
     def skip(self) -> None:
         """Begin anew after a gap, and leave it dark."""
         self._samples, self._valid = self._samples[:0], self._valid[:0]
         self._gap = True
-
-    def flush(self) -> Columns | None:
-        """Hand out what waits."""
-        if not self._waiting:
-            return None
-        time = np.concatenate([columns.time for columns in self._waiting])
-        level = np.concatenate([columns.level for columns in self._waiting], axis=1)
-        self._waiting = []
-        return Columns(time, level)
 
     def _levels(self, samples: Array, valid: Mask, count: int) -> Array:
         view = np.lib.stride_tricks.sliding_window_view
@@ -172,7 +143,7 @@ class SpectrogramStream:
         every = amplitudes(level_windows).reshape(count, windows.shape[1], -1)
         amplitude = every.max(axis=1).T * whole
         level = 2 * decibel(in_bands(self._frequency, amplitude, self.edges))
-        return np.clip(SPECTRUM.place(level), 0.0, 1.0)
+        return np.clip(SPECTRUM.place(level), 0.0, 1.0).T
 
 
 JOINT_POINTS = 400.0
@@ -183,7 +154,14 @@ SEND_INTERVAL = 0.1
 FILE_INTERVAL = 2.0
 """The same for a file without a viewer: for each message, rerun keeps some hundred bytes until the
 file is closed."""
-NOISE, FOUND_PATH = "noise", "/class/found"
+SHOWN = 10.0
+"""Time that plots reach back, in [s]."""
+NOISE, BANDS_PATH, SCORES, FOUND_PATH = (
+    "/noise/simplified",
+    "/spectrogram/bands",
+    "/score",
+    "/class/found",
+)
 NOISE_PANEL = Panel("noise", 130.0)
 SPECTROGRAM_PANEL, SIGNALS_PANEL = Panel("spectrogram", 150.0), Panel("signals", 390.0)
 NEWEST = 8
@@ -191,11 +169,13 @@ NEWEST = 8
 
 
 class Drawing:
-    """Draws into a recording.
+    """Draws into a recording: what is to be drawn waits until a message has enough of it.
 
     Args:
-        classes: What can be predicted; empty without a model. `Drawing.classes` is their panel.
+        signals: Names of the signals that there are.
+        classes: What can be predicted; empty without a model.
         edges: Of the spectrogram's bands, shape (bands + 1,), in [Hz].
+        watched: Whether there is a viewer: labels are drawn at once then.
     """
 
     def __init__(
@@ -210,156 +190,145 @@ class Drawing:
     ) -> None:
         self._recording, self._watched = recording, watched
         self._interval = SEND_INTERVAL if watched else FILE_INTERVAL
-        self._columns: list[Columns] = []
-        self._scores: list[tuple[Array, Array]] = []
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
-        self._state, self._changes = "", list[Change]()
-        self._signals = [name for name in signals if name.removesuffix("_desired") in UNITS]
-        self._slices = [
-            slice(first, min(first + JOINTS_PER_PLOT, len(joint_names)))
-            for first in range(0, len(joint_names), JOINTS_PER_PLOT)
-        ]
-        self._entities = {
-            kind: [(_joints(kind, plot), columns) for plot, columns in enumerate(self._slices)]
-            for kind in self._signals
-        }
-        self._told = ""
-        self._waiting: dict[str, list[tuple[Array, Array]]] = {}
+        self._classes = Panel("class", ROW * len(self._rows) + axes.AXIS) if classes else None
+        self._state, self._told = "", ""
+        self._waiting: dict[str, list[tuple[NDArray[np.int64], Array]]] = {}
         self._held = 0.0  # time that waits, in [s]
-        for kind in self._signals:
-            for plot, columns in enumerate(self._slices):
-                self._style_joints(kind, plot, joint_names[columns])
-        self._entities[NOISE] = [("/noise/simplified", slice(None))]
-        style_lines(
-            recording, "/noise/simplified", names=["simplified [rad/s]"], colours=[colors.NOISE]
-        )
+        self._entities = {
+            kind: _plots(kind, len(joint_names))
+            for kind in signals
+            if kind.removesuffix("_desired") in UNITS
+        }
+        for kind, plots in self._entities.items():
+            desired = kind.endswith("_desired")
+            for path, columns in plots.items():
+                names = [f"{name} desired" if desired else name for name in joint_names[columns]]
+                shades = colors.of_series(len(names), dim=desired)
+                style_lines(recording, path, names=names, colours=shades)
+        self._style(classes, edges)
+
+    def _style(self, classes: tuple[str, ...], edges: Array) -> None:
+        """Log how everything but the joints' signals is drawn, and what stands beside it."""
+        recording, nothing = self._recording, [Label(0.5, "")]  # else the viewer says: no data
+        style_lines(recording, NOISE, names=["simplified [rad/s]"], colours=[colors.NOISE])
+        axes.log_left(recording, NOISE_PANEL, [Label(0.5, "noise p\u0302\n[rad/s]")])
+        axes.log_right(recording, NOISE_PANEL, nothing)
+        axes.log_left(recording, SIGNALS_PANEL, nothing)
+        axes.log_right(recording, SIGNALS_PANEL, nothing)
         # A line of one entity each: an entity each would cost a message each.
-        style_bands(recording, "/spectrogram/bands", np.sqrt(edges[:-1] * edges[1:]).tolist())
+        style_bands(recording, BANDS_PATH, np.sqrt(edges[:-1] * edges[1:]).tolist())
         title = Label(0.5, "spectrum,\nloudest\njoint", -22.0)
         ends = float(edges[0]), float(edges[-1])
         log_axis(recording, SPECTROGRAM_PANEL, *ends, title, axes.hertz)
         axes.log_scale(recording, SPECTROGRAM_PANEL, SPECTRUM)
-        axes.log_left(recording, NOISE_PANEL, [Label(0.5, "noise p\u0302\n[rad/s]")])
-        nothing = [Label(0.5, "")]  # else the viewer says that there is no data
-        self.classes = Panel("class", ROW * len(self._rows) + axes.AXIS) if classes else None
-        for panel in filter(None, (self.classes, NOISE_PANEL, SIGNALS_PANEL)):
-            axes.log_right(recording, panel, nothing)
-        axes.log_left(recording, SIGNALS_PANEL, nothing)
-        if self.classes is not None:
-            shown = [self._colours[name] for name in classes]
-            style_lines(recording, "/score", names=classes, colours=shown)
-            self._style_classes(self.classes)
+        if self._classes is None:
+            return
+        style_lines(
+            recording, SCORES, names=classes, colours=[self._colours[name] for name in classes]
+        )
+        shades = [self._colours[name] for name in self._rows]
+        names = [spoken(name) for name in self._rows]
+        copies = unstable.COPIES
+        unstable.style_bands(
+            recording,
+            FOUND_PATH,
+            [name for name in names for _ in range(copies)],
+            [shade for shade in shades for _ in range(copies)],
+        )
+        rows = zip(axes.row_labels(names), shades, strict=True)
+        named = [replace(row, color=readable(shade)) for row, shade in rows]
+        axes.log_left(recording, self._classes, named)
+        axes.log_right(recording, self._classes, nothing)
 
-    @property
-    def plots(self) -> list[tuple[str, list[str]]]:
-        """Title and entity paths of each plot of joint signals."""
-        found: dict[str, list[str]] = {}
-        for kind in self._signals:
-            measured = kind.removesuffix("_desired")
-            for plot in range(len(self._slices)):
-                number = f" {plot + 1}" if len(self._slices) > 1 else ""
-                title = f"{measured}{number} [{UNITS[measured]}]"
-                found.setdefault(title, []).append(_joints(kind, plot))
-        return list(found.items())
-
-    def lines(self, time: Array, noise: Array, signals: Mapping[str, Array], rate: float) -> None:
+    def lines(
+        self, time: Array, noise: Array, signals: Mapping[str, Array], seconds: float
+    ) -> None:
         """Draw the next stretch of noise and joint signals, as soon as there are 0.1 s of them.
 
         Args:
             time: Shape (samples,), in [s].
             noise: Shape (samples,), in [rad/s].
             signals: Each of shape (samples, joints); rows that are not finite are left out.
-            rate: Samples per second, in [Hz].
+            seconds: That the stretch lasts, in [s].
         """
-        if not len(time):
-            return
-        seconds = len(time) / rate
-        self._keep(NOISE, time, noise[:, None], seconds * NOISE_POINTS)
-        for kind in self._signals:
+        self._thin(time, noise[:, None], {NOISE: slice(None)}, seconds * NOISE_POINTS)
+        for kind, plots in self._entities.items():
             finite = np.isfinite(signals[kind]).all(axis=1)
-            if not finite.any():
-                continue
-            rows = slice(None) if finite.all() else finite
-            self._keep(kind, time[rows], signals[kind][rows], seconds * JOINT_POINTS)
+            self._thin(time[finite], signals[kind][finite], plots, seconds * JOINT_POINTS)
         self._held += seconds
         if self._held >= self._interval:
             self.flush()
 
-    def flush(self) -> None:
-        """Draw what waits."""
-        for kind, pieces in self._waiting.items():
-            index = [at(np.concatenate([time for time, _ in pieces]))]
-            values = np.concatenate([part for _, part in pieces])
-            for path, columns in self._entities[kind]:
-                self._send(path, index, values[:, columns])
-        self._waiting, self._held = {}, 0.0
-        self._send_spectrogram()
-        self._send_scores()
-        self._send_changes()
+    def _thin(self, time: Array, values: Array, plots: Mapping[str, slice], points: float) -> None:
+        shown, thin = extremes(time, values, points=max(2, round(points)))
+        for path, columns in plots.items():
+            self._wait(path, shown, thin[:, columns].copy())  # the array will be used again
 
-    def spectrogram(self, columns: Columns) -> None:
-        """Draw columns of the spectrogram, at once if they are watched."""
-        self._columns.append(columns)
-        if self._watched:
-            self._send_spectrogram()
-
-    def _send_spectrogram(self) -> None:
-        if not self._columns:
-            return
-        time = np.concatenate([columns.time for columns in self._columns])
-        level = np.concatenate([columns.level for columns in self._columns], axis=1)
-        self._columns = []
-        bands, count = level.shape
-        rgba = colors.heat(level.T).reshape(-1, 4)
-        self._recording.send_columns(
-            "/spectrogram/bands",
-            indexes=[at(time)],
-            columns=[
-                *scalars(np.tile(axes.middles(bands)[::-1], (count, 1))),
-                *rr.SeriesLines.columns(colors=rgba).partition([bands] * count),
-            ],
-        )
+    def spectrogram(self, time: Array, level: Array) -> None:
+        """Draw columns of the spectrogram, see `SpectrogramStream.push`."""
+        self._wait(BANDS_PATH, time, level)
 
     def labels(self, labels: Labels) -> None:
         """Draw the scores of frames, at their centres, at once if they are watched."""
-        self._scores.append(((labels.start + labels.stop) / 2, labels.scores))
+        self._wait(SCORES, (labels.start + labels.stop) / 2, labels.scores)
         if self._watched:
-            self._send_scores()
-
-    def _send_scores(self) -> None:
-        if self._scores:
-            time, scores = (np.concatenate(each) for each in zip(*self._scores, strict=True))
-            self._send("/score", [at(time)], scores)
-            self._scores = []
+            self._send(SCORES)
 
     def changes(self, changes: Sequence[Change]) -> None:
         """Draw the class where it changes and until when it lasts, at once if it is watched."""
-        self._changes += changes
-        if self._watched:
-            self._send_changes()
-
-    def _send_changes(self) -> None:
         points: list[tuple[int, str]] = []
-        for change in self._changes:
-            begin = round(1e9 * change.time)
-            if self._state not in ("", change.state):
+        for time, state in changes:
+            begin = round(1e9 * time)
+            if self._state not in ("", state):
                 points.append((begin - 1, self._state))
-            points.append((begin, change.state))
-            self._state = change.state
-        self._changes = []
-        if points:
-            middle, half = self._places()
-            shown = np.array([[state == name for name in self._rows] for _, state in points])
-            values = np.where(shown, middle, np.nan).repeat(unstable.COPIES, axis=1)
-            times = np.array([time for time, _ in points])
-            unstable.send_bands(self._recording, FOUND_PATH, TIMELINE, times, values, half)
+            points.append((begin, state))
+            self._state = state
+        shown = [[state == name for name in self._rows] for _, state in points]
+        times = np.array([time for time, _ in points], dtype=np.int64)
+        self._wait_at(FOUND_PATH, times, np.array(shown, dtype=np.float64))
+        if self._watched:
+            self._send(FOUND_PATH)
 
-    def _places(self) -> tuple[Array, float]:
-        """Middles of the classes' bands on their axis, from above, and half of their width."""
-        count, (upper, lower) = len(self._rows), FOUND
-        middles = 1.0 - (np.arange(count) + (upper + lower) / 2) / count
-        return axes.TOP * middles, axes.TOP * (lower - upper) / 2 / count
+    def _wait(self, path: str, time: Array, values: Array) -> None:
+        """Let values wait, at times in [s]."""
+        self._wait_at(path, np.round(1e9 * time).astype(np.int64), values)
+
+    def _wait_at(self, path: str, time: NDArray[np.int64], values: Array) -> None:
+        """Let values wait, at times in [ns]."""
+        if len(time):
+            self._waiting.setdefault(path, []).append((time, values))
+
+    def flush(self) -> None:
+        """Draw what waits."""
+        for path in list(self._waiting):
+            self._send(path)
+        self._held = 0.0
+
+    def _send(self, path: str) -> None:
+        """Draw what waits of an entity in one message."""
+        pieces = self._waiting.pop(path, None)
+        if pieces is None:
+            return
+        time, values = (np.concatenate(each) for each in zip(*pieces, strict=True))
+        count, width = values.shape
+        columns: Any = scalars(values)
+        if path == BANDS_PATH:
+            shades = colors.heat(values).reshape(-1, 4)
+            columns = [
+                *scalars(np.tile(axes.middles(width)[::-1], (count, 1))),
+                *rr.SeriesLines.columns(colors=shades).partition([width] * count),
+            ]
+        elif path == FOUND_PATH:
+            upper, lower = FOUND
+            middles = axes.TOP * (1.0 - (np.arange(width) + (upper + lower) / 2) / width)
+            bands = np.where(values > 0.0, middles, np.nan).repeat(unstable.COPIES, axis=1)
+            half = axes.TOP * (lower - upper) / 2 / width
+            unstable.send_bands(self._recording, path, TIMELINE, time, bands, half)
+            return
+        index = rr.TimeColumn(TIMELINE, duration=time.astype("timedelta64[ns]"))
+        self._recording.send_columns(path, indexes=[index], columns=columns)
 
     def findings(self, time: float, found: Sequence[Event], lasting: Sequence[Event]) -> None:
         """Show the findings so far in a document.
@@ -376,7 +345,7 @@ class Drawing:
         if text != self._told:
             self._told = text
             document = rr.TextDocument.columns(text=[text], media_type=["text/markdown"])
-            index = [at(np.array([time]))]
+            index = [axes.at(np.array([time]))]
             self._recording.send_columns("/report", indexes=index, columns=document)
             verdict = ("findings", f"FAIL   {title}") if title else ("ok", "PASS so far")
             axes.log_verdict(self._recording, *verdict, time)
@@ -390,28 +359,62 @@ class Drawing:
         """Add a line to the list of events."""
         log_events(self._recording, [time], [text], [colour])
 
-    def _keep(self, kind: str, time: Array, values: Array, points: float) -> None:
-        """Thin a stretch, and let it wait; the arrays that it is in will be used again."""
-        shown, thin = extremes(time, values, points=max(2, round(points)))
-        self._waiting.setdefault(kind, []).append((shown.copy(), thin.copy()))
+    def layout(self, start: float, camera: Camera | None, *, links: bool, full: bool) -> Blueprint:
+        """Lay the recording out; every plot shows ten seconds: the first, and then the last.
 
-    def _send(self, path: str, index: list[rr.TimeColumn], values: Array) -> None:
-        self._recording.send_columns(path, indexes=index, columns=scalars(values))
+        Args:
+            start: Time of the first sample, in [s].
+            camera: From where the robot is seen; None without one.
+            links: Whether the links are coloured.
+            full: Whether the last ten seconds all lie after the start; until then, plots show the
+                first ten, so that no time is negative.
+        """
+        shown: dict[str, Any] = {"last": SHOWN} if full else {"during": (start, start + SHOWN)}
+        shown |= {"fixed": True, "titled": False}
+        rows = shown | {"between": (0.0, axes.TOP)}
+        over_time = [
+            (NOISE_PANEL, unstable.plot("Noise", "/noise", **shown)),
+            (SPECTROGRAM_PANEL, unstable.plot("Spectrum", "/spectrogram", **rows)),
+            (SIGNALS_PANEL, self._signals(shown)),
+        ]
+        left = [
+            (unstable.text("Findings", "/report", titled=False), 2.0),
+            (unstable.events("Events", "/events"), 1.4),
+        ]
+        if self._classes is not None:  # otherwise there is no verdict
+            over_time.insert(0, (self._classes, unstable.plot("Classes", "/class", **rows)))
+            left.insert(0, (unstable.drawing("/verdict"), 0.32))
+        if camera is not None:
+            title = "Robot, links coloured by level above 10 Hz" if links else "Robot"
+            robot = unstable.robot(title, "/robot", camera)
+            if links:
+                key = unstable.drawing(f"/axis/{KEY.name}/right")
+                robot = unstable.beside((robot, 88.0), (key, 12.0))
+            left.insert(len(left) - 1, (robot, 3.4))
+        right = [
+            (part if panel is SIGNALS_PANEL else axes.part(panel, part), panel.height)
+            for panel, part in over_time
+        ]
+        whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*right), 64.0))
+        return unstable.blueprint(whole, TIMELINE, following=True)
 
-    def _style_classes(self, panel: Panel) -> None:
-        shades = [self._colours[name] for name in self._rows]
-        copies = [name for name in map(spoken, self._rows) for _ in range(unstable.COPIES)]
-        every = [shade for shade in shades for _ in range(unstable.COPIES)]
-        unstable.style_bands(self._recording, FOUND_PATH, copies, every)
-        rows = axes.row_labels([spoken(name) for name in self._rows])
-        named = [replace(at, color=readable(c)) for at, c in zip(rows, shades, strict=True)]
-        axes.log_left(self._recording, panel, named)
-
-    def _style_joints(self, kind: str, plot: int, names: Sequence[str]) -> None:
-        desired = kind.endswith("_desired")
-        labels = [f"{name} desired" if desired else name for name in names]
-        shades = colors.of_series(len(names), dim=desired)
-        style_lines(self._recording, _joints(kind, plot), names=labels, colours=shades)
+    def _signals(self, shown: Mapping[str, Any]) -> Part:
+        """Plots of joint signals and of scores, behind each other."""
+        paths: dict[str, list[str]] = {}
+        for kind, plots in self._entities.items():
+            measured = kind.removesuffix("_desired")
+            for number, path in enumerate(plots, start=1):
+                which = f" {number}" if len(plots) > 1 else ""
+                paths.setdefault(f"{measured}{which} [{UNITS[measured]}]", []).append(path)
+        views = {
+            title: unstable.plot(title, "/joints", own, legend=True, **shown)
+            for title, own in paths.items()
+        }
+        if self._classes is not None:
+            views["Scores"] = unstable.plot("Scores", SCORES, legend=True, **shown)
+        return unstable.tabs(
+            *(axes.part(SIGNALS_PANEL, plot, name=name) for name, plot in views.items())
+        )
 
 
 def _line(event: Event, *, lasts: bool) -> str:
@@ -420,106 +423,12 @@ def _line(event: Event, *, lasts: bool) -> str:
     return f"- **{spoken(event.label)}**, {when}, score {event.score:.2f}{event.novelty}"
 
 
-def _joints(kind: str, plot: int) -> str:
+def _plots(kind: str, joints: int) -> dict[str, slice]:
+    """The entities of a signal, each with the columns of eight joints."""
     end = "_desired" if kind.endswith("_desired") else ""
-    return f"/joints/{kind.removesuffix('_desired')}/{plot}{end}"
-
-
-SHOWN = 10.0
-"""Time that plots reach back, in [s]."""
-
-
-@dataclass(frozen=True)
-class Contents:
-    """What there is to show.
-
-    Attributes:
-        joints: Title and entity paths of each plot of joint signals.
-        camera: From where the robot is seen; None without one.
-        classes: Where the classes are drawn; None without any.
-        links: Whether the links are coloured.
-        rate: Samples per second, in [Hz].
-        start: Time of the first sample, in [s].
-        full: Whether the last ten seconds are all after that.
-    """
-
-    joints: Sequence[tuple[str, Sequence[str]]]
-    camera: Camera | None
-    classes: Panel | None
-    links: bool
-    rate: float
-    start: float
-    full: bool
-
-
-def layout(contents: Contents) -> Blueprint:
-    """Lay a live recording out; every plot shows ten seconds: the first, and then the last."""
-    noise = _plot(contents, "/noise", "Noise", titled=False)
-    bands = _plot(contents, "/spectrogram", "Spectrum", between=(0.0, axes.TOP), titled=False)
-    over_time = [
-        (axes.part(NOISE_PANEL, noise), NOISE_PANEL.height),
-        (axes.part(SPECTROGRAM_PANEL, bands), SPECTROGRAM_PANEL.height),
-        (_signals(contents), SIGNALS_PANEL.height),
-    ]
-    if contents.classes is not None:
-        rows = _plot(contents, "/class", "Classes", between=(0.0, axes.TOP), titled=False)
-        over_time.insert(0, (axes.part(contents.classes, rows), contents.classes.height))
-    findings = unstable.text("Findings", "/report", titled=False)
-    left = [(findings, 2.0), (unstable.events("Events", "/events"), 1.4)]
-    if contents.classes is not None:  # otherwise there is no verdict
-        left.insert(0, (unstable.drawing("/verdict"), 0.32))
-    if contents.camera is not None:
-        title = "Robot, links coloured by level above 10 Hz" if contents.links else "Robot"
-        robot = unstable.robot(title, "/robot", contents.camera)
-        if contents.links:
-            key = unstable.drawing(f"/axis/{KEY.name}/right")
-            robot = unstable.beside((robot, 88.0), (key, 12.0))
-        left.insert(len(left) - 1, (robot, 3.4))
-    whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*over_time), 64.0))
-    return unstable.blueprint(whole, TIMELINE, following=True)
-
-
-def _shown(contents: Contents) -> tuple[tuple[float, float] | None, float | None]:
-    """What plots show: a stretch of time at first, so that it begins with the samples, or a last.
-
-    Before ten seconds are over, the last ten begin before the first sample.
-    """
-    if contents.full:
-        return None, SHOWN
-    return (contents.start, contents.start + SHOWN), None
-
-
-def _plot(
-    contents: Contents,
-    origin: str,
-    name: str,
-    paths: Sequence[str] = ("$origin/**",),
-    *,
-    legend: bool = False,
-    between: tuple[float, float] | None = None,
-    titled: bool = True,
-) -> Part:
-    during, last = _shown(contents)
-    return unstable.plot(
-        name,
-        origin,
-        paths,
-        legend=legend,
-        between=between,
-        fixed=True,
-        during=during,
-        last=last,
-        titled=titled,
-    )
-
-
-def _signals(contents: Contents) -> Part:
-    plots = {
-        title: _plot(contents, "/joints", title, paths, legend=True, titled=False)
-        for title, paths in contents.joints
+    return {
+        f"/joints/{kind.removesuffix('_desired')}/{first // JOINTS_PER_PLOT}{end}": slice(
+            first, first + JOINTS_PER_PLOT
+        )
+        for first in range(0, joints, JOINTS_PER_PLOT)
     }
-    if contents.classes is not None:
-        plots["Scores"] = _plot(contents, "/score", "Scores", legend=True, titled=False)
-    return unstable.tabs(
-        *(axes.part(SIGNALS_PANEL, plot, name=name) for name, plot in plots.items())
-    )

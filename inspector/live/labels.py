@@ -10,8 +10,9 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector.library import Library
 from noiseclassifier import Event, Labels
+from noiseclassifier.lasting import ERROR, MEASURED
 from noiseclassifier.profile import NOMINAL, TOLERANCE
-from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE
+from noiseclassifier.signals import JOINTS, NOISE
 from noisemodel.run import EDGE
 from noisemodel.types import Array, Mask
 
@@ -58,56 +59,31 @@ class Decimator:
         return lower, np.asarray(view(valid, length)[:: self._ratio][:count].all(axis=1))
 
 
-NOISY = ("base_velocity", "velocity", "velocity_desired", "effort")
-"""The signals that models take: where one of them is unknown there is no label."""
+NOISY = ("base_velocity", "velocity", "velocity_desired")
+"""What makes noise, in the order of the columns of a motion: where one is unknown, no label is."""
 
 
-class NoiseSignals:
-    """Noise signals of motion in columns: `noisemodel.norms` and `by_joint`, without a run.
+def noise_signal(name: str, motion: Array, base: int, joints: int) -> Array:
+    """A norm of a motion, or joint by joint what it is of, as `noisemodel` makes them of a run.
 
-    Attributes:
-        columns: How many columns make noise: those of ``NOISY``, in that order.
-        names: Noise signals that there are.
-        joints: How many joints there are.
-        lasting: Names of those in which what lasts is looked for.
+    Args:
+        name: A noise signal.
+        motion: Velocities, shape (samples, columns), in [rad/s] and [m/s].
+        base: Columns of the base, which are first.
+        joints: Columns of the joints, after which come those of desired velocities, if any.
+
+    Returns:
+        Shape (samples,), or (joints, samples), in [rad/s].
     """
-
-    def __init__(self, widths: Mapping[str, int]) -> None:
-        base, joints, desired, efforts = (widths.get(name, 0) for name in NOISY)
-        self.columns, self.joints = base + joints + desired + efforts, joints
-        moved = base + joints
-        end = moved + desired
-        of_desired, of_measured, of_error = MOTION
-        desired_joints, measured_joints, error_joints = JOINTS
-        self._ways: dict[str, Callable[[Array], Array]] = {
-            NOISE: lambda motion: nm.simplified(motion[:, :end]),
-            of_measured: lambda motion: nm.simplified(motion[:, :moved]),
-            measured_joints: lambda motion: motion[:, base:moved].T,
-        }
-        if desired:
-            self._ways |= {
-                of_desired: lambda motion: nm.simplified(motion[:, moved:end]),
-                of_error: lambda motion: nm.simplified(
-                    motion[:, moved:end] - motion[:, base:moved]
-                ),
-                desired_joints: lambda motion: motion[:, moved:end].T,
-                error_joints: lambda motion: (motion[:, moved:end] - motion[:, base:moved]).T,
-            }
-        if efforts:
-            self._ways[EFFORT] = lambda motion: motion[:, end:].T
-        self.names = tuple(self._ways)
-        self.lasting = tuple(name for name in (measured_joints, error_joints) if name in self.names)
-
-    def of(self, motion: Array, names: Sequence[str]) -> dict[str, Array]:
-        """Compute noise signals.
-
-        Args:
-            motion: Velocities, shape (samples, columns), in [rad/s] and [m/s].
-
-        Returns:
-            Signals by name, norms of shape (samples,), joints of (joints, samples), in [rad/s].
-        """
-        return {name: self._ways[name](motion) for name in names}
+    if name == NOISE:
+        return nm.simplified(motion)
+    each, moved = name in JOINTS, base + joints
+    measured, desired = motion[:, base:moved], motion[:, moved:]
+    if name.startswith("measured"):
+        chosen = measured if each else motion[:, :moved]
+    else:
+        chosen = desired if name.startswith("desired") else desired - measured
+    return chosen.T if each else nm.simplified(chosen)
 
 
 class Labeller:
@@ -119,56 +95,50 @@ class Labeller:
     Attributes:
         model: Name of the model that labels; empty without one.
         remark: Why there are no labels, or at which other rate; empty if neither.
+        classes: What can be predicted; nothing without a model.
+        length: Duration of a frame, in [s]; 0 without a model.
+        hop: Time from one frame to the next, in [s]; 0 without a model.
     """
 
     def __init__(self, library: Library, rate: float, widths: Mapping[str, int]) -> None:
         self.rate, self.remark, self.model = rate, "", ""
+        self.classes, self.length, self.hop = tuple[str, ...](), 0.0, 0.0
         self._stream: nc.Stream | None = None
         self._decimator: Decimator | None = None
-        self._signals, self._names = NoiseSignals(widths), tuple[str, ...]()
-        self._ratio, self._samples = 1, 0
         self._lasting: nc.Lasting | None = None
+        self._ratio, self._samples = 1, 0
+        self._base, self._joints, desired = (widths.get(name, 0) for name in NOISY)
+        kinds = ("desired", "measured", "error") if desired else ("measured",)
+        there = (NOISE, *kinds, *(f"{kind}_joints" for kind in kinds))
+        self._followed = [name for name in there if name in (MEASURED, ERROR)]
+        self._names: tuple[str, ...] = ()
         try:
-            self.model, chosen = nc.nearest(library, rate, self._signals.names)
+            self.model, chosen = nc.nearest(library, rate, there)
         except nc.ModelsError as error:
             self.remark = f"No labels: {error}."
             return
         ratio = round(rate / chosen.rate)
         if rate > chosen.rate and isinstance(model := library[self.model], nc.General):
             ratio = ceil(rate / chosen.rate * (1.0 - TOLERANCE))
-            chosen = model.at(rate / ratio, self._signals.names)
+            chosen = model.at(rate / ratio, there)
         if abs(rate / ratio / chosen.rate - 1.0) > NOMINAL:
+            self.model = ""
             self.remark = (
                 f"No labels: {rate:g} Hz is no multiple of the {chosen.rate:g} Hz of the nearest"
                 " model, as is needed while samples come in."
             )
             return
         self._ratio, self._names = ratio, chosen.profile.signals
-        self._stream = nc.Stream(chosen, rate=rate / ratio, joints=self._signals.joints)
+        self.classes, self.length = chosen.classes, chosen.profile.duration
+        self.hop = chosen.profile.hop / rate * ratio
+        self._stream = nc.Stream(chosen, rate=rate / ratio, joints=self._joints)
         self._lasting = nc.Lasting(rate / ratio)
         if ratio > 1:
-            self._decimator = Decimator(ratio, self._signals.columns)
+            self._decimator = Decimator(ratio, self._base + self._joints + desired)
             self.remark = (
                 f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}: nothing above"
                 f" {rate / ratio / 2:g} Hz is left."
             )
-
-    @property
-    def length(self) -> float:
-        """Duration of a frame, in [s]."""
-        return 0.0 if self._stream is None else self._stream.classifier.profile.duration
-
-    @property
-    def hop(self) -> float:
-        """Time from one frame to the next, in [s]."""
-        if self._stream is None:
-            return 0.0
-        return self._stream.classifier.profile.hop / self.rate * self._ratio
-
-    @property
-    def classes(self) -> tuple[str, ...]:
-        """What can be predicted; nothing without a model."""
-        return () if self._stream is None else self._stream.classifier.classes
 
     @property
     def elapsed(self) -> float:
@@ -196,8 +166,11 @@ class Labeller:
     def _take(self, motion: Array, valid: Mask) -> nc.Labels:
         assert self._stream is not None
         assert self._lasting is not None
-        self._lasting.push(self._signals.of(motion, self._signals.lasting), valid)
-        return self._stream.push(self._signals.of(motion, self._names), valid)
+        self._lasting.push(self._signals(motion, self._followed), valid)
+        return self._stream.push(self._signals(motion, self._names), valid)
+
+    def _signals(self, motion: Array, names: Sequence[str]) -> dict[str, Array]:
+        return {name: noise_signal(name, motion, self._base, self._joints) for name in names}
 
     @property
     def lasting(self) -> tuple[Event, ...]:
@@ -244,19 +217,14 @@ class Findings:
 
     A finding is decided when a frame begins after it. Memory grows with events and
     with the stretch that lasts, not with time.
-
-    Attributes:
-        frames: Frames that were added.
     """
 
     def __init__(self) -> None:
-        self.frames = 0
         self._closed: list[Event] = []
         self._open: Labels | None = None
 
     def add(self, labels: Labels) -> None:
         """Take the labels of the next frames."""
-        self.frames += len(labels)
         waiting = labels if self._open is None else Labels.concatenated((self._open, labels))
         quiet = waiting.label == "ok"
         # How far the frames reach that are not `ok`; those that it touches join them.

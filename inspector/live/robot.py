@@ -4,12 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from rerun.urdf import UrdfJoint
 
 import noisemodel as nm
 from inspector.levels import LINKS
@@ -23,15 +22,6 @@ from noisemodel.types import Array
 
 STEP = 0.2
 """Time over which a level is taken, in [s]."""
-
-
-class Step(NamedTuple):
-    """Levels of all links."""
-
-    time: float
-    """Start of the step, in [s]."""
-    level: Array
-    """Shape (links,), in [dB re 1 pW]; silence is at -inf."""
 
 
 class LinkLevels:
@@ -50,70 +40,62 @@ class LinkLevels:
         self._robot = nm.Robot.load(robot, floating_base=True if floating else None)
         self._surface = nm.Surface.of(self._robot, "auto")
         self.links = self._surface.names
-        by_name = {joint.name: joint for joint in self._robot.joints if joint.nv == 1}
-        self._joints = [by_name[name] for name in joint_names]
-        self._columns = [joint.first_v for joint in self._joints]
+        self._names, self._rate = tuple(joint_names), rate
         self._size, self._half = max(1, round(STEP * rate)), max(1, round(rate / FAST / 2))
-        self._rate = rate
         self.skip()
 
     def skip(self) -> None:
         """Begin anew after a gap."""
-        self._velocity = np.empty((0, self._robot.nv))
-        self._time, self._position = np.empty(0), np.empty((0, len(self._joints)))
+        self._held: dict[str, Array] = {}
         self._before = 0  # samples before the step that comes next
 
-    def push(self, time: Array, signals: Mapping[str, Array]) -> list[Step]:
+    def push(self, time: Array, signals: Mapping[str, Array]) -> list[tuple[float, Array]]:
         """Take samples that follow each other.
 
         Args:
             time: Shape (samples,), in [s].
             signals: Velocities and positions, shape (samples, joints), and a base's velocity, shape
                 (samples, 6), if there is one. A sample that is not finite begins anew.
+
+        Returns:
+            Start of each step that is complete now, in [s], and the levels of all links, shape
+            (links,), in [dB re 1 pW]; silence is at -inf.
         """
-        velocity = np.zeros((len(time), self._robot.nv))
-        velocity[:, self._columns] = signals["velocity"]
-        if self._robot.floating_base and "base_velocity" in signals:
-            velocity[:, :6] = signals["base_velocity"]
-        position = signals["position"]
-        known = np.isfinite(velocity).all(axis=1) & np.isfinite(position).all(axis=1)
+        floats = self._robot.floating_base and "base_velocity" in signals
+        names = ["velocity", "position", *(["base_velocity"] if floats else [])]
+        known = np.all([np.isfinite(signals[name]).all(axis=1) for name in names], axis=0)
+        first = 0
         if not known.all():
-            last = int(np.flatnonzero(~known)[-1]) + 1
             self.skip()
-            time, velocity, position = time[last:], velocity[last:], position[last:]
-        self._time = np.concatenate((self._time, time))
-        self._velocity = np.concatenate((self._velocity, velocity))
-        self._position = np.concatenate((self._position, position))
+            first = int(np.flatnonzero(~known)[-1]) + 1
+        new = {"time": time[first:], **{name: signals[name][first:] for name in names}}
+        if self._held:
+            new = {name: np.concatenate((self._held[name], new[name])) for name in new}
+        self._held = new
         steps = []
-        while len(self._time) >= self._before + self._size + self._half:
+        while len(self._held["time"]) >= self._before + self._size + self._half:
             steps.append(self._step())
         return steps
 
-    def _step(self) -> Step:
+    def _step(self) -> tuple[float, Array]:
         first, stop = self._before, self._before + self._size
-        window = self._velocity[: stop + self._half]
-        fast = vibrating(window, np.ones(len(window), dtype=bool), self._rate)[first:stop]
-        moments = second_moments(fast, np.ones(self._size, dtype=bool), size=self._size)
-        pose = self._pose(self._position[(first + stop) // 2])
+        window: dict[str, Any] = {
+            name: values[: stop + self._half] for name, values in self._held.items()
+        }
+        start = float(window["time"][first])
+        window["time"] = np.arange(len(window["time"])) / self._rate
+        run = nm.Run(joint_names=self._names, **window)
+        position, velocity = self._robot.configuration(run)
+        fast = vibrating(velocity, run.mask, self._rate)[first:stop]
+        moments = second_moments(fast, run.mask[first:stop], size=self._size)
+        pose = position[(first + stop) // 2][None]
         (power,) = by_moments(self._robot, self._surface, pose, [("normal", moments)])
-        found = Step(float(self._time[first]), decibel(power[0] / REFERENCE_POWER))
         used = max(stop - self._half, 0)
         self._before = stop - used
-        self._time, self._velocity = self._time[used:], self._velocity[used:]
-        self._position = self._position[used:]
-        return found
-
-    def _pose(self, position: Array) -> Array:
-        pose = self._robot.neutral[None].copy()
-        for joint, angle in zip(self._joints, position.tolist(), strict=True):
-            if joint.kind == "continuous":
-                pose[0, joint.first_q : joint.first_q + 2] = np.cos(angle), np.sin(angle)
-            else:
-                pose[0, joint.first_q] = angle
-        return pose
+        self._held = {name: values[used:] for name, values in self._held.items()}
+        return start, decibel(power[0] / REFERENCE_POWER)
 
 
-SLIDING = "prismatic"
 SHADES = 16
 KEY = axes.Panel("key", 360.0)
 """The scale beside the robot."""
@@ -143,6 +125,9 @@ class LiveRobot:
         floating: bool,
         at_once: int = 1,
     ) -> None:
+        from scipy.spatial.transform import Rotation
+
+        self._rotation = Rotation
         with TemporaryDirectory() as folder:
             tree = scene.load(robot, Path(folder), joint_names)
             self._outermost = framing.outermost(scene.drawn_file(robot, Path(folder)))
@@ -160,23 +145,18 @@ class LiveRobot:
             name: joint.mimic.joint if joint.mimic else name for name, joint in movable.items()
         }
         joints = [joint for name, joint in movable.items() if leaders[name] in joint_names]
+        mimics = [joint.mimic for joint in joints]
         self._columns = [joint_names.index(leaders[joint.name]) for joint in joints]
-        self._factor = np.array(
-            [joint.mimic.multiplier if joint.mimic else 1.0 for joint in joints]
-        )
-        self._offset = np.array([joint.mimic.offset if joint.mimic else 0.0 for joint in joints])
-        slides = np.array([joint.joint_type == SLIDING for joint in joints], dtype=bool)[:, None]
-        axis = np.array([joint.axis for joint in joints]).reshape(-1, 3)
-        self._place = np.array([joint.origin_xyz for joint in joints]).reshape(-1, 3)
-        self._turn = np.array([_quaternion(joint) for joint in joints]).reshape(-1, 4)
-        self._slide = np.where(slides, _rotated(self._turn, axis), 0.0)
-        self._spin = np.where(slides, 0.0, _times(self._turn, np.pad(axis, ((0, 0), (0, 1)))))
-        self._half = np.where(slides, 0.0, 0.5)
-        moved = (str(tree.root_link().name), framing.VIEW) if floating else ()
-        base = [(scene.WORLD, child) for child in moved]
-        links = [*((joint.parent_link, joint.child_link) for joint in joints), *base]
-        self.children = [child for _, child in links]
-        self._carriers = [parent for parent, _ in links]
+        self._factor = np.array([mimic.multiplier if mimic else 1.0 for mimic in mimics])
+        self._offset = np.array([mimic.offset if mimic else 0.0 for mimic in mimics])
+        slides = np.array([joint.joint_type == "prismatic" for joint in joints])[:, None]
+        axis = np.array([joint.axis for joint in joints])
+        self._slide, self._spin = np.where(slides, axis, 0.0), np.where(slides, 0.0, axis)
+        self._place = np.array([joint.origin_xyz for joint in joints])
+        self._turn = Rotation.from_euler("xyz", [joint.origin_rpy for joint in joints])
+        base = [str(tree.root_link().name), framing.VIEW] if floating else []
+        self.children = [joint.child_link for joint in joints] + base
+        self._carriers = [joint.parent_link for joint in joints] + len(base) * [scene.WORLD]
         self._at_once = at_once
         self._waiting: list[tuple[float, Array, Array]] = []
         self._names = [joint.name for joint in joints]
@@ -242,20 +222,20 @@ class LiveRobot:
         self._painted = {}
 
     def show(self, time: float, position: Array, base_pose: Array | None) -> None:
-        """Move the robot, once there are as many poses as a message has.
+        """Move the robot, once there are as many poses as a message has; not where one is unknown.
 
         Args:
             time: In [s].
             position: Of the named joints, shape (joints,), in [rad] or [m].
             base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (7,).
         """
+        if not all(np.isfinite(each).all() for each in (position, base_pose) if each is not None):
+            return
         places, turns = self.transforms(position)
         if base_pose is not None:
             below = base_pose[:3] * framing.ON_FLOOR
             places = np.vstack((places, base_pose[:3], below))
             turns = np.vstack((turns, base_pose[3:], UPRIGHT))
-        if not len(places):
-            return
         self._waiting.append((time, places, turns))
         if len(self._waiting) >= self._at_once:
             self.flush()
@@ -290,10 +270,8 @@ class LiveRobot:
             joints that move: the named ones, and those that mimic one of them.
         """
         angle = (self._factor * position[self._columns] + self._offset)[:, None]
-        half = self._half * angle
-        # turn (axis sin half, cos half), with what does not change multiplied once
-        turned = np.sin(half) * self._spin + np.cos(half) * self._turn
-        return self._place + angle * self._slide, turned
+        turned = self._turn * self._rotation.from_rotvec(angle * self._spin)
+        return self._place + self._turn.apply(angle * self._slide), turned.as_quat()
 
 
 def _range(limits: Limits) -> tuple[float, float]:
@@ -306,26 +284,3 @@ def _range(limits: Limits) -> tuple[float, float]:
 def _known(pose: Array) -> Array:
     """A pose, or that of a base in the origin where it is not known."""
     return pose if np.isfinite(pose).all() else np.concatenate((np.zeros(3), UPRIGHT))
-
-
-def _quaternion(joint: UrdfJoint) -> Array:
-    """Turn the roll, pitch and yaw of a joint's origin into a quaternion."""
-    turn = np.array([0.0, 0.0, 0.0, 1.0])
-    for axis, angle in reversed(list(zip(np.eye(3), joint.origin_rpy, strict=True))):
-        spin = np.append(np.sin(angle / 2.0) * axis, np.cos(angle / 2.0))
-        turn = _times(turn, spin)
-    return turn
-
-
-def _times(left: Array, right: Array) -> Array:
-    """Multiply quaternions x, y, z, w, shape (..., 4)."""
-    u, v, a, b = left[..., :3], right[..., :3], left[..., 3:], right[..., 3:]
-    scalar = a * b - (u * v).sum(axis=-1, keepdims=True)
-    return np.concatenate((a * v + b * u + np.cross(u, v), scalar), axis=-1)
-
-
-def _rotated(turn: Array, vector: Array) -> Array:
-    """Rotate vectors by quaternions."""
-    u, w = turn[..., :3], turn[..., 3:]
-    rotated: Array = vector + 2.0 * np.cross(u, np.cross(u, vector) + w * vector)
-    return rotated

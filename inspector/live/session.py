@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 import noisemodel as nm
 from inspector.analysis import headline, status_of
 from inspector.library import Library, for_robot, load_library
-from inspector.live.drawing import SHOWN, Contents, Drawing, Lane, SpectrogramStream, layout
+from inspector.live.drawing import SHOWN, Drawing, Lane, SpectrogramStream
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
 from inspector.live.robot import LinkLevels, LiveRobot
 from inspector.live.samples import (
@@ -28,6 +28,7 @@ from inspector.live.samples import (
     widths_of,
 )
 from inspector.live.sink import Sink
+from inspector.recording.camera import Camera
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from inspector.status import Status
 from inspector.wrongrobot import LONG, LimitWatch, check_joints
@@ -49,7 +50,14 @@ class Worker:
         rate: Nominal samples per second, in [Hz].
         robot: The robot to draw; None draws none.
         watch: The limits of the robot that the samples are said to be of; None checks none.
-        levels: Keeps octave levels; None keeps none.
+        stream: Keeps octave levels; None keeps none.
+
+    Attributes:
+        samples: How many were worked on.
+        labeller: Labels them.
+        counts: How many frames were labelled, by class.
+        delays: From a frame's last sample to its label in the recording, in [s].
+        levels: Octave levels of all samples, once they have ended, if they were kept.
     """
 
     def __init__(
@@ -63,7 +71,7 @@ class Worker:
         library: Library,
         warnings: Warnings,
         watch: LimitWatch | None = None,
-        levels: LevelStream | None = None,
+        stream: LevelStream | None = None,
         on_finding: Callable[[Event, bool], None] | None = None,
     ) -> None:
         self.samples, self._now = 0, 0.0
@@ -71,74 +79,44 @@ class Worker:
         self._rate, self._sink, self._warnings = rate, sink, warnings
         self._noisy = [name for name in NOISY if name in widths]
         self._clock, self._spectrogram = Clock(rate, warnings), SpectrogramStream(rate)
-        self._labeller = Labeller(library, rate, widths)
-        self._lane = Lane(self._labeller.hop, self._labeller.length)
-        self._counts: Counter[str] = Counter()
-        self._findings = Findings()
+        self.labeller = Labeller(library, rate, widths)
+        self._lane = Lane(self.labeller.hop, self.labeller.length)
+        self._findings, self._on_finding = Findings(), on_finding
+        self._news = News(self._tell, self.labeller.length + SETTLED * self.labeller.hop)
         self._shift: float | None = None  # from the clock of the labels to that of the samples
-        wait = self._labeller.length + SETTLED * self._labeller.hop
-        self._news, self._on_finding = News(self._tell, wait), on_finding
-        self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
-        self._robot = None
+        self.counts: Counter[str] = Counter()
+        self.delays: deque[float] = deque(maxlen=MAX_DELAYS)
+        self._watch, self._stream = watch, stream
+        self.levels: Levels | None = None
+        self._robot: LiveRobot | None = None
         self._links: LinkLevels | None = None
-        self._watch, self._stream = watch, levels
-        self.levels: Levels | None = None  # until the end
         if robot is not None:
-            floating = "base_pose" in widths
+            floating, poses = "base_pose" in widths, 1 if sink.watched else POSES
             self._robot = LiveRobot(
-                sink.recording,
-                robot,
-                joint_names,
-                floating=floating,
-                at_once=1 if sink.watched else POSES,
+                sink.recording, robot, joint_names, floating=floating, at_once=poses
             )
-            self._links = self._levels_of(robot, joint_names, floating=floating)
+            try:
+                self._links = LinkLevels(robot, joint_names, rate, floating=floating)
+            except nm.NoiseModelError as error:  # its surface cannot be had
+                warnings.emit(f"The links are not coloured: {error}.")
         self._drawing = Drawing(
             sink.recording,
             joint_names,
             list(widths),
-            self._labeller.classes,
+            self.labeller.classes,
             self._spectrogram.edges,
             watched=sink.watched,
         )
-        self._contents: Contents | None = None  # until the first sample
-        if self._labeller.remark:
-            warnings.emit(self._labeller.remark)
-
-    @property
-    def model(self) -> str:
-        """Name of the model that labels; empty without one."""
-        return self._labeller.model
-
-    @property
-    def reason(self) -> str:
-        """Why there are no labels; empty if a model labels."""
-        return "" if self._labeller.model else self._labeller.remark
-
-    @property
-    def frame(self) -> float:
-        """Duration of a frame, in [s]; 0 without a model."""
-        return self._labeller.length
-
-    @property
-    def labels(self) -> Mapping[str, int]:
-        """How many frames were labelled, by class."""
-        return dict(self._counts)
-
-    @property
-    def delays(self) -> Sequence[float]:
-        """From a frame's last sample to its label in the recording, in [s]."""
-        return tuple(self._delays)
+        self._camera: Camera | None = None
+        self._start: float | None = None  # time of the first sample
+        self._full = False  # whether plots show the last ten seconds, not the first
+        if self.labeller.remark:
+            warnings.emit(self.labeller.remark)
 
     @property
     def findings(self) -> tuple[Event, ...]:
         """The findings so far, as if the signal ended here."""
         return self._with_lasting(self._findings.events)
-
-    @property
-    def frames(self) -> int:
-        """How many frames were labelled."""
-        return self._findings.frames
 
     def work(self, buffer: SampleBuffer, *, ended: bool = False) -> None:
         """Show the samples that a buffer holds, and empty it; few may have to wait for others."""
@@ -153,20 +131,17 @@ class Worker:
         valid = np.asarray(np.isfinite(motion).all(axis=1))
         self._note_unknown(time, valid)
         motion = np.where(valid[:, None], motion, 0.0)
-        noise = nm.simplified(motion)  # of measured and desired velocities side by side
         if self._stream is not None:
             self._stream.push(float(time[0]), signals, valid, lost)
         edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(time)]
         for first, stop in pairwise(edges):  # labels first: their latency counts
             piece = slice(first, stop)
-            self._skip(int(lost[first]))
+            if lost[first]:
+                self._skip(int(lost[first]))
             self._label(time[piece], received[piece], motion[piece], valid[piece])
-            self._show_spectrum(time[piece], signals["velocity"][piece], valid[piece])
-            self._colour(time[piece], {name: rows[piece] for name, rows in signals.items()})
+            self._draw_piece(time[piece], valid[piece], {n: s[piece] for n, s in signals.items()})
         if self._sink.alive:
-            self._drawing.changes(self._lane.expire(self._now))
-            self._drawing.lines(time[valid], noise[valid], _rows(signals, valid), self._rate)
-            self._move(self._now, signals)
+            self._draw_batch(time, motion, valid, signals)
         self._check_limits(signals)
         self._unconfirmed += len(time)
         if self._sink.check_viewer():
@@ -188,7 +163,7 @@ class Worker:
 
     def finish(self) -> None:
         """Show what waits, and tell of findings that last to the end."""
-        self._labeller.finish()
+        self.labeller.finish()
         if self._stream is not None:
             self.levels = self._stream.finish()
             if self._stream.too_long:
@@ -197,95 +172,73 @@ class Worker:
         self._news.update(self.findings, float("inf"))
         if self._sink.alive:
             self._drawing.changes(self._lane.end())
-            if self._labeller.classes and self._contents is not None:
+            if self.labeller.classes and self._start is not None:
                 self._drawing.findings(self._now, self.findings, ())
-            if (columns := self._spectrogram.flush()) is not None:
-                self._drawing.spectrogram(columns)
             self._drawing.flush()
             if self._robot is not None:
                 self._robot.flush()
 
-    def _levels_of(
-        self, robot: str, joint_names: Sequence[str], *, floating: bool
-    ) -> LinkLevels | None:
-        """What colours the robot; nothing where its surface cannot be had."""
-        try:
-            return LinkLevels(robot, joint_names, self._rate, floating=floating)
-        except nm.NoiseModelError as error:
-            self._warnings.emit(f"The links are not coloured: {error}.")
-            return None
-
     def _lay_out(self, time: float, signals: Mapping[str, Array]) -> None:
         """Send the layout with the first sample, whose pose places the camera, and at 10 s."""
-        known = self._contents
-        if known is None:
-            camera = None
+        if self._start is None:
+            self._start = time
             if self._robot is not None:
                 pose = signals.get("base_pose")
                 first = None if pose is None else pose[0]
-                camera = self._robot.camera(signals["position"][0], first)
+                self._camera = self._robot.camera(signals["position"][0], first)
                 self._robot.colour(time, (), np.empty(0))
-            self._contents = Contents(
-                joints=self._drawing.plots,
-                camera=camera,
-                classes=self._drawing.classes,
-                links=self._links is not None,
-                rate=self._rate,
-                start=time,
-                full=False,
-            )
-            if self._labeller.classes:
+            if self.labeller.classes:
                 self._drawing.findings(time, (), ())
-        elif not known.full and time >= known.start + SHOWN:
-            self._contents = replace(known, full=True)
-        if self._contents is not known and self._contents is not None:
-            self._sink.recording.send_blueprint(layout(self._contents))
+        elif not self._full and time >= self._start + SHOWN:
+            self._full = True
+        else:
+            return
+        links = self._links is not None
+        layout = self._drawing.layout(self._start, self._camera, links=links, full=self._full)
+        self._sink.recording.send_blueprint(layout)
 
     def _skip(self, samples: int) -> None:
-        if samples:
-            self._labeller.skip(samples)
-            self._spectrogram.skip()
-            if self._links is not None:
-                self._links.skip()
-
-    def _show_spectrum(self, time: Array, velocity: Array, valid: Mask) -> None:
-        known = np.where(valid[:, None], velocity, 0.0)
-        columns = self._spectrogram.push(known, valid, float(time[-1]) + 1.0 / self._rate)
-        if columns is not None and self._sink.alive:
-            self._drawing.spectrogram(columns)
+        self.labeller.skip(samples)
+        self._spectrogram.skip()
+        if self._links is not None:
+            self._links.skip()
 
     def _label(self, time: Array, received: Array, motion: Array, valid: Mask) -> None:
         """Label and draw a stretch without missing samples."""
+        labels = self.labeller.push(motion, valid)
+        if labels is None or not len(labels):
+            return
         end = float(time[-1]) + 1.0 / self._rate
-        labels = self._labeller.push(motion, valid)
-        if labels is not None and len(labels):
-            # How far back in the stretch frames end; a lower rate lags behind.
-            back = np.rint((self._labeller.elapsed - labels.stop) * self._rate).astype(int)
-            shift = end - self._labeller.elapsed
-            labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
-            self._findings.add(labels)
-            self._shift = shift if self._shift is None else self._shift
-            told = self._with_lasting(self._findings.confirmed)
-            decided = min(self._findings.decided, self._labeller.decided + self._shift)
-            self._news.update(told, decided, float(labels.stop[-1]))
-            labels = replace(labels, label=labels.raw)
-            self._counts.update(labels.label.tolist())
-            changes = self._lane.take(labels)
-            if self._sink.alive:
-                self._drawing.labels(labels)
-                self._drawing.changes(changes)
-                last = len(received) - 1 - back
-                before = np.minimum(last, 0) / self._rate
-                delay = clocks.perf_counter() - received[np.maximum(last, 0)] - before
-                self._delays.extend(delay.tolist())
-                self._show_findings(end)
+        # How far back in the stretch frames end; a lower rate lags behind.
+        back = np.rint((self.labeller.elapsed - labels.stop) * self._rate).astype(int)
+        shift = end - self.labeller.elapsed
+        labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
+        self._findings.add(labels)
+        self._shift = shift if self._shift is None else self._shift
+        told = self._with_lasting(self._findings.confirmed)
+        decided = min(self._findings.decided, self.labeller.decided + self._shift)
+        self._news.update(told, decided, float(labels.stop[-1]))
+        labels = replace(labels, label=labels.raw)
+        self.counts.update(labels.label.tolist())
+        changes = self._lane.take(labels)
+        if self._sink.alive:
+            self._drawing.labels(labels)
+            self._drawing.changes(changes)
+            last = len(received) - 1 - back
+            before = np.minimum(last, 0) / self._rate
+            delay = clocks.perf_counter() - received[np.maximum(last, 0)] - before
+            self.delays.extend(delay.tolist())
+            found, latest = self.findings, end - 2 * self.labeller.hop
+            # One that reaches the latest frame lasts.
+            lasting = [event for event in found if event.stop >= latest]
+            self._drawing.findings(end, found, lasting)
 
     def _with_lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
         """Findings of the labels and of what lasts, on the clock of the samples."""
         shift = self._shift or 0.0
         lasting = (
             replace(each, start=each.start + shift, stop=each.stop + shift)
-            for each in self._labeller.lasting
+            for each in self.labeller.lasting
         )
         return merged(*events, *lasting)
 
@@ -295,11 +248,31 @@ class Worker:
         if self._on_finding is not None:
             self._on_finding(event, over)
 
-    def _show_findings(self, end: float) -> None:
-        """Show the findings so far; one that reaches the latest frame lasts."""
-        found = self.findings
-        latest = end - 2 * self._labeller.hop
-        self._drawing.findings(end, found, [event for event in found if event.stop >= latest])
+    def _draw_piece(self, time: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
+        """Draw the spectrogram and the levels of links of a stretch without missing samples."""
+        velocity = np.where(valid[:, None], signals["velocity"], 0.0)
+        columns = self._spectrogram.push(velocity, valid, float(time[-1]) + 1.0 / self._rate)
+        if not self._sink.alive:
+            return
+        self._drawing.spectrogram(*columns)
+        if self._links is not None and self._robot is not None:
+            for start, level in self._links.push(time, signals):
+                self._robot.colour(start, self._links.links, level)
+
+    def _draw_batch(
+        self, time: Array, motion: Array, valid: Mask, signals: Mapping[str, Array]
+    ) -> None:
+        """Draw the noise of measured and desired velocities side by side, the joints, the robot."""
+        self._drawing.changes(self._lane.expire(self._now))
+        rows = dict(signals)
+        if not valid.all():
+            time, motion = time[valid], motion[valid]
+            rows = {name: signal[valid] for name, signal in signals.items()}
+        self._drawing.lines(time, nm.simplified(motion), rows, len(valid) / self._rate)
+        if self._robot is not None:
+            pose = signals.get("base_pose")
+            last = None if pose is None else pose[-1]
+            self._robot.show(self._now, signals["position"][-1], last)
 
     def _check_limits(self, signals: Mapping[str, Array]) -> None:
         """Warn where the motion has been far beyond the limits of the robot for a second."""
@@ -310,19 +283,6 @@ class Worker:
                 self._watch = None
                 return
 
-    def _move(self, time: float, signals: Mapping[str, Array]) -> None:
-        if self._robot is None:
-            return
-        position, pose = signals["position"][-1], signals.get("base_pose")
-        last = None if pose is None else pose[-1]
-        if np.isfinite(position).all() and (last is None or np.isfinite(last).all()):
-            self._robot.show(time, position, last)
-
-    def _colour(self, time: Array, signals: Mapping[str, Array]) -> None:
-        if self._links is not None and self._robot is not None and self._sink.alive:
-            for step in self._links.push(time, signals):
-                self._robot.colour(step.time, self._links.links, step.level)
-
     def _note_unknown(self, time: Array, valid: Mask) -> None:
         if not valid.all():
             line = (
@@ -330,12 +290,6 @@ class Worker:
                 " such samples make no noise, frames with one have no label"
             )
             self._warnings.note("samples without noise", line, int((~valid).sum()))
-
-
-def _rows(signals: Mapping[str, Array], chosen: Mask) -> dict[str, Array]:
-    if chosen.all():
-        return dict(signals)
-    return {name: signal[chosen] for name, signal in signals.items()}
 
 
 BATCH = 0.05
@@ -513,12 +467,13 @@ class LiveSession:
     @property
     def summary(self) -> Summary:
         """What became of the samples so far."""
-        worker, buffer = self._worker, self._buffer
-        findings = worker.findings if worker else ()
-        samples = worker.samples + buffer.held if worker and buffer else 0
-        status = status_of(worker.frames if worker else 0, findings)
-        reason = (worker.reason if worker else "") or "no frame was labelled"
-        counts = self._warnings.counts
+        worker, buffer, counts = self._worker, self._buffer, self._warnings.counts
+        if worker is None or buffer is None:
+            return Summary(0, self._rate, "", {}, counts, (), self._sink.where)
+        labeller, findings = worker.labeller, worker.findings
+        samples = worker.samples + buffer.held
+        status = status_of(worker.counts.total(), findings)
+        reason = labeller.remark if not labeller.model else "no frame was labelled"
         dropped = {kind: counts[kind] for kind in DROPPED if kind in counts}
         if status is Status.OK and sum(dropped.values()) > MOST_DROPPED * max(samples, 1):
             status = Status.CANNOT_TELL
@@ -527,16 +482,16 @@ class LiveSession:
         return Summary(
             samples=samples,
             rate=self._rate,
-            model=worker.model if worker else "",
-            labels=worker.labels if worker else {},
+            model=labeller.model,
+            labels=dict(worker.counts),
             warnings=counts,
-            delays=worker.delays if worker else (),
+            delays=tuple(worker.delays),
             where=self._sink.where,
             status=status,
             findings=findings,
             reason=reason,
-            frame=worker.frame if worker else 0.0,
-            levels=worker.levels if worker else None,
+            frame=labeller.length,
+            levels=worker.levels,
         )
 
     def close(self) -> Summary:
@@ -582,7 +537,7 @@ class LiveSession:
         size = max(1, round(BATCH * self._rate))
         # A file's name is none that a reference knows.
         robot = "" if self._robot is None or Path(self._robot).suffix else self._robot
-        levels = LevelStream(tuple(names), self._rate, robot) if self._keep_levels else None
+        stream = LevelStream(tuple(names), self._rate, robot) if self._keep_levels else None
         worker = Worker(
             self._sink,
             rate=self._rate,
@@ -592,7 +547,7 @@ class LiveSession:
             library=for_robot(self._library, self._robot),
             warnings=self._warnings,
             watch=LimitWatch(names, self._robot) if self._robot else None,
-            levels=levels,
+            stream=stream,
             on_finding=self._on_finding,
         )
         if self._robot and "position" not in widths:
