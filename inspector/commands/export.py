@@ -21,34 +21,41 @@ class Labels(StrEnum):
     ANNOTATED = "annotated"
 
 
+Output = Annotated[
+    Path,
+    typer.Option(
+        "--output",
+        "-o",
+        help="The file to write: .mcap, .csv or .parquet; labels as .toml (NoisyTest), .csv or"
+        " .txt (Audacity); a run as .npz.",
+    ),
+]
+LabelsOption = Annotated[
+    Labels | None,
+    typer.Option("--labels", help="Write a label file of the findings or annotated blocks."),
+]
+Annotate = Annotated[
+    Path | None,
+    typer.Option("--annotate", help="Write the run with the labels of this file instead."),
+]
+Kind = Annotated[
+    str, typer.Option("--kind", help="Extended noise: normal, rms, mean, paper, A, B or C.")
+]
+Layouts = Annotated[
+    bool,
+    typer.Option("--layouts", help="Write layouts for Foxglove and PlotJuggler beside .mcap."),
+]
+
+
 def export(
     ctx: typer.Context,
     run: RunFile,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output",
-            "-o",
-            help="The file to write: .mcap, .csv or .parquet; labels as .toml (NoisyTest), .csv or"
-            " .txt (Audacity); a run as .npz.",
-        ),
-    ],
-    labels: Annotated[
-        Labels | None,
-        typer.Option("--labels", help="Write a label file of the findings or annotated blocks."),
-    ] = None,
-    annotate: Annotated[
-        Path | None,
-        typer.Option("--annotate", help="Write the run with the labels of this file instead."),
-    ] = None,
-    kind: Annotated[
-        str, typer.Option("--kind", help="Extended noise: normal, rms, mean, paper, A, B or C.")
-    ] = "normal",
+    output: Output,
+    labels: LabelsOption = None,
+    annotate: Annotate = None,
+    kind: Kind = "normal",
     model: ModelFiles = None,
-    layouts: Annotated[
-        bool,
-        typer.Option("--layouts", help="Write layouts for Foxglove and PlotJuggler beside .mcap."),
-    ] = False,
+    layouts: Layouts = False,
     overwrite: Overwrite = False,
 ) -> None:
     """Write noise, labels and scores for other tools.

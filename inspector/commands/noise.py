@@ -20,38 +20,45 @@ def _of_models(*names: str, **settings: object) -> object:
     return typer.Option(*names, rich_help_panel="Comparing noise models", **settings)  # type: ignore[arg-type]
 
 
+Runs = Annotated[
+    list[Path] | None,
+    typer.Argument(help="A run file or log; with --compare several.", show_default=False),
+]
+Kind = Annotated[
+    list[str] | None,
+    typer.Option("--kind", help="simplified, paper, A, B, C, mean, rms, normal; repeatable."),
+]
+Csv = Annotated[
+    Path | None, typer.Option("--csv", help="Write the noise over time, or all numbers.")
+]
+Compare = Annotated[
+    bool, _of_models("--compare", help="Compare noise models on run files with positions.")
+]
+Robots = Annotated[
+    str, _of_models("--robots", help="Compare them on robots that move: talos,go2 or all.")
+]
+Geometry = Annotated[
+    str,
+    _of_models("--geometry", callback=one_of(GEOMETRIES), help="visual, collision, hull or auto."),
+]
+Seed = Annotated[int, _of_models("--seed", min=0, help="Random seed of the generated motion.")]
+Save = Annotated[Path | None, _of_models("--save", help="Write a recording (.rrd).")]
+Picture = Annotated[
+    Path | None, _of_models("--picture", help="Write a PNG (needs the extra `report`).")
+]
+
+
 def noise(
     ctx: typer.Context,
-    runs: Annotated[
-        list[Path] | None,
-        typer.Argument(help="A run file or log; with --compare several.", show_default=False),
-    ] = None,
-    kind: Annotated[
-        list[str] | None,
-        typer.Option("--kind", help="simplified, paper, A, B, C, mean, rms, normal; repeatable."),
-    ] = None,
-    csv: Annotated[
-        Path | None, typer.Option("--csv", help="Write the noise over time, or all numbers.")
-    ] = None,
-    compare: Annotated[
-        bool, _of_models("--compare", help="Compare noise models on run files with positions.")
-    ] = False,
-    robots: Annotated[
-        str, _of_models("--robots", help="Compare them on robots that move: talos,go2 or all.")
-    ] = "",
-    geometry: Annotated[
-        str,
-        _of_models(
-            "--geometry", callback=one_of(GEOMETRIES), help="visual, collision, hull or auto."
-        ),
-    ] = "auto",
-    seed: Annotated[
-        int, _of_models("--seed", min=0, help="Random seed of the generated motion.")
-    ] = 0,
-    save: Annotated[Path | None, _of_models("--save", help="Write a recording (.rrd).")] = None,
-    picture: Annotated[
-        Path | None, _of_models("--picture", help="Write a PNG (needs the extra `report`).")
-    ] = None,
+    runs: Runs = None,
+    kind: Kind = None,
+    csv: Csv = None,
+    compare: Compare = False,
+    robots: Robots = "",
+    geometry: Geometry = "auto",
+    seed: Seed = 0,
+    save: Save = None,
+    picture: Picture = None,
     jobs: NumberOfJobs = 1,
     overwrite: Overwrite = False,
 ) -> None:

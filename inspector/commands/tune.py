@@ -17,59 +17,71 @@ class By(StrEnum):
     SUBSET_ACCURACY = "subset-accuracy"
 
 
+Output = Annotated[
+    Path,
+    typer.Option(
+        "--output",
+        "-o",
+        help="Results file, one line of JSON per point; resumes if it exists.",
+    ),
+]
+Validation = Annotated[
+    list[Path] | None,
+    typer.Option(help="Runs of a validation set, instead of folds; repeatable."),
+]
+Folds = Annotated[
+    int | None, typer.Option(min=2, help="Folds of the cross-validation.", show_default="5")
+]
+Profile = Annotated[
+    str,
+    typer.Option(
+        help="joints, norms, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
+        " paper-linear."
+    ),
+]
+Rate = Annotated[
+    float, typer.Option(min=1.0, help="Rate of the model in [Hz]; faster runs are decimated.")
+]
+Grid = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="paper, or a setting and its values: stride=224:1024:100, C=0.1:1000:x10,"
+        " gamma=1e-4,1e-3, bands=comb,adjacent; repeatable.",
+        show_default="paper",
+    ),
+]
+Criterion = Annotated[By, typer.Option(help="Ranks the points; the log-loss breaks ties.")]
+Train = Annotated[
+    Path | None,
+    typer.Option(help="Train the best point on all training runs, write the model."),
+]
+Picture = Annotated[
+    Path | None,
+    typer.Option(
+        help="Draw the accuracy along each setting around the best point, as PNG (needs the"
+        " extra `report`)."
+    ),
+]
+Rows = Annotated[int, typer.Option(min=1, help="Number of points to print.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel processes.")]
+
+
 def tune(
     training: Inputs,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output",
-            "-o",
-            help="Results file, one line of JSON per point; resumes if it exists.",
-        ),
-    ],
-    validation: Annotated[
-        list[Path] | None,
-        typer.Option(help="Runs of a validation set, instead of folds; repeatable."),
-    ] = None,
-    folds: Annotated[
-        int | None, typer.Option(min=2, help="Folds of the cross-validation.", show_default="5")
-    ] = None,
+    output: Output,
+    validation: Validation = None,
+    folds: Folds = None,
     part: InPart = "all",
-    profile: Annotated[
-        str,
-        typer.Option(
-            help="joints, norms, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
-            " paper-linear."
-        ),
-    ] = "noisytest-rbf",
-    rate: Annotated[
-        float, typer.Option(min=1.0, help="Rate of the model in [Hz]; faster runs are decimated.")
-    ] = 10000.0,
-    grid: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="paper, or a setting and its values: stride=224:1024:100, C=0.1:1000:x10,"
-            " gamma=1e-4,1e-3, bands=comb,adjacent; repeatable.",
-            show_default="paper",
-        ),
-    ] = None,
-    criterion: Annotated[
-        By, typer.Option(help="Ranks the points; the log-loss breaks ties.")
-    ] = By.BALANCED_ACCURACY,
-    train: Annotated[
-        Path | None,
-        typer.Option(help="Train the best point on all training runs, write the model."),
-    ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            help="Draw the accuracy along each setting around the best point, as PNG (needs the"
-            " extra `report`)."
-        ),
-    ] = None,
-    rows: Annotated[int, typer.Option(min=1, help="Number of points to print.")] = 10,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel processes.")] = 1,
+    profile: Profile = "noisytest-rbf",
+    rate: Rate = 10000.0,
+    grid: Grid = None,
+    criterion: Criterion = By.BALANCED_ACCURACY,
+    train: Train = None,
+    picture: Picture = None,
+    rows: Rows = 10,
+    as_json: AsJson = False,
+    jobs: Jobs = 1,
     dask: Dask = "",
     overwrite: Overwrite = False,
 ) -> None:
