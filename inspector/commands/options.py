@@ -170,50 +170,63 @@ PackageRoot = Annotated[
 ]
 
 
+Robot = Annotated[
+    str | None,
+    _of_log("--robot", help='Robot name (see `inspector robots`), URDF or MJCF, or "none".'),
+]
+Rate = Annotated[
+    float | None, _of_log("--rate", min=1.0, help="Rate of the log in [Hz], if it is known.")
+]
+Force = Annotated[
+    bool, _of_log("--force", help="Take --rate even if positions and velocities contradict it.")
+]
+Map = Annotated[
+    list[str] | None,
+    _of_log("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
+]
+Mapping = Annotated[Path | None, _of_log("--mapping", help="A saved mapping (TOML).")]
+Joints = Annotated[str | None, _of_log("--joints", help="Names of the columns of arrays: a,b,c.")]
+Columns = Annotated[
+    str | None,
+    _of_log("--columns", help="Names of a CSV's columns, without a header: time,q1,q2."),
+]
+Units = Annotated[
+    str | None, _of_log("--units", help="Unit of angles: radians, degrees or normalised.")
+]
+Degrees = Annotated[bool, _of_log("--degrees", help="Angles are in degrees.")]
+Topic = Annotated[
+    list[str] | None, _of_log("--topic", help="Read this topic of a bag; repeatable.")
+]
+Episode = Annotated[
+    list[str] | None, _of_log("--episode", help="Read this episode of a data set; repeatable.")
+]
+Desired = Annotated[
+    Path | None,
+    _of_log("--desired", help="Another log, with the desired motion on its own clock."),
+]
+Offset = Annotated[
+    float | None,
+    _of_log("--offset", help="Add to the timestamps of --desired, in seconds; else estimated."),
+]
+
+
 def log_options(
-    robot: Annotated[
-        str | None,
-        _of_log("--robot", help='Robot name (see `inspector robots`), URDF or MJCF, or "none".'),
-    ] = None,
+    robot: Robot = None,
     package_root: PackageRoot = None,
     max_unpacked: MaxUnpacked = None,
     limit: Limits = None,
-    rate: Annotated[
-        float | None, _of_log("--rate", min=1.0, help="Rate of the log in [Hz], if it is known.")
-    ] = None,
-    force: Annotated[
-        bool, _of_log("--force", help="Take --rate even if positions and velocities contradict it.")
-    ] = False,
-    map_: Annotated[
-        list[str] | None,
-        _of_log("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
-    ] = None,
-    mapping: Annotated[Path | None, _of_log("--mapping", help="A saved mapping (TOML).")] = None,
-    joints: Annotated[
-        str | None, _of_log("--joints", help="Names of the columns of arrays: a,b,c.")
-    ] = None,
-    columns: Annotated[
-        str | None,
-        _of_log("--columns", help="Names of a CSV's columns, without a header: time,q1,q2."),
-    ] = None,
-    units: Annotated[
-        str | None, _of_log("--units", help="Unit of angles: radians, degrees or normalised.")
-    ] = None,
-    degrees: Annotated[bool, _of_log("--degrees", help="Angles are in degrees.")] = False,
-    topic: Annotated[
-        list[str] | None, _of_log("--topic", help="Read this topic of a bag; repeatable.")
-    ] = None,
-    episode: Annotated[
-        list[str] | None, _of_log("--episode", help="Read this episode of a data set; repeatable.")
-    ] = None,
-    desired: Annotated[
-        Path | None,
-        _of_log("--desired", help="Another log, with the desired motion on its own clock."),
-    ] = None,
-    offset: Annotated[
-        float | None,
-        _of_log("--offset", help="Add to the timestamps of --desired, in seconds; else estimated."),
-    ] = None,
+    rate: Rate = None,
+    force: Force = False,
+    map_: Map = None,
+    mapping: Mapping = None,
+    joints: Joints = None,
+    columns: Columns = None,
+    units: Units = None,
+    degrees: Degrees = False,
+    topic: Topic = None,
+    episode: Episode = None,
+    desired: Desired = None,
+    offset: Offset = None,
 ) -> Any:
     """Options on reading logs, the same in all commands that read logs.
 
