@@ -95,8 +95,8 @@ def diff(
     from inspector import assets
     from inspector.library import load_library
     from inspector.reference.difference import Gate, difference
-    from inspector.reference.output import FORMATS
     from inspector.report.cases import published
+    from inspector.report.difference import FORMATS
 
     files = files_of(write or [], list(Format), overwrite=overwrite)
     if report:
@@ -151,7 +151,7 @@ def _report(
     from inspector.compare.pair import compare
     from inspector.compare.recording import write
     from inspector.reference.difference import picture
-    from inspector.reference.output import as_json
+    from inspector.report.difference import as_json
     from noisemodel.files import replacing
 
     with replacing(folder / NUMBERS, overwrite=overwrite) as temporary:
