@@ -36,6 +36,7 @@ VERDICTS: dict[str, Color] = {
 """Behind a verdict in white letters; the words say the same."""
 NOISE: Color = (160, 196, 255)
 LEVEL: Color = (240, 228, 140)
+BAND: Color = (150, 156, 168)
 THRESHOLD: Color = (235, 235, 235)
 """Alarm threshold, ticks and gaps."""
 SERIES: tuple[Color, ...] = (

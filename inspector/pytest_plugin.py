@@ -251,7 +251,7 @@ class Noise:
         recording, picture = self._artefacts(stem if self._count < 2 else f"{stem}-{self._count}")
         write(analysis, recording, overwrite=True)
         if picture and comparison is not None:
-            from inspector.reference.difference import picture as over_reference
+            from inspector.report.picture import over_reference
 
             picture.write_bytes(over_reference(comparison, f"{shown}: {comparison}"))
         elif picture:

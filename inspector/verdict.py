@@ -52,6 +52,8 @@ SETTINGS = ("how logs are read", "--unknown", "--report", "--reference")
 """The first settings of a header; what follows are files that options name."""
 MAX_BYTES = 256 * 2**20
 """Most bytes of a state file that is read: those of some hundred thousand runs."""
+DRAWING = 0.4
+"""About how long a picture takes, in [s]."""
 LONGEST_LINE = 2**16
 """Characters of a line that are looked at."""
 
@@ -487,8 +489,8 @@ def classify_file(
     *,
     reading: Reading | None = None,
     unknown: Unknown = Unknown.FINDING,
-    draw: Callable[[Analysis, Path], Path] | None = None,
-    reference: Callable[[Analysis, Verdict], Verdict] | None = None,
+    draw: Callable[[Analysis, Verdict, Any], Path] | None = None,
+    reference: Callable[[Analysis, Verdict], tuple[Verdict, Any]] | None = None,
 ) -> Verdict:
     """Classify one file; errors become part of the verdict.
 
@@ -496,8 +498,10 @@ def classify_file(
         path: A run file, any log that `inspector import` reads, or one of NoisyTest's two-column
             logs (``*.log``).
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
-        draw: Draws a picture of an analysis of a file and gives its path, if one is wanted.
-        reference: Adds the evidence of a reference, see `inspector.reference.verdicts`.
+        draw: Draws a picture of a file's analysis with its verdict and comparison, which is None
+            without a reference, and gives its path.
+        reference: Adds the evidence of a reference and gives the comparison with it, see
+            `inspector.reference.verdicts`.
     """
     source = path if isinstance(path, Source) else Source(path)
     begun = perf_counter()
@@ -508,12 +512,12 @@ def classify_file(
             opened = open_source(source, reading)
             analysis = analyse(opened.run, library, unknown=unknown)
             analysis = replace(analysis, assumed=opened.assumed)
-        verdict = Verdict.of(source.shown, analysis)
+        verdict, comparison = Verdict.of(source.shown, analysis), None
         if reference is not None:
-            verdict = reference(analysis, verdict)
+            verdict, comparison = reference(analysis, verdict)
         if draw is not None:
             try:
-                verdict = replace(verdict, picture=draw(analysis, source.shown))
+                verdict = replace(verdict, picture=draw(analysis, verdict, comparison))
             except (OutputError, OSError) as error:
                 verdict = replace(verdict, lost=(str(error),))
     except EXPECTED as error:
@@ -536,8 +540,8 @@ def classify_files(
     *,
     reading: Reading | None = None,
     unknown: Unknown = Unknown.FINDING,
-    draw: Callable[[Analysis, Path], Path] | None = None,
-    reference: Callable[[Analysis, Verdict], Verdict] | None = None,
+    draw: Callable[[Analysis, Verdict, Any], Path] | None = None,
+    reference: Callable[[Analysis, Verdict], tuple[Verdict, Any]] | None = None,
     jobs: Jobs = 1,
     resume: Path | None = None,
 ) -> Iterator[Verdict]:
@@ -545,7 +549,7 @@ def classify_files(
 
     Args:
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
-        draw: Draws a picture of an analysis, see `classify_file`; importable for several jobs.
+        draw: Draws a picture, see `classify_file`; importable for several jobs.
         reference: Adds the evidence of a reference, see `classify_file`.
         jobs: How many to work on at once, or the address of a Dask scheduler. A run with which a
             worker dies is an internal error.
@@ -560,8 +564,9 @@ def classify_files(
         reference=reference,
     )
     end = partial(_died, unknown=unknown)
+    each = DRAWING if draw is not None else 0.0
     if resume is None:
-        yield from in_order(one, paths, jobs=jobs, died=end, work=work_of(paths))
+        yield from in_order(one, paths, jobs=jobs, died=end, work=work_of(paths, each))
         return
     reading = reading or Reading()
     beside = (reading.desired, Path(str(reading.options.robot or "")))
@@ -583,7 +588,7 @@ def classify_files(
                 yield known
         work = partial(_with_digest, one=one)
         for _, (verdict, sha256) in as_done(
-            work, todo, jobs=jobs, died=lambda run: (end(run), ""), work=work_of(todo)
+            work, todo, jobs=jobs, died=lambda run: (end(run), ""), work=work_of(todo, each)
         ):
             state.add(verdict, sha256)
             yield verdict
@@ -601,10 +606,14 @@ def _died(path: Path | Source, unknown: Unknown) -> Verdict:
     return Verdict(shown, Status.INTERNAL_ERROR, message=message, unknown=unknown)
 
 
-def work_of(paths: Sequence[Path | Source]) -> float:
-    """About how long runs take, in [s]: one core does 50 MB/s of samples that are not packed."""
+def work_of(paths: Sequence[Path | Source], each: float = 0.0) -> float:
+    """About how long runs take, in [s]: one core does 50 MB/s of samples that are not packed.
+
+    Args:
+        each: What comes to it for each run, in [s].
+    """
     files = (each.path if isinstance(each, Source) else each for each in paths)
-    return sum(file.stat().st_size for file in files if file.is_file()) / 50e6
+    return sum(file.stat().st_size for file in files if file.is_file()) / 50e6 + each * len(paths)
 
 
 def _has_header(path: Path) -> bool:

@@ -238,7 +238,7 @@ def _page(
     return [(str(folder), lambda verdicts: index.write(verdicts, folder))]
 
 
-def _drawing(folder: Path | None) -> "Callable[[Analysis, Path], Path] | None":
+def _drawing(folder: Path | None) -> "Callable[[Analysis, Verdict, Any], Path] | None":
     """What draws each run into the folder of the report."""
     if folder is None:
         return None

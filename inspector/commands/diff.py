@@ -150,8 +150,8 @@ def _report(
     """Write the worst scenario as recording and picture, and all numbers."""
     from inspector.compare.pair import compare
     from inspector.compare.recording import write
-    from inspector.reference.difference import picture
     from inspector.report.difference import as_json
+    from inspector.report.picture import over_reference
     from noisemodel.files import replacing
 
     with replacing(folder / NUMBERS, overwrite=overwrite) as temporary:
@@ -164,4 +164,4 @@ def _report(
     write(pair, folder / RECORDING, overwrite=overwrite)
     with replacing(folder / PICTURE, overwrite=overwrite) as temporary:
         title = f"{row.name}: {row.outcome}, {row.reason}; {after.name}"
-        temporary.write_bytes(picture(row.worst, title))
+        temporary.write_bytes(over_reference(row.worst, title))

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from inspector.library import Library
     from inspector.logs.read import Opened, Reading
     from inspector.reference.judging import Comparison
+    from inspector.verdict import Verdict
 
 SUFFIXES = ("", ".rrd", ".png", ".html")
 """Of what is written; without a suffix a recording."""
@@ -172,13 +173,12 @@ def _check(paths: list[Path], target: Path, request: Request) -> None:
 
 def _picture(run: Path, output: Path, request: Request) -> None:
     """Write a PNG of what the viewer shows, without a display."""
-    from inspector.analysis import analyse_file
     from inspector.recording import picture as screenshot
     from inspector.recording.run import write
     from inspector.sound import worst_time
 
     screenshot.require()
-    points, at, kind = screenshot.parse_size(request.size), request.at, request.links
+    points, at = screenshot.parse_size(request.size), request.at
     with TemporaryDirectory() as folder:
         recording, seconds = run, at or 0.0
         if run.suffix != ".rrd":
@@ -188,10 +188,10 @@ def _picture(run: Path, output: Path, request: Request) -> None:
                 raise typer.BadParameter(
                     f"--at {at:g}: the run lasts from {first:.2f} s to {last:.2f} s"
                 )
-            found = analyse_file(source, request.library, links=bool(kind), kind=kind)
+            found, _, beside = _analysed(source, request)
             recording = Path(folder) / "run.rrd"
             seconds = worst_time(found) if at is None else at
-            write(found, recording, floor=request.floor, beside=_beside(source, request, found))
+            write(found, recording, floor=request.floor, beside=beside)
         complaints = screenshot.shoot(
             recording, output, seconds, size=points, overwrite=request.overwrite
         )
@@ -202,32 +202,22 @@ def _picture(run: Path, output: Path, request: Request) -> None:
 
 def _page(run: Path, output: Path, request: Request) -> None:
     """Write one HTML page about a run: pictures, tables, sound."""
-    from datetime import date
-
-    from inspector.analysis import analyse_file, headline
     from inspector.audit import text
-    from inspector.reference.verdicts import References
     from inspector.report import html
-    from inspector.verdict import Verdict
 
     html.require()
-    kind, source = request.links, opened(run, request.reading)
-    found = analyse_file(source, request.library, links=bool(kind), kind=kind)
+    found, verdict, beside = _analysed(opened(run, request.reading), request)
     assert found.audit is not None
-    verdict, told = None, found.headline
-    if request.reference is not None:
-        beside = References.found([run], request.reference, request.reading)
-        verdict = beside.judge(beside(found, Verdict.of(run, found)), None, date.today())
-        told = headline(verdict.status, verdict.failing, found.reason)
     html.write(
         found,
         output,
         audit=text(found.name, found.audit),
         verdict=verdict,
+        beside=beside,
         overwrite=request.overwrite,
         floor=request.floor,
     )
-    typer.echo(f"{output}: {told} ({output.stat().st_size / 1e6:.1f} MB)")
+    typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
 
 
 def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: bool) -> None:
@@ -275,40 +265,44 @@ def _read(paths: list[Path], reading: "Reading") -> list["Opened"]:
     return found
 
 
-def _beside(run: "Opened", request: Request, found: "Analysis") -> "Comparison | None":
-    """A run beside its reference; None without one."""
-    if request.reference is None:
-        return None
-    from inspector.reference.judging import compare
-    from inspector.reference.levels import levels
-    from inspector.reference.store import Reference, scenario_of
+def _analysed(
+    run: "Opened", request: Request
+) -> "tuple[Analysis, Verdict | None, Comparison | None]":
+    """A run with what was found in it, beside its reference if there is one."""
+    from datetime import date
 
-    path = run.source.shown
-    own = levels(found.run, name=scenario_of(found.run, path), file=str(path))
-    return compare(own, Reference.load(request.reference, request.reading).scenarios)
+    from inspector.analysis import analyse_file
+    from inspector.reference.verdicts import References, seen
+    from inspector.verdict import Verdict
+
+    kind, path = request.links, run.source.shown
+    found = analyse_file(run, request.library, links=bool(kind), kind=kind, terms=request.terms)
+    if request.reference is None:
+        return found, None, None
+    references = References.found([path], request.reference, request.reading)
+    verdict, beside = references(found, Verdict.of(path, found))
+    verdict = references.judge(verdict, None, date.today())
+    return seen(found, verdict), verdict, beside
 
 
 def _one(runs: list["Opened"], target: Path, request: Request) -> float:
     """Write the recording of a run; returns the time of its worst moment, in [s]."""
-    from inspector.analysis import analyse_file
     from inspector.recording.run import write
-    from inspector.report.markdown import sentence
+    from inspector.report import findings, markdown
     from inspector.sound import of_recording, worst_time
 
-    (run,), kind = runs, request.links
-    found = analyse_file(run, request.library, links=bool(kind), kind=kind, terms=request.terms)
-    beside, sound = _beside(run, request, found), of_recording(found)
-    floor, overwrite = request.floor, request.overwrite
+    (run,) = runs
+    found, verdict, beside = _analysed(run, request)
+    floor, overwrite, sound = request.floor, request.overwrite, of_recording(found)
     write(found, target, overwrite=overwrite, sound=sound, floor=floor, beside=beside)
     typer.echo(f"{run.source.shown}: {found.headline}")
-    for event in found.findings:
-        typer.echo(f"  {sentence(found, event)}")
-    if beside is not None:
-        typer.echo(f"  beside the reference: {beside}")
-        for each in (*beside.exceedances, *beside.remarks):
-            typer.echo(f"  {each}")
-    for remark in found.remarks:
-        typer.echo(f"  {remark}")
+    if verdict is None:
+        lines = [markdown.sentence(found, event) for event in found.findings]
+    else:
+        lines = [*findings.failing(verdict), *findings.excused(verdict)]
+        lines += [f"beside {verdict.beside.path}: {verdict.beside.words}"] if verdict.beside else []
+    for line in (*lines, *found.remarks):
+        typer.echo(f"  {line}")
     return worst_time(found)
 
 

@@ -320,9 +320,11 @@ class Curve:
     between: tuple[float, float]
 
 
-def log_curves(recording: rr.RecordingStream, analysis: Analysis) -> list[Curve]:
-    """Log the noise, its level above 10 Hz, and the probability of a failure if there is one."""
-    curves = [_log_noise(recording, analysis), _log_level(recording, analysis)]
+def log_curves(
+    recording: rr.RecordingStream, analysis: Analysis, beside: Comparison | None = None
+) -> list[Curve]:
+    """Log the noise, its level and that of repetitions, and the probability of a failure."""
+    curves = [_log_noise(recording, analysis), _log_level(recording, analysis, beside)]
     if analysis.labels is not None and analysis.alarm is not None:
         curves.append(_log_probability(recording, analysis, analysis.alarm))
     for curve in curves:
@@ -358,11 +360,18 @@ def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> Curve:
     return Curve(NOISE, "/noise", between)
 
 
-def _log_level(recording: rr.RecordingStream, analysis: Analysis) -> Curve:
-    between = (LOW_DB, HIGH_DB)
+def _log_level(
+    recording: rr.RecordingStream, analysis: Analysis, beside: Comparison | None
+) -> Curve:
+    between, lowest = (LOW_DB, HIGH_DB), 10.0
     time, level = analysis.noise_level
     log_shades(recording, "/level/finding", analysis, between)
-    names = ["noise above 10 Hz [dB re 1 rad/s]"]
+    if beside is not None:
+        time, level, lowest = beside.time, beside.noise[:, None], beside.octaves[0][0]
+        names = [f"{each} repetition [dB re 1 rad/s]" for each in ("quietest", "loudest")]
+        path, band = "/level/repetitions", [colors.BAND, colors.BAND]
+        axes.log_lines(recording, path, time, beside.band, names=names, colours=band)
+    names = [f"noise above {lowest:g} Hz [dB re 1 rad/s]"]
     path = "/level/noise"
     axes.log_lines(recording, path, time, level, names=names, colours=[colors.LEVEL])
     span = HIGH_DB - LOW_DB
@@ -370,7 +379,7 @@ def _log_level(recording: rr.RecordingStream, analysis: Analysis) -> Curve:
         Label((mark - LOW_DB) / span, axes.written(mark), 44.0)
         for mark in (-60.0, -40.0, -20.0, 0.0)
     ]
-    title = Label(0.62, "level above\n10 Hz [dB re\n1 rad/s]", -20.0)
+    title = Label(0.62, f"level above\n{lowest:g} Hz [dB re\n1 rad/s]", -20.0)
     axes.log_left(recording, LEVEL, [title, *marks])
     peak = float(np.nanmax(level, initial=LOW_DB))
     place = min(max((peak - LOW_DB) / span, 0.05), 0.85)
@@ -576,10 +585,8 @@ CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
 
 def log_over(recording: rr.RecordingStream, beside: Comparison) -> Panel:
     """Log by how much each joint is louder than its reference: the eight that are most."""
-    over = beside.by_joint
-    peaks = np.nan_to_num(over, nan=-np.inf).max(axis=0)
-    which = np.sort(np.argsort(-peaks, kind="stable")[:SHOWN])
-    own, shown = [beside.joints[index] for index in which], over[:, which].T
+    which = beside.loudest(SHOWN)
+    own, shown = [beside.joints[place] for place in which], beside.by_joint[:, which].T
     panel = Panel("over", STRIP_ROW * len(own) + axes.AXIS)
     rgba = CHANGE.colours(np.nan_to_num(shown, nan=0.0), shades=SHADES)
     rgba[np.isnan(shown)] = axes.EMPTY

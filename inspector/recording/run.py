@@ -108,7 +108,8 @@ def _log(
     run, links, moments, seen = analysis.run, analysis.links, worst(analysis), None
     axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
     strips = []
-    if beside is not None and len(beside.time) and beside.joints:
+    beside = None if beside is None or beside.empty else beside
+    if beside is not None:
         strips.append(("Over the reference", panels.log_over(recording, beside)))
     if (panel := panels.log_joint_levels(recording, analysis)) is not None:
         strips.append(("Joints above 10 Hz", panel))
@@ -119,7 +120,7 @@ def _log(
         (seen,) = framing.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
         strips.append(("Links above 10 Hz", panels.log_links(recording, tree, analysis, links)))
     shown_classes = panels.log_classes(recording, analysis)
-    curves = panels.log_curves(recording, analysis)
+    curves = panels.log_curves(recording, analysis, beside)
     joint = worst_joint(analysis)
     fast = worst_signal(analysis, joint)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)

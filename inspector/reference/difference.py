@@ -5,7 +5,7 @@ scenario depends neither on the order of scenarios nor on their number.
 """
 
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
@@ -436,38 +436,3 @@ def _findings(
             named = LOUDER if there and kind == NEW else kind
             found.append(Finding(named, path, event, known.db, known.level, known))
     return found
-
-
-def picture(comparison: Comparison, title: str) -> bytes:
-    """Draw how much louder a run is than its reference, by joint and time, as a PNG."""
-    import io
-
-    from matplotlib.figure import Figure
-
-    joints, time = comparison.joints, comparison.time
-    figure = Figure(figsize=(9.6, 1.8 + 0.26 * len(joints)), dpi=120, layout="constrained")
-    axes = figure.subplots()
-    image = axes.pcolormesh(
-        time,
-        range(len(joints)),
-        comparison.by_joint.T,
-        cmap="RdBu_r",
-        vmin=-12.0,
-        vmax=12.0,
-        shading="nearest",
-    )
-    for each in comparison.exceedances:
-        place = joints.index(each.joint)
-        axes.plot([each.start, each.stop], [place, place], color="#24292f", lw=1.5)
-        axes.plot(each.peak, place, "o", color="#24292f", markersize=4)
-    axes.set_yticks(range(len(joints)), joints, parse_math=False)
-    axes.invert_yaxis()
-    axes.set_xlabel("time [s]")
-    axes.set_title(title, fontsize=9, loc="left", parse_math=False)
-    figure.colorbar(image, ax=axes, pad=0.01, label="over the reference [dB]")
-    file = io.BytesIO()
-    figure.savefig(file, format="png", metadata={"Software": None})
-    return file.getvalue()
-
-
-Writer = Callable[[Difference], str]

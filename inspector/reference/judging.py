@@ -245,6 +245,8 @@ class Comparison:
         exceedances: Stretches that are louder, in order of time.
         quieter: By how much the run is quieter than each repetition, in [dB]; 0 if it is not.
         slope: Speed of the run over that of the repetitions; NaN without.
+        band: Level of the noise of the quietest and of the loudest repetition at each frame, shape
+            (frames, 2), in [dB re 1 rad/s]; NaN without.
         remarks: What is not compared, and why, a sentence each.
     """
 
@@ -260,7 +262,18 @@ class Comparison:
     exceedances: tuple[Exceedance, ...]
     quieter: float = 0.0
     slope: float = float("nan")
-    remarks: tuple[str, ...] = field(default=())
+    band: Array = field(default_factory=lambda: np.empty((0, 2)))
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing can be compared."""
+        return not len(self.time) or not self.joints or not self.octaves
+
+    @property
+    def noise(self) -> Array:
+        """Level of the run's noise in the joints and octaves that are compared, as in the band."""
+        return _noise(_view(self.run, self.joints, self.octaves))
 
     @property
     def time(self) -> Array:
@@ -274,6 +287,11 @@ class Comparison:
         A heat map of it shows where the run is louder than its reference.
         """
         return _largest(self.over.reshape(*self.over.shape[:2], -1))
+
+    def loudest(self, count: int) -> list[int]:
+        """Places of the joints that are most over the reference, in their order."""
+        peaks = np.nan_to_num(self.by_joint, nan=-np.inf).max(axis=0, initial=-np.inf)
+        return sorted(np.argsort(-peaks, kind="stable")[:count].tolist())
 
     @property
     def worst(self) -> float:
@@ -317,7 +335,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     score = np.full(frames, np.nan)
     margins: dict[Kind, Margin] = {}
     matched: list[Scenario] = []
-    quieter, slope, count = 0.0, float("nan"), 0
+    quieter, slope, count, band = 0.0, float("nan"), 0, np.full((frames, 2), np.nan)
     if frames and joints and octaves:
         matched, told = _matching(run, known, joints)
         remarks += told
@@ -331,6 +349,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
             margins[Kind.REPETITIONS] = margin_of(scores, count)
             slope = float(np.nanmedian([each.slope for each in aligned]))
             quieter = _quieter(mine, references, aligned, joints, octaves)
+            band = _band(references, aligned, joints, octaves)
         left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
         others = [each for s in known if s not in matched for each in s.repetitions]
         if len(left) and (others or references):
@@ -354,6 +373,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
         _exceedances(run, joints, octaves, over, score, kind, margins),
         quieter,
         slope,
+        band,
         tuple(remarks),
     )
 
@@ -617,6 +637,27 @@ def _quieter(
         margins.append(_top(scores_of(over)))
     known = [each for each in margins if np.isfinite(each)]
     return max(0.0, min(known)) if known else 0.0
+
+
+def _noise(level: NDArray[np.float32]) -> Array:
+    """Level of the velocities of all joints in all octaves, shape (frames,); NaN where none is."""
+    power = np.nansum(10.0 ** (level[:, :, 0].reshape(len(level), -1) / 10), axis=1)
+    return np.asarray(10 * np.log10(np.where(power > 0.0, power, np.nan)))
+
+
+def _band(
+    references: Sequence[Levels],
+    aligned: Sequence[Aligned],
+    joints: Sequence[str],
+    octaves: Sequence[tuple[float, float]],
+) -> Array:
+    """Quietest and loudest repetition at each frame of the run, shape (frames, 2)."""
+    low = high = np.full(len(aligned[0].frame), np.nan)
+    for each, path in zip(references, aligned, strict=True):
+        noise = _noise(_view(each, joints, octaves))[path.frame]
+        noise[path.residual > RESIDUAL] = np.nan
+        low, high = np.fmin(low, noise), np.fmax(high, noise)
+    return np.stack((low, high), axis=1)
 
 
 def _exceedances(

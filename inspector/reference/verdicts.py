@@ -60,18 +60,18 @@ class References:
             {path: Reference.load(path, reading) for path in dict.fromkeys(known.values())}, known
         )
 
-    def __call__(self, analysis: Analysis, verdict: Verdict) -> Verdict:
-        """Add the evidence of the reference to the verdict on a run."""
+    def __call__(self, analysis: Analysis, verdict: Verdict) -> tuple[Verdict, Comparison | None]:
+        """Add the evidence of the reference to the verdict on a run, and compare them."""
         path = self.of.get(verdict.path)
         if path is None or analysis.audit is None:
-            return verdict
+            return verdict, None
         reference = self.loaded[path]
         name = self.names.get(verdict.path, "") or scenario_of(analysis.run, verdict.path)
         if not self.names and reference.named(name) is None:
             name = scenario_of(analysis.run, verdict.path, _root(verdict.path, path))
         run = levels(analysis.run, name=name, file=str(verdict.path))
         comparison = compare(run, reference.scenarios)
-        return beside(verdict, comparison, reference, analysis.labels)
+        return beside(verdict, comparison, reference, analysis.labels), comparison
 
     def __str__(self) -> str:
         """What a batch that resumes must find unchanged: the levels of each reference."""
@@ -230,6 +230,13 @@ def beside(
         scenario=verdict.scenario or comparison.run.name,
         orders={event: found for event, found in verdict.orders.items() if event in evidence},
     )
+
+
+def seen(analysis: Analysis, verdict: Verdict) -> Analysis:
+    """The analysis with the findings that are left beside a reference, as pictures show it."""
+    left = [event for event in verdict.failing if event in verdict.evidence]
+    found = tuple(event for event in left if not verdict.evidence[event].excused)
+    return replace(analysis, status=verdict.status, findings=found, spans=found)
 
 
 def _known(value: float) -> float | None:

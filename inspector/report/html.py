@@ -3,7 +3,7 @@
 import re
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -12,6 +12,7 @@ import numpy as np
 
 from inspector.analysis import Analysis
 from inspector.errors import InspectorError
+from inspector.reference.judging import Comparison
 from inspector.report.findings import excused
 from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
 from inspector.sound import clip, worst_time
@@ -55,6 +56,7 @@ def write(
     *,
     audit: str = "",
     verdict: Verdict | None = None,
+    beside: Comparison | None = None,
     overwrite: bool = False,
     floor: float | None = None,
 ) -> None:
@@ -63,12 +65,13 @@ def write(
     Args:
         analysis: A run with what was found in it.
         path: The file to write, by convention ``*.html``.
-        verdict: The verdict beside a reference, which replaces that of the analysis.
+        verdict: The verdict beside a reference; None without.
+        beside: How the run compares with the reference; None without.
         overwrite: Whether a file that exists may be replaced.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
     require()
-    text = page(analysis, audit=audit, verdict=verdict, floor=floor)
+    text = page(analysis, audit=audit, verdict=verdict, beside=beside, floor=floor)
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -78,20 +81,19 @@ def page(
     *,
     audit: str = "",
     verdict: Verdict | None = None,
+    beside: Comparison | None = None,
     floor: float | None = None,
 ) -> str:
     """Write the page of an inspected run.
 
     Args:
         analysis: A run with what was found in it.
-        verdict: The verdict beside a reference, which replaces that of the analysis.
+        verdict: The verdict beside a reference; None without.
+        beside: How the run compares with the reference; None without.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s].
     """
     from inspector.report.picture import picture
 
-    if verdict is not None:
-        failing = verdict.failing
-        analysis = replace(analysis, status=verdict.status, findings=failing, spans=failing)
     html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
     add_text(body, "p", spoken(analysis.headline), "verdict")
@@ -104,8 +106,8 @@ def page(
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
         _add_list(body, "Does not count", excused(verdict))
     add_text(body, "h2", "Over time")
-    image = f"data:image/png;base64,{_encoded(picture(analysis, floor=floor))}"
-    ET.SubElement(body, "img", src=image, alt=_described(analysis))
+    image = f"data:image/png;base64,{_encoded(picture(analysis, beside, floor=floor))}"
+    ET.SubElement(body, "img", src=image, alt=_described(analysis, beside))
     _add_sound(body, analysis)
     for table in parts(analysis):
         _add_table(body, table)
@@ -201,9 +203,11 @@ def add_text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
     element.text = re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]", "\ufffd", text)
 
 
-def _described(analysis: Analysis) -> str:
+def _described(analysis: Analysis, beside: Comparison | None) -> str:
     """What the picture shows, for readers without it."""
     rows = ["classes", "noise", "its level above 10 Hz", "probability of a failure"]
+    if beside is not None:
+        rows[2:] = ["its level and that of the repetitions", "joints over the reference"]
     rows += ["spectrogram of the worst joint", "levels of joints"]
     rows += ["levels of links"] if analysis.links is not None else []
     return f"Over {analysis.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"

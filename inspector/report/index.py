@@ -11,6 +11,8 @@ from xml.etree import ElementTree as ET
 from inspector.analysis import Analysis
 from inspector.colors import of_classes
 from inspector.errors import InspectorError
+from inspector.reference.judging import Comparison
+from inspector.reference.verdicts import seen
 from inspector.report.findings import COUNTED, excused, failing
 from inspector.report.formats import summary
 from inspector.report.html import STYLE, add_text, document
@@ -79,20 +81,24 @@ def prepare(folder: Path, *, overwrite: bool = False) -> None:
         )
 
 
-def draw(analysis: Analysis, path: Path, *, folder: Path) -> Path:
+def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, folder: Path) -> Path:
     """Draw a run over time into the folder.
 
     Args:
         analysis: The run with what was found in it.
-        path: The file that it is of: the picture is named after it.
+        verdict: The verdict on it: the picture is named after its file.
+        beside: How it compares with its reference; None without.
     """
     from inspector.report.picture import picture
 
+    path = verdict.path
+    if beside is not None:
+        analysis = seen(analysis, verdict)
     # The hash keeps runs of one name in several folders apart, in any process.
     name = re.sub(r"[^\w.-]", "_", path.stem)[:80]
     target = folder / PICTURES / f"{name}-{hashlib.sha256(str(path).encode()).hexdigest()[:8]}.png"
     with replacing(target, overwrite=True) as temporary:
-        temporary.write_bytes(picture(analysis))
+        temporary.write_bytes(picture(analysis, beside))
     return target
 
 

@@ -2,15 +2,16 @@
 
 import io
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inspector import colors, levels
-from inspector.analysis import Analysis, chosen, gaps, worst_joint, worst_signal
+from inspector.analysis import SHOWN, Analysis, chosen, gaps, worst_joint, worst_signal
 from inspector.levels import Scale
 from inspector.orders import orders
+from inspector.reference.judging import Comparison
 from inspector.report.markdown import classes_of, spoken
 from inspector.spectrogram import Spectrogram, spectrogram
 from inspector.thinning import extremes
@@ -19,80 +20,137 @@ from noisemodel.types import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
     from matplotlib.figure import Figure
 
-WIDTH, DPI = 9.6, 150
+WIDTH, DPI = 9.6, 120
 INK, LINE = "#24292f", "#0072b2"
 POINTS = 4000
 ORDERS, TIMES = 3, 6
 """Most orders that are written, and most times of each."""
 ROW = 0.24
 """Height of a class, a joint or a link, in [inch]."""
+GAP, TITLE, BELOW, RIGHT = 0.14, 0.22, 0.55, 0.95
+"""Between panels, above one with a title, below and at the right of all, in [inch]."""
+LETTER, LABELS, LONGEST = 0.085, 1.2, 32
+"""Width of a letter and least width of labels, in [inch], and letters of a name that are shown."""
 SHADE = 0.35
 """Opacity of a finding behind a curve."""
+MOST_OVER_DB = 12.0
+"""Largest level over the reference that has a colour of its own."""
 
 
-def picture(analysis: Analysis, *, floor: float | None = None) -> bytes:
+def picture(
+    analysis: Analysis, beside: Comparison | None = None, *, floor: float | None = None
+) -> bytes:
     """Draw an inspected run.
 
     Args:
         analysis: A run with what was found in it.
+        beside: How it compares with its reference, which takes the place of the probability.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
-    from matplotlib.figure import Figure
-
     run, links = analysis.run, analysis.links
     names, ordered = classes_of(analysis), orders(analysis)
     strips = [_strip(analysis, *analysis.joint_levels, run.joint_names)]
     if links is not None:
         strips.append(_strip(analysis, *levels.link_levels(links), links.links))
-    heights = {
-        "classes": ROW * len(names) + 0.3 if names else 0.0,
-        "noise": 1.3,
-        "level": 1.2,
-        "probability": 0.9 if _alarmed(analysis) else 0.0,
-        "spectrogram": 2.2,
-        "orders": 1.6 if ordered else 0.0,
-        "joints": ROW * len(strips[0][2]) + 0.3 if run.joint_names else 0.0,
-        "links": ROW * len(strips[1][2]) + 0.3 if links is not None else 0.0,
+    beside = None if beside is None or beside.empty else beside
+    alarmed = analysis.labels is not None and analysis.alarm is not None and beside is None
+    told = _told(analysis)
+    panels = {
+        "classes": (ROW * len(names), TITLE * len(told)),
+        "noise": (1.2, 0.0),
+        "level": (1.1, 0.0),
+        "probability": (0.8 * alarmed, 0.0),
+        "over": (0.0 if beside is None else ROW * min(len(beside.joints), SHOWN), TITLE),
+        "spectrogram": (2.0, 0.0),
+        "orders": (1.5 if ordered else 0.0, 0.0),
+        "joints": (ROW * len(strips[0][2]), TITLE),
+        "links": (ROW * len(strips[1][2]) if links is not None else 0.0, TITLE),
     }
-    shown = {name: height for name, height in heights.items() if height}
-    size = (WIDTH, sum(shown.values()) + 0.6)
-    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-    panels = figure.subplots(
-        len(shown), 1, sharex=True, squeeze=False, height_ratios=list(shown.values())
-    )[:, 0]
-    axes: dict[str, Axes] = dict(zip(shown, panels, strict=True))
+    figure, axes = _panels(panels, (*names, *strips[0][2], *strips[-1][2]))
     if "classes" in axes:
-        _classes(axes["classes"], analysis, names)
+        _classes(axes["classes"], analysis, names, told)
     _noise(axes["noise"], analysis)
-    _level(axes["level"], analysis)
-    if "probability" in axes:
+    _level(axes["level"], analysis, beside)
+    if alarmed:
         _probability(axes["probability"], analysis)
+    if beside is not None:
+        _over(axes["over"], beside)
     worst = worst_joint(analysis)
     fast = worst_signal(analysis, worst)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
     scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
-    title = f"{'noise' if worst is None else run.joint_names[worst]}\n[Hz]"
-    _spectrum(figure, axes["spectrogram"], spectrum, scale, title)
+    title = f"{'noise' if worst is None else _short(run.joint_names[worst])}\n[Hz]"
+    _spectrum(axes["spectrogram"], spectrum, scale, title)
     if ordered is not None:
         joint, spectrum = ordered
-        _spectrum(figure, axes["orders"], spectrum, scale, f"periods per turn\nof {joint}")
+        _spectrum(axes["orders"], spectrum, scale, f"periods per turn\nof {_short(joint)}")
     if "joints" in axes:
-        _strips(figure, axes["joints"], strips[0], levels.JOINTS.following(strips[0][1]), "joints")
-    if links is not None:
-        _strips(figure, axes["links"], strips[1], levels.LINKS.following(strips[1][1]), "links")
+        _strips(axes["joints"], strips[0], levels.JOINTS.following(strips[0][1]), "joints")
+    if "links" in axes:
+        _strips(axes["links"], strips[1], levels.LINKS.following(strips[1][1]), "links")
     for name, panel in axes.items():
         _gaps(panel, analysis, named=name == "noise")
-    panels[-1].set_xlim(run.time[0], run.time[-1])
-    panels[-1].set_xlabel("time [s]")
+    axes["noise"].set_xlim(run.time[0], run.time[-1])
+    return _png(figure)
+
+
+def over_reference(beside: Comparison, title: str) -> bytes:
+    """Draw how much louder a run is than its reference, by joint and time."""
+    joints = [_short(beside.joints[place]) for place in beside.loudest(SHOWN)]
+    panels = {"level": (1.1, TITLE), "over": (ROW * len(joints), TITLE)}
+    figure, axes = _panels(panels, joints)
+    _band(axes["level"], beside)
+    axes["level"].set_title(title, fontsize=9, loc="left", parse_math=False)
+    _over(axes["over"], beside)
+    axes["level"].set_xlim(beside.time[0], beside.time[-1])
+    return _png(figure)
+
+
+def _panels(
+    heights: Mapping[str, tuple[float, float]], names: Sequence[str]
+) -> "tuple[Figure, dict[str, Axes]]":
+    """A figure with panels over time below each other, those that have a height.
+
+    Placing them by hand takes half the time of matplotlib's layout.
+
+    Args:
+        heights: Of each panel and of its title, in [inch].
+        names: What stands at the left of rows.
+    """
+    from matplotlib.figure import Figure
+
+    longest = max((len(_short(name)) for name in names), default=0)
+    left = max(LABELS, LETTER * longest + 0.15)
+    shown = {name: each for name, each in heights.items() if each[0]}
+    height = sum(sum(each) + GAP for each in shown.values()) + BELOW
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI)
+    axes: dict[str, Axes] = {}
+    first, bottom = None, height
+    for name, (own, above) in shown.items():
+        bottom -= own + above + GAP
+        place = (left / WIDTH, bottom / height, (WIDTH - left - RIGHT) / WIDTH, own / height)
+        axes[name] = figure.add_axes(place, sharex=first)
+        axes[name].tick_params(labelbottom=False)
+        first = first or axes[name]
+    last = axes[name]
+    last.tick_params(labelbottom=True)
+    last.set_xlabel("time [s]")
+    return figure, axes
+
+
+def _png(figure: "Figure") -> bytes:
     file = io.BytesIO()
     figure.savefig(file, format="png", metadata={"Software": None})
     return file.getvalue()
 
 
-def _alarmed(analysis: Analysis) -> bool:
-    return analysis.labels is not None and analysis.alarm is not None
+def _short(name: str) -> str:
+    """A name that has room."""
+    name = spoken(name)
+    return name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…"
 
 
 def _shade(color: colors.Color) -> tuple[float, float, float]:
@@ -100,7 +158,7 @@ def _shade(color: colors.Color) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _classes(axes: "Axes", analysis: Analysis, names: Sequence[str]) -> None:
+def _classes(axes: "Axes", analysis: Analysis, names: Sequence[str], told: Sequence[str]) -> None:
     """Draw a row for each class: findings filled, annotations hatched."""
     shades = colors.of_classes(tuple(names))
     for row, name in enumerate(names):
@@ -112,16 +170,14 @@ def _classes(axes: "Axes", analysis: Analysis, names: Sequence[str]) -> None:
         axes.broken_barh(
             blocks, (row + 0.1, 0.3), facecolor="white", edgecolor=INK, linewidth=0.6, hatch="////"
         )
-    axes.set_yticks(range(len(names)), list(map(spoken, names)), parse_math=False)
+    axes.set_yticks(range(len(names)), list(map(_short, names)), parse_math=False)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(axis="x", alpha=0.3)
-    hatched = "; hatched: annotated" if analysis.run.blocks else ""
-    lines = [f"filled: found{hatched}", *_orders(analysis)]
-    axes.set_title("\n".join(lines), fontsize=9, loc="left", parse_math=False)
+    axes.set_title("\n".join(told), fontsize=9, loc="left", parse_math=False)
 
 
-def _orders(analysis: Analysis) -> list[str]:
-    """List what goes with the speed of a joint, and when: a line for each order."""
+def _told(analysis: Analysis) -> list[str]:
+    """What is drawn, and what goes with the speed of a joint and when: a line for each order."""
     when: dict[str, list[str]] = defaultdict(list)
     for event, order in analysis.orders.items():
         when[str(order)].append(f"{event.start:.2f}")
@@ -129,7 +185,8 @@ def _orders(analysis: Analysis) -> list[str]:
         f"at {', '.join(times[:TIMES])}{', …' * (len(times) > TIMES)} s: {order}"
         for order, times in when.items()
     ]
-    return [*lines[:ORDERS], *["…"] * (len(lines) > ORDERS)]
+    hatched = "; hatched: annotated" if analysis.run.blocks else ""
+    return [f"filled: found{hatched}", *lines[:ORDERS], *["…"] * (len(lines) > ORDERS)]
 
 
 def _shaded(axes: "Axes", analysis: Analysis) -> None:
@@ -151,12 +208,52 @@ def _noise(axes: "Axes", analysis: Analysis) -> None:
     _shaded(axes, analysis)
 
 
-def _level(axes: "Axes", analysis: Analysis) -> None:
-    time, level = analysis.noise_level
-    axes.plot(time, level[:, 0], color=LINE, linewidth=0.9)
-    axes.set_ylim(levels.FLOOR_DB + 20.0, 20.0)
-    axes.set_ylabel("level above\n10 Hz [dB re\n1 rad/s]")
+def _level(axes: "Axes", analysis: Analysis, beside: Comparison | None) -> None:
+    if beside is not None:
+        _band(axes, beside)
+    else:
+        time, level = analysis.noise_level
+        axes.plot(time, level[:, 0], color=LINE, linewidth=0.9)
+        axes.set_ylim(levels.FLOOR_DB + 20.0, 20.0)
+        axes.set_ylabel("level above\n10 Hz [dB re\n1 rad/s]")
     _shaded(axes, analysis)
+
+
+def _band(axes: "Axes", beside: Comparison) -> None:
+    """Draw the level of the noise, and that of the repetitions behind it."""
+    low, high = beside.band.T
+    axes.fill_between(beside.time, low, high, color=INK, alpha=0.25, linewidth=0)
+    axes.plot(beside.time, high, color=INK, alpha=0.5, linewidth=0.6)
+    axes.plot(beside.time, beside.noise, color=LINE, linewidth=0.9)
+    axes.set_ylabel(f"level above\n{beside.octaves[0][0]:g} Hz [dB re\n1 rad/s]")
+    axes.margins(y=0.15)
+    told = "grey: repetitions" if np.isfinite(high).any() else "no repetitions"
+    axes.text(1.01, 0.5, told.replace(": ", ":\n"), transform=axes.transAxes, fontsize=8)
+
+
+def _over(axes: "Axes", beside: Comparison) -> None:
+    """Draw by how much each joint is louder than the reference: those that are most."""
+    which = beside.loudest(SHOWN)
+    joints = [beside.joints[place] for place in which]
+    rows = np.arange(len(joints), dtype=np.float64)
+    image = axes.pcolormesh(
+        beside.time,
+        rows,
+        beside.by_joint[:, which].T,
+        cmap="RdBu_r",
+        vmin=-MOST_OVER_DB,
+        vmax=MOST_OVER_DB,
+        shading="nearest",
+    )
+    for each in beside.exceedances:
+        if each.joint in joints:
+            row = joints.index(each.joint)
+            axes.plot([each.start, each.stop], [row, row], color=INK, linewidth=1.5)
+            axes.plot(each.peak, row, "o", color=INK, markersize=4)
+    axes.set_yticks(rows, list(map(_short, joints)), parse_math=False)
+    axes.invert_yaxis()
+    axes.set_title("joints over the reference", fontsize=9, loc="left")
+    _bar(axes, image, "[dB]")
 
 
 def _probability(axes: "Axes", analysis: Analysis) -> None:
@@ -174,12 +271,10 @@ def _probability(axes: "Axes", analysis: Analysis) -> None:
     _shaded(axes, analysis)
 
 
-def _spectrum(
-    figure: "Figure", axes: "Axes", spectrum: Spectrogram, scale: Scale, title: str
-) -> None:
+def _spectrum(axes: "Axes", spectrum: Spectrogram, scale: Scale, title: str) -> None:
     """Draw a spectrogram on a logarithmic axis; what is not known stays white."""
     level = np.where(spectrum.valid, 2 * decibel(spectrum.amplitude), np.nan)
-    _heat(figure, axes, spectrum.time, spectrum.frequency, level, scale)
+    _heat(axes, spectrum.time, spectrum.frequency, level, scale)
     if len(spectrum.frequency) > 1:
         axes.set_yscale("log")
         axes.set_ylim(spectrum.frequency[0], spectrum.frequency[-1])
@@ -196,7 +291,6 @@ def _strip(
 
 
 def _strips(
-    figure: "Figure",
     axes: "Axes",
     strip: tuple[Array, Array, list[str]],
     scale: Scale,
@@ -204,22 +298,27 @@ def _strips(
 ) -> None:
     time, level, names = strip
     rows = np.arange(len(names), dtype=np.float64)
-    _heat(figure, axes, time, rows, np.maximum(level, scale.low), scale)
-    axes.set_yticks(range(len(names)), names, parse_math=False)
+    _heat(axes, time, rows, np.maximum(level, scale.low), scale)
+    axes.set_yticks(rows, list(map(_short, names)), parse_math=False)
     axes.invert_yaxis()
     axes.set_title(f"{title} above 10 Hz", fontsize=9, loc="left")
 
 
-def _heat(
-    figure: "Figure", axes: "Axes", time: Array, rows: Array, level: Array, scale: Scale
-) -> None:
+def _heat(axes: "Axes", time: Array, rows: Array, level: Array, scale: Scale) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
     shades = LinearSegmentedColormap.from_list("heat", list(colors.HEAT / 255))
     image = axes.pcolormesh(
         time, rows, level, cmap=shades, shading="nearest", vmin=scale.low, vmax=scale.high
     )
-    figure.colorbar(image, ax=axes, pad=0.01, aspect=15, label=f"[{scale.unit}]")
+    _bar(axes, image, f"[{scale.unit}]")
+
+
+def _bar(axes: "Axes", image: "QuadMesh", label: str) -> None:
+    """Draw the scale of colours at the right."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.colorbar(image, cax=axes.inset_axes((1.01, 0.0, 0.015, 1.0)), label=label)
 
 
 def _gaps(axes: "Axes", analysis: Analysis, *, named: bool) -> None:
