@@ -352,6 +352,10 @@ def test_where_a_run_is_louder_than_its_reference_has_a_row_for_each_joint(tmp_p
     write(inspected(run, tmp_path), tmp_path / "o", beside=beside)
     _, (names,) = read(tmp_path / "o", "/axis/over/left", "Points2D:labels")
     assert names == list(run.joint_names)
+    time, band = read(tmp_path / "o", "/level/repetitions", "Scalars:scalars")
+    _, noise = read(tmp_path / "o", "/level/noise", "Scalars:scalars")
+    loud = [now for now, (own,), (_, high) in zip(time, noise, band, strict=True) if own > high + 1]
+    assert 0.8 < loud[0] < loud[-1] < 1.8
     for row, name in enumerate(names):
         time, shown = shades(tmp_path / "o", f"/strips/over/{row:02d}")
         louder = {tuple(shade) for shade in shown} - {panels.SAME}

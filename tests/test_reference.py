@@ -84,6 +84,32 @@ def test_an_impact_is_one_finding_that_starts_where_it_begins(own, simulate):
     assert event["evidence"]["joint"] == "upperarm"
 
 
+def test_the_band_of_repetitions_holds_each_of_them_and_a_chatter_is_above_it(project, simulate):
+    reference = Reference.load(project / "reference")
+    own = reference.compare(simulate.run("pick", 2))
+    low, high = own.band.T
+    assert (low - 0.5 <= own.noise).all()  # the store has steps of half a decibel
+    assert (own.noise <= high + 0.5).all()
+    loud = reference.compare(simulate.run("pick", 4, "chatter"))
+    assert (loud.noise > loud.band[:, 1]).mean() > 0.9
+
+
+def test_pictures_beside_a_reference_show_what_it_finds(own, simulate, monkeypatch):
+    index = pytest.importorskip("inspector.report.index")
+    drawn = {}
+    monkeypatch.setattr(
+        "inspector.report.picture.picture",
+        lambda analysis, beside: drawn.setdefault(analysis.status, (analysis, beside)) and b"",
+    )
+    simulate.write(own / "now", "chatter")
+    call("classify", own / "now", "--report", own / "page")
+    analysis, beside = drawn["findings"]
+    assert [event.label for event in analysis.findings]
+    assert beside.scenarios == ("pick",)
+    assert drawn["ok"][0].findings == ()
+    assert list((own / "page" / index.PICTURES).iterdir())
+
+
 def test_an_improvement_is_told_and_does_not_fail(own, simulate):
     simulate.write(own / "now", "improvement")
     status, runs, _ = classified(own / "now")
