@@ -24,6 +24,8 @@ def page(width=900, height=560):
     with playwright.sync_playwright() as driver:
         window = driver.chromium.launch(executable_path=browser, args=FLAGS)
         try:
-            yield window.new_page(viewport={"width": width, "height": height})
+            page = window.new_page(viewport={"width": width, "height": height})
+            page.set_default_timeout(240_000)
+            yield page
         finally:
             window.close()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import inspector
+from inspector.live import sink
 
 picture = pytest.importorskip("picture")
 pytestmark = [
@@ -12,7 +13,9 @@ pytestmark = [
 ]
 
 
-def test_a_viewer_follows_a_session_and_reports_no_error():
+def test_a_viewer_follows_a_session_and_reports_no_error(monkeypatch):
+    monkeypatch.setattr(sink, "CONNECT_TIMEOUT", 60.0)
+    monkeypatch.setattr(sink, "FLUSH_TIMEOUT", 60.0)
     time_ = np.arange(3000) / 1000
     swing = 0.5 * np.cos(time_[:, None] * np.arange(1, 8))
     with picture.headless_viewer() as client:
@@ -47,7 +50,7 @@ def following(state):
     return all(each.current_time / 1e9 > 2.9 for each in state.recordings)
 
 
-def until(client, holds, timeout=60.0):
+def until(client, holds, timeout=300.0):
     """Ask for the viewer's state until something holds; it responds late under load."""
     limit = time.monotonic() + timeout
     while True:

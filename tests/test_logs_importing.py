@@ -1,4 +1,3 @@
-import time as clock
 from pathlib import Path
 
 import numpy as np
@@ -128,9 +127,7 @@ def test_desired_motion_alone_is_refused(tmp_path, others):
 
 @pytest.mark.skipif(not PANDA.is_dir(), reason="data/panda is not beside this checkout")
 def test_the_panda_log_is_imported_in_one_call():
-    before = clock.process_time()
     imported = read_log(PANDA / "measured.csv", desired=PANDA / "desired.csv", robot="panda")
-    assert clock.process_time() - before < 5.0  # takes half a second where nothing else runs
     run = imported.run
     assert run.rate == 1000.0
     assert run.joint_names == tuple(f"panda_joint{number}" for number in range(1, 8))

@@ -119,6 +119,8 @@ def test_numbered_columns_get_the_robots_joints_in_order(tmp_path):
 
 
 HANGS = """
+import resource
+resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
 from inspector.logs.names import Naming
 for word in ("r", "rr", "l_", "1", "shoulder", "1shoulder", "joint", "q", "_", "[(", "error"):
     for end in ("", "!", "1x"):
@@ -127,4 +129,4 @@ for word in ("r", "rr", "l_", "1", "shoulder", "1shoulder", "joint", "q", "_", "
 
 
 def test_names_that_can_be_read_in_many_ways_do_not_hold_up_the_reader():
-    subprocess.run([sys.executable, "-c", HANGS], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", HANGS], check=True)

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -36,14 +37,18 @@ def test_a_process_that_dies_costs_only_its_own_item():
     assert os.getpid() not in {process for *_, process in found}
 
 
-def slow_first(number):
-    time.sleep(1.0 if number == 0 else 0.0)
+def first_waits(number, done):
+    while number == 0 and not done.exists():
+        time.sleep(0.01)
+    done.touch()
     return number
 
 
-def test_results_come_as_they_are_ready_and_in_order_if_requested():
-    assert next(as_done(slow_first, range(4), jobs=2, died=dead))[0] != 0
-    assert list(in_order(slow_first, range(4), jobs=2, died=dead)) == [0, 1, 2, 3]
+def test_results_come_as_they_are_ready_and_in_order_if_requested(tmp_path):
+    work = partial(first_waits, done=tmp_path / "done")
+    assert next(as_done(work, range(4), jobs=2, died=dead))[0] != 0
+    (tmp_path / "done").unlink()
+    assert list(in_order(work, range(4), jobs=2, died=dead)) == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize(
