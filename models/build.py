@@ -171,7 +171,7 @@ def measured(model: Path, title: str, path: Path) -> str:
 def card(path: Path, texts: list[str]) -> str:
     """The card of a model: what it was trained on, its figures, its limits."""
     model = nc.load(path)
-    robots = {nc.splitting.robot_of(run) for run in model.runs}
+    robots = {nc.recording.robot_of(run) for run in model.runs}
     return CARD.format(
         name=path.stem,
         rates=", ".join(f"{rate:g}" for rate in RATES),
