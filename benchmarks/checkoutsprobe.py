@@ -194,7 +194,7 @@ class Probe:
         found = self._models[model]
         if not hasattr(found, "recipe"):
             return found
-        return found.at(max(rate, self.names("noiseclassifier.logbands.LOWEST")), signals)
+        return found.at(max(rate, self.names("noiseclassifier.profile.LOWEST")), signals)
 
     def _classify(
         self, name: str, model: str, classifier: Any, signals: Mapping[str, Any], *, valid: Any

@@ -35,7 +35,7 @@ from inspector.logs.read import Reading, left_out, open_source, sources
 from inspector.text import counted, plain
 from inspector.wrongrobot import check_joints, limit_warnings
 from noiseclassifier import Profile
-from noiseclassifier.logbands import FEWEST, HIGHEST, LOWEST
+from noiseclassifier.profile import FEWEST, HIGHEST, LOWEST
 from noisemodel import NoiseModelError, Run
 from noisemodel.run import part
 from noisemodel.runfile import pieces

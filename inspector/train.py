@@ -21,8 +21,7 @@ from inspector.progress import progress
 from inspector.text import counted
 from inspector.wrongrobot import check_joints
 from noiseclassifier import Assessment
-from noiseclassifier.logbands import HIGHEST, LOWEST
-from noiseclassifier.profile import NOMINAL
+from noiseclassifier.profile import HIGHEST, LOWEST, NOMINAL
 from noisemodel.files import also_reading, refuse_existing, replacing
 
 if TYPE_CHECKING:
@@ -307,9 +306,7 @@ def train(
         raise InspectorError(f"no run to train {profile} on; {left_out}{hint}") from error
     classifier = simulators.signed(nc.Classifier.train(examples, chosen))
     classifier.save(output, overwrite=overwrite)
-    predicted = classifier.predict_features(examples.features)
-    evaluation = nc.Evaluation.of(examples.labels, predicted, classifier.classes)
-    return evaluation, left_out
+    return classifier.evaluate(examples), left_out
 
 
 def _train_general(

@@ -6,8 +6,7 @@ from scipy.fft import dct as scipy_dct
 from scipy.signal import get_window
 
 import noiseclassifier as nc
-from noiseclassifier.features import band_shares, compress, dct, feature_count, spectrogram
-from noiseclassifier.pooling import pool
+from noiseclassifier.features import band_shares, compress, dct, feature_count, pool, spectrogram
 
 RANDOM = np.random.default_rng(7)
 PROFILES = [

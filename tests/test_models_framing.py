@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.framefeatures import frame_features
-from noiseclassifier.framing import pad_end
+from noiseclassifier.features import frame_features
 
 
 @pytest.mark.parametrize(("samples", "frames"), [(400, 1), (499, 1), (500, 2), (1000, 7)])
@@ -32,16 +31,6 @@ def test_a_flush_frame_covers_the_tail_once():
 
     assert starts(500) == [0, 100]
     assert starts(501) == [0, 100, 101]
-
-
-def test_padding_continues_value_and_slope():
-    ramp = np.arange(10.0)
-    assert np.array_equal(pad_end(ramp, length=25), np.arange(25.0))
-    assert np.array_equal(pad_end(np.array([1.0, 4.0, 2.0]), length=5), [1.0, 4.0, 2.0, 0.0, 3.0])
-
-
-def test_padding_leaves_a_long_signal_alone():
-    assert np.array_equal(pad_end(np.arange(10.0), length=4), np.arange(10.0))
 
 
 def test_a_signal_shorter_than_a_frame_is_refused():

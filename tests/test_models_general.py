@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 
 import noiseclassifier as nc
 from noiseclassifier.estimators.trees import Trees
-from noiseclassifier.framefeatures import frame_features
+from noiseclassifier.features import frame_features
 from noiseclassifier.general import LEARNT
-from noiseclassifier.logbands import HIGHEST, INPUTS, LOWEST
-from noiseclassifier.pooling import columns
+from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, columns
 from noiseclassifier.signals import JOINTS, MOTION, NOISE
 
 GIVEN = {

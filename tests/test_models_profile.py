@@ -8,8 +8,7 @@ import pytest
 
 import noiseclassifier as nc
 from noiseclassifier.faults import with_fault
-from noiseclassifier.logbands import HIGHEST, LOWEST
-from noiseclassifier.pooling import columns
+from noiseclassifier.profile import HIGHEST, LOWEST, columns
 from noiseclassifier.signals import JOINTS, MOTION
 
 GENERAL = Path(__file__).parents[1] / "models" / "general.npz"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import noiseclassifier as nc
 from noiseclassifier import reference as module
-from noiseclassifier.framefeatures import frame_features
+from noiseclassifier.features import frame_features
 from noiseclassifier.reference import LEAST, NORMAL, Rest, RunningReference
 
 RECIPE = replace(nc.ANY, rounds=5)

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import noiseclassifier as nc
-from noiseclassifier import windows
-from noiseclassifier.framefeatures import FrameFeatures, frame_features
-from noiseclassifier.logbands import INPUTS
+from noiseclassifier.features import FrameFeatures, frame_features
+from noiseclassifier.profile import INPUTS
 from noiseclassifier.signals import by_joint, stacked
 
+module = sys.modules["noiseclassifier.features"]
 RATE = 1000.0
 OURS = nc.LogBands().at(RATE)
 PROFILES = {
@@ -58,13 +58,13 @@ def classifier(name):
 
 @pytest.mark.parametrize("chunk", [1, 7, 10])
 def test_the_chunk_that_completes_a_frame_finds_nearly_all_its_windows_done(chunk, monkeypatch):
-    transformed, original = [], windows.log_band_energies
+    transformed, original = [], module.log_band_energies
 
     def counted(samples, *rest):
         transformed.append(samples.shape[-2])
         return original(samples, *rest)
 
-    monkeypatch.setattr(windows, "log_band_energies", counted)
+    monkeypatch.setattr(module, "log_band_energies", counted)
     stream, signal = nc.Stream(classifier("two windows")), noise(4000)
     for first in range(0, len(signal), chunk):
         transformed.clear()
@@ -261,8 +261,6 @@ def test_memory_does_not_grow():
 
 
 def test_every_transform_is_computed_once(monkeypatch):
-    import noiseclassifier.windows as module
-
     transformed = []
 
     def counted(windows, profile, resolution):

@@ -11,8 +11,7 @@ This package needs no robot: its input is a signal and its rate. It needs NumPy,
 only to train.
 """
 
-from noiseclassifier.choice import Model, load, nearest
-from noiseclassifier.classifier import Classifier
+from noiseclassifier.classifier import Classifier, Stream
 from noiseclassifier.confusion import Evaluation
 from noiseclassifier.dataset import Dataset, Examples
 from noiseclassifier.errors import (
@@ -30,14 +29,20 @@ from noiseclassifier.errors import (
 )
 from noiseclassifier.evaluation.assessment import Assessment, assess, evaluate
 from noiseclassifier.evaluation.matching import Unanswered, match
-from noiseclassifier.features import features
-from noiseclassifier.framing import frame
-from noiseclassifier.general import Frames, General, frames_of
+from noiseclassifier.features import features, frame
+from noiseclassifier.general import Frames, General, Model, frames_of, load, nearest
 from noiseclassifier.labels import UNKNOWN, Event, Labels
 from noiseclassifier.lasting import Lasting, merged
-from noiseclassifier.logbands import ANY, EACH, GENERAL, SCALAR, LogBands
 from noiseclassifier.noisytest import nominal_rate, read_log
-from noiseclassifier.profile import CLASSES, Profile
+from noiseclassifier.profile import (
+    ANY,
+    CLASSES,
+    EACH,
+    GENERAL,
+    SCALAR,
+    LogBands,
+    Profile,
+)
 from noiseclassifier.recording import (
     Block,
     Fault,
@@ -48,7 +53,6 @@ from noiseclassifier.recording import (
     held_out,
 )
 from noiseclassifier.signals import NOISE, Signals
-from noiseclassifier.stream import Stream
 
 __all__ = [
     "ANY",

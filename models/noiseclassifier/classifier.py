@@ -1,8 +1,7 @@
-"""The classifier: a profile, its estimator, and the training set of it."""
+"""The classifier: a model at one rate, which labels signals whole, in pieces or as a stream."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -10,15 +9,14 @@ import numpy as np
 
 from noiseclassifier import modelfile
 from noiseclassifier.confusion import Evaluation
-from noiseclassifier.dataset import CHUNK, Dataset, Examples
+from noiseclassifier.dataset import CHUNK, Dataset, Examples, features_in_chunks
 from noiseclassifier.errors import DatasetError, FileError, MissingSignalError, RateError
 from noiseclassifier.estimators import ESTIMATORS, Estimator
-from noiseclassifier.features import features, standard
-from noiseclassifier.framefeatures import frames_of
+from noiseclassifier.features import FrameFeatures, Frames, frames_of, standard
 from noiseclassifier.labels import UNKNOWN, Labels
 from noiseclassifier.profile import NOMINAL, Profile
 from noiseclassifier.reference import Rest
-from noiseclassifier.signals import Signals, feeds
+from noiseclassifier.signals import Signals, feeds, stacked
 from noiseclassifier.types import Array, Index, Mask, Real, Words
 
 
@@ -70,29 +68,24 @@ class Classifier:
             DatasetError: If the frames are of fewer than two classes.
             SignalError: If the frames do not fit the profile.
         """
-        examples = _examples(dataset, profile)
-        there = set(examples.labels.tolist())
-        classes = tuple(name for name in profile.classes if name in there)
-        if len(classes) < 2 or there - set(classes):
-            raise DatasetError(
-                f"training takes two classes or more of {', '.join(profile.classes)};"
-                f" the frames are {', '.join(sorted(there))}"
-            )
+        sets = {
+            name: Examples.of(each, profile) if isinstance(each, Dataset) else each
+            for name, each in (("training", dataset), ("validation", validation))
+            if each is not None
+        }
+        examples = sets["training"]
+        classes, targets = targets_of(examples.labels, profile.classes)
         mean, scale = standard(examples.features, profile)
-        targets = np.array([classes.index(label) for label in examples.labels.tolist()])
         scaled = (examples.features - mean) / scale
         estimator = ESTIMATORS[profile.estimator].fit(scaled, targets, examples.groups, profile)
-        classifier = cls(profile, classes, estimator, mean, scale, dict(examples.hashes))
-        sets = {"training": examples}
-        if validation is not None:
-            sets["validation"] = _examples(validation, profile)
-        metrics = {
-            name: Evaluation.of(
-                each.labels, classifier.predict_features(each.features), classes
-            ).as_dict()
-            for name, each in sets.items()
-        }
-        return replace(classifier, metrics=metrics, versions=modelfile.versions())
+        model = cls(profile, classes, estimator, mean, scale, dict(examples.hashes))
+        metrics = {name: model.evaluate(each).as_dict() for name, each in sets.items()}
+        return replace(model, metrics=metrics, versions=modelfile.versions())
+
+    def evaluate(self, examples: Examples) -> Evaluation:
+        """Measures of the model on frames, by their features."""
+        predicted = self._choose(self.decide(examples.features))
+        return Evaluation.of(examples.labels, predicted, self.classes)
 
     def at(self, rate: float, signals: Collection[str]) -> "Classifier":
         """The model itself, if it fits.
@@ -118,18 +111,15 @@ class Classifier:
         return self.profile.rate
 
     def predict(self, frames: Real) -> Words:
-        """Class of each frame.
-
-        Args:
-            frames: Stretches of noise signal, shape (frames, length).
-
-        Returns:
-            Class names, shape (frames,).
-
-        Raises:
-            SignalError: If the frames have another shape or values that are not finite.
-        """
+        """Class of each frame, shape (frames,); see `decision`."""
         return self._choose(self.decision(frames))
+
+    def scores(self, frames: Real) -> Array:
+        """Score of each class, larger meaning more certain, shape (frames, classes).
+
+        Networks and trees give probabilities, support vector machines votes and margins.
+        """
+        return self.estimator.score(self.decision(frames))
 
     def decision(self, frames: Real) -> Array:
         """Decision values of frames.
@@ -143,23 +133,17 @@ class Classifier:
         Raises:
             SignalError: If the frames have another shape or values that are not finite.
         """
-        chunks = range(0, max(len(frames), 1), CHUNK)
-        found = [features(frames[first : first + CHUNK], self.profile) for first in chunks]
-        return self.decide(np.concatenate(found))
+        return self.decide(features_in_chunks(frames, self.profile))
 
-    def scores(self, frames: Real) -> Array:
-        """Score of each class, larger meaning more certain.
+    def decide(self, plain: Array) -> Array:
+        """Decision values, shape (frames, decisions).
 
         Args:
-            frames: Stretches of noise signal, shape (frames, length).
-
-        Returns:
-            Shape (frames, classes): see `svm.score`; of networks and trees, probabilities.
-
-        Raises:
-            SignalError: If the frames have another shape or values that are not finite.
+            plain: Features, not yet standardised, shape (frames, features).
         """
-        return self._score(self.decision(frames))
+        chunks = range(0, max(len(plain), 1), CHUNK)
+        parts = ((plain[first : first + CHUNK] - self.mean) / self.scale for first in chunks)
+        return np.concatenate([self.estimator.decision(part) for part in parts])
 
     def classify(
         self, signal: Signals, rate: float, *, start: float = 0.0, valid: Mask | None = None
@@ -199,21 +183,16 @@ class Classifier:
         the decisions relative to the past and to the rest, that of the lower failure score counts.
 
         Args:
-            pieces: The noise estimate, shape (samples,), or signals by name, each of that shape,
-                and False in gaps, shape (samples,); one piece or more.
-            rate: As `classify` takes it.
+            pieces: Signals and their validity as `classify` takes them, one piece or more.
+            rate: Sample rate, in [Hz], as `classify` takes it.
             start: Time of the first sample, in [s].
             whole: Whether what is found is compared with the rest of the signal.
-
-        Returns:
-            Start, stop, class and scores of each frame.
 
         Raises:
             RateError: If the model is of another rate.
             SignalError: As `classify`.
         """
-        if not abs(rate / self.rate - 1.0) <= NOMINAL:
-            raise RateError(rate, [self.rate], "lower the signal's rate, or take another model")
+        self.check_rate(rate, "lower the signal's rate, or take another model")
         starts: list[Index] = []
         decisions: list[Array] = []
         waiting = np.empty((0, len(self.mean)))
@@ -245,10 +224,6 @@ class Classifier:
         found[places[fewer]] = other[fewer]
         return self.labels(found, begins, rate, start=start)
 
-    def _failure(self, decisions: Array) -> Array:
-        """Score of any failure, shape (frames,)."""
-        return np.asarray(self._score(decisions)[:, 1:].sum(axis=1))
-
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
         """Labels of frames from their decision values.
 
@@ -262,36 +237,17 @@ class Classifier:
             start + starts / rate,
             start + (starts + self.profile.length) / rate,
             self._choose(decisions),
-            self._score(decisions),
+            self.estimator.score(decisions),
             self.classes,
             self.estimator.above_threshold(decisions),
             self.estimator.novel(decisions),
             hop=self.profile.hop / rate,
         )
 
-    def decide(self, plain: Array) -> Array:
-        """Decision values of features.
-
-        Args:
-            plain: Features, not yet standardised, shape (frames, features).
-
-        Returns:
-            Decisions, shape (frames, decisions).
-        """
-        chunks = range(0, max(len(plain), 1), CHUNK)
-        parts = ((plain[first : first + CHUNK] - self.mean) / self.scale for first in chunks)
-        return np.concatenate([self.estimator.decision(part) for part in parts])
-
-    def predict_features(self, plain: Array) -> Words:
-        """Class of each frame, from its features.
-
-        Args:
-            plain: Features, not yet standardised, shape (frames, features).
-
-        Returns:
-            Class names, shape (frames,).
-        """
-        return self._choose(self.decide(plain))
+    def check_rate(self, rate: float, advice: str) -> None:
+        """Refuse signals of another rate."""
+        if not abs(rate / self.rate - 1.0) <= NOMINAL:
+            raise RateError(rate, [self.rate], advice)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, whole or not at all; the same model gives the same bytes.
@@ -303,23 +259,12 @@ class Classifier:
         Raises:
             OutputError: If the file exists or cannot be written.
         """
-        manifest = {
-            "profile": self.profile.as_dict(),
-            "classes": list(self.classes),
-            "rate": self.rate,
-            "runs": dict(self.runs),
-            "metrics": dict(self.metrics),
-            "versions": dict(self.versions),
-        }
-        arrays = {**self.estimator.arrays(), "mean": self.mean, "scale": self.scale}
-        modelfile.write(path, manifest, arrays, overwrite=overwrite)
+        settings = {"profile": self.profile.as_dict(), "rate": self.rate}
+        modelfile.write(path, self, settings, overwrite=overwrite)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a model file; nothing in it is unpickled or run.
-
-        Args:
-            path: The file.
 
         Raises:
             FileError: If the file is missing, damaged, no model file, of another version, or
@@ -327,7 +272,7 @@ class Classifier:
         """
         manifest, arrays = modelfile.read(path)
         if "recipe" in manifest:
-            raise FileError(path, "is a model for any rate; read it by models.load")
+            raise FileError(path, "is a model for any rate; read it by noiseclassifier.load")
         return cls.of(manifest, arrays, modelfile.digest(path))
 
     @classmethod
@@ -340,22 +285,117 @@ class Classifier:
             ESTIMATORS[profile.estimator].of(arrays, profile),
             arrays["mean"],
             arrays["scale"],
-            runs=manifest["runs"],
-            metrics=manifest["metrics"],
-            versions=manifest["versions"],
-            sha256=sha256,
+            manifest["runs"],
+            manifest["metrics"],
+            manifest["versions"],
+            sha256,
         )
 
-    @cached_property
-    def _names(self) -> Words:
-        return np.array((*self.classes, UNKNOWN))
-
     def _choose(self, decisions: Array) -> Words:
-        return self._names[self.estimator.choose(decisions)]
+        return np.array((*self.classes, UNKNOWN))[self.estimator.choose(decisions)]
 
-    def _score(self, decisions: Array) -> Array:
-        return self.estimator.score(decisions)
+    def _failure(self, decisions: Array) -> Array:
+        """Score of any failure, shape (frames,)."""
+        return np.asarray(self.estimator.score(decisions)[:, 1:].sum(axis=1))
 
 
-def _examples(dataset: Dataset | Examples, profile: Profile) -> Examples:
-    return Examples.of(dataset, profile) if isinstance(dataset, Dataset) else dataset
+class Stream:
+    """A classifier of samples one by one, or in chunks of any size.
+
+    Its labels are those of `Classifier.classify` for the whole signal: both have the same features
+    and decision values of each frame, bit for bit (of support vector machines, decision values up
+    to rounding: one product of matrices is faster for many frames, but its rounding depends on how
+    many they are). The label of a frame comes with its last sample.
+
+    Args:
+        classifier: The model.
+        rate: Sample rate of the signal, in [Hz], which must be the model's; the model's unless
+            given.
+        start: Time of the first sample, in [s].
+        joints: Number of joints, if the model takes signals joint by joint.
+
+    Raises:
+        RateError: If the model is of another rate. Motion can be decimated before it becomes
+            noise; the noise itself cannot.
+    """
+
+    def __init__(
+        self,
+        classifier: Classifier,
+        *,
+        rate: float | None = None,
+        start: float = 0.0,
+        joints: int = 1,
+    ) -> None:
+        self.classifier = classifier
+        self.rate = classifier.rate if rate is None else rate
+        self.start = start
+        classifier.check_rate(self.rate, "lower the motion's rate, or take another model")
+        profile = classifier.profile
+        rows = profile.norms + (len(profile.signals) - profile.norms) * joints
+        self._frames = FrameFeatures(profile, rows)
+        nothing = np.empty((0, classifier.estimator.width))
+        self._nothing = classifier.labels(nothing, np.empty(0, np.intp), self.rate, start=start)
+
+    @property
+    def count(self) -> int:
+        """Samples so far."""
+        return self._frames.count
+
+    def push(self, samples: Signals, valid: Mask | None = None) -> Labels:
+        """Labels of the frames that samples complete.
+
+        Args:
+            samples: Any number of them, also none, shape (samples,), or of each signal by name,
+                of that shape or, joint by joint, (joints, samples).
+            valid: False in gaps, shape (samples,); frames that touch a gap are left out.
+
+        Returns:
+            Labels, most often none.
+
+        Raises:
+            SignalError: If the samples are not finite, not one-dimensional, or not all that the
+                model needs; none is taken.
+        """
+        plain = stacked(samples, self.classifier.profile.signals)
+        return self._labels(self._frames.push(plain, valid))
+
+    def skip(self, samples: int) -> None:
+        """Skip a gap: the same as pushing so many samples that are not valid.
+
+        Args:
+            samples: How many were lost; a gap of hours takes no longer than one of seconds.
+        """
+        self._frames.skip(samples)
+
+    def finish(self) -> Labels:
+        """End the signal; what is pushed next begins another one.
+
+        Returns:
+            The label of the last frame, flush with the end, if the profile asks for one where no
+            hop leads.
+        """
+        return self._labels(self._frames.finish())
+
+    def _labels(self, frames: Frames) -> Labels:
+        starts, features = frames
+        if not len(starts):
+            return self._nothing
+        decisions = self.classifier.decide(features)
+        return self.classifier.labels(decisions, starts, self.rate, start=self.start)
+
+
+def targets_of(labels: Words, known: Sequence[str]) -> tuple[tuple[str, ...], Index]:
+    """Classes that the frames of a training set have, in order, and the number of each frame's.
+
+    Raises:
+        DatasetError: If they are fewer than two, or not all known.
+    """
+    there = set(labels.tolist())
+    classes = tuple(name for name in known if name in there)
+    if len(classes) < 2 or there - set(classes):
+        raise DatasetError(
+            f"training takes two classes or more of {', '.join(known)};"
+            f" the frames are {', '.join(sorted(there))}"
+        )
+    return classes, np.array([classes.index(label) for label in labels.tolist()])

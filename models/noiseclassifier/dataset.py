@@ -10,19 +10,16 @@ from typing import Self
 
 import numpy as np
 
-from noiseclassifier.errors import (
-    DatasetError,
-    NoFrameError,
-    RateError,
-    RecordingError,
-)
-from noiseclassifier.features import features
-from noiseclassifier.framing import frame, pad_end
+from noiseclassifier.errors import DatasetError, NoFrameError, RateError, RecordingError
+from noiseclassifier.features import features, frame
 from noiseclassifier.noisytest import read_folder
 from noiseclassifier.profile import NOMINAL, Profile
 from noiseclassifier.recording import Block, Recording, group_of
 from noiseclassifier.signals import stacked
 from noiseclassifier.types import Array, Mask, Real, Words
+
+CHUNK = 64
+"""Frames per evaluation, which bounds the memory that they take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,27 +43,23 @@ class Dataset:
     def of(
         cls, recordings: Iterable[Recording], profile: Profile, *, training: bool = True
     ) -> Self:
-        """Frame the annotated blocks of recordings.
+        """Frame the annotated blocks of recordings, and leave out frames that touch a gap.
 
         Args:
             recordings: Annotated signals at the profile's rate, each of another name.
             profile: How blocks are cut and framed, and which labels there are.
             training: Whether the frames are for training; see `cut`.
 
-        Returns:
-            All frames without an invalid sample.
-
         Raises:
             RateError: If a recording has another rate than the profile.
-            RecordingError: If a label is no class of the profile.
-            RecordingError: If a block cannot be cut.
+            RecordingError: If a label is no class of the profile, or a block cannot be cut.
             NoFrameError: If there is no frame at all.
             DatasetError: If a name repeats.
         """
         frames, labels, runs = [], [], []
         hashes: dict[str, str] = {}
         for recording in recordings:
-            _check_recording(recording, profile, hashes)
+            _check(recording, profile, hashes)
             hashes[recording.name] = recording.sha256
             for block in recording.blocks:
                 signal, valid = cut(recording, block, profile, training=training)
@@ -77,23 +70,12 @@ class Dataset:
         if not labels:
             raise NoFrameError(len(hashes), profile.classes)
         return cls(
-            np.concatenate(frames),
-            np.array(labels),
-            np.array(runs),
-            MappingProxyType(hashes),
+            np.concatenate(frames), np.array(labels), np.array(runs), MappingProxyType(hashes)
         )
 
     @classmethod
     def read(cls, folder: str | Path, profile: Profile, *, training: bool = True) -> Self:
         """Read and frame a folder of NoisyTest's ``.log`` and ``.toml`` files, in sorted order.
-
-        Args:
-            folder: Folder that holds a ``.toml`` beside each ``.log``.
-            profile: How blocks are cut and framed, and which labels there are.
-            training: Whether the frames are for training; see `cut`.
-
-        Returns:
-            All annotated frames.
 
         Raises:
             FileError: If a file is missing or cannot be understood.
@@ -105,20 +87,90 @@ class Dataset:
         return len(self.labels)
 
 
-def _check_recording(recording: Recording, profile: Profile, hashes: Mapping[str, str]) -> None:
-    if abs(recording.rate / profile.rate - 1.0) > NOMINAL:
-        raise RateError(
-            recording.rate,
-            [profile.rate],
-            f"recording {recording.name!r} does not fit; lower its rate, or take another profile",
+@dataclass(frozen=True, eq=False)
+class Examples:
+    """Features of labelled frames; a tenth of the memory that the frames themselves take.
+
+    Attributes:
+        features: Not yet standardised, shape (frames, features).
+        labels: Class of each frame, shape (frames,).
+        runs: Name of the recording that each frame is from, shape (frames,).
+        hashes: SHA-256 of each recording, by name.
+    """
+
+    features: Array
+    labels: Words
+    runs: Words
+    hashes: Mapping[str, str]
+
+    @classmethod
+    def of(cls, dataset: Dataset, profile: Profile) -> Self:
+        """Features of all frames of a data set that was cut by the same profile.
+
+        Raises:
+            SignalError: If the frames do not fit the profile.
+        """
+        found = features_in_chunks(dataset.frames, profile)
+        return cls(found, dataset.labels, dataset.runs, dataset.hashes)
+
+    @classmethod
+    def read(
+        cls, recordings: Iterable[Recording], profile: Profile, *, training: bool = True
+    ) -> Self:
+        """Features of recordings, read one after the other; only the features are kept.
+
+        Args:
+            recordings: Annotated signals at the profile's rate, each of another name; those
+                without a frame are skipped.
+            profile: How blocks are cut and framed, and what to compute.
+            training: Whether the frames are for training; see `cut`.
+
+        Raises:
+            NoFrameError: If there is no frame at all.
+            DatasetError: If a name repeats.
+            ModelsError: As `Dataset.of` does.
+        """
+        found: list[Self] = []
+        hashes: dict[str, str] = {}
+        for recording in recordings:
+            _check(recording, profile, hashes)
+            hashes[recording.name] = recording.sha256
+            with suppress(NoFrameError):
+                found.append(cls.of(Dataset.of([recording], profile, training=training), profile))
+        if not found:
+            raise NoFrameError(len(hashes), profile.classes)
+        return cls(
+            np.concatenate([each.features for each in found]),
+            np.concatenate([each.labels for each in found]),
+            np.concatenate([each.runs for each in found]),
+            MappingProxyType(hashes),
         )
-    for block in recording.blocks:
-        if block.label not in profile.classes:
-            known = ", ".join(profile.classes)
-            problem = f"label {block.label!r} is no class; there are {known}"
-            raise RecordingError(recording.name, problem)
-    if recording.name in hashes:
-        raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
+
+    @property
+    def groups(self) -> Words:
+        """Group of each frame, shape (frames,); see `recording.group_of`."""
+        return np.array([group_of(name) for name in self.runs.tolist()])
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+
+def features_in_chunks(frames: Real, profile: Profile) -> Array:
+    """Features of frames, some at a time, which bounds the memory that they take."""
+    chunks = range(0, max(len(frames), 1), CHUNK)
+    return np.concatenate([features(frames[first : first + CHUNK], profile) for first in chunks])
+
+
+def _check(recording: Recording, profile: Profile, names: Mapping[str, str]) -> None:
+    name = recording.name
+    if abs(recording.rate / profile.rate - 1.0) > NOMINAL:
+        advice = f"recording {name!r} does not fit; lower its rate, or take another profile"
+        raise RateError(recording.rate, [profile.rate], advice)
+    if odd := [block.label for block in recording.blocks if block.label not in profile.classes]:
+        known = ", ".join(profile.classes)
+        raise RecordingError(name, f"label {odd[0]!r} is no class; there are {known}")
+    if name in names:
+        raise DatasetError(f"two recordings are called {name!r}; name them apart")
 
 
 def cut(
@@ -135,10 +187,8 @@ def cut(
     time: Real = recording.time[lost:].astype(precision)
     pad = training and profile.pad_short
     spread = training and profile.spread_failures and block.label != profile.classes[0]
-    start, stop = _bounds(
-        time, _spread(block, time, profile) if spread else block, profile, pad=pad
-    )
-    samples = _samples(time, start, stop, profile)
+    wanted = _spread(block, time, profile) if spread else block
+    samples = _samples(time, *_bounds(time, wanted, profile, pad=pad), profile)
     whole = stacked(recording.signal, profile.signals)
     signal: Real = whole[..., lost:][..., samples].astype(precision)
     count = signal.shape[-1]
@@ -151,11 +201,12 @@ def cut(
         raise RecordingError(
             recording.name, f"{len(time)} samples are too short: one frame takes {profile.length}"
         )
-    padding = max(profile.length - count, 0)
+    # Reflected at the last sample in time and in amplitude, which continues value and slope.
+    padding = [(0, 0)] * (signal.ndim - 1) + [(0, max(profile.length - count, 0))]
     valid = np.ones(len(time), bool) if recording.valid is None else recording.valid[lost:]
     return (
-        pad_end(signal, length=profile.length),
-        np.pad(valid[samples], (0, padding), constant_values=True),
+        np.pad(signal, padding, mode="reflect", reflect_type="odd"),
+        np.pad(valid[samples], padding[-1], constant_values=True),
     )
 
 
@@ -193,82 +244,3 @@ def _samples(time: Real, start: float, stop: float, profile: Profile) -> slice:
         return slice(inside[0], inside[-1] + 1) if len(inside) else slice(0, 0)
     first = max(round((start - float(time[0])) * profile.rate), 0)
     return slice(first, first + round((stop - start) * profile.rate))
-
-
-CHUNK = 64
-"""Frames per evaluation, which bounds the memory that they take."""
-
-
-@dataclass(frozen=True, eq=False)
-class Examples:
-    """Features of labelled frames; a tenth of the memory that the frames themselves take.
-
-    Attributes:
-        features: Not yet standardised, shape (frames, features).
-        labels: Class of each frame, shape (frames,).
-        runs: Name of the recording that each frame is from, shape (frames,).
-        hashes: SHA-256 of each recording, by name.
-    """
-
-    features: Array
-    labels: Words
-    runs: Words
-    hashes: Mapping[str, str]
-
-    @classmethod
-    def of(cls, dataset: Dataset, profile: Profile) -> Self:
-        """Features of all frames of a data set.
-
-        Args:
-            dataset: Annotated frames, cut by the same profile.
-            profile: What to compute.
-
-        Raises:
-            SignalError: If the frames do not fit the profile.
-        """
-        chunks = range(0, len(dataset), CHUNK)
-        found = [features(dataset.frames[first : first + CHUNK], profile) for first in chunks]
-        return cls(np.concatenate(found), dataset.labels, dataset.runs, dataset.hashes)
-
-    @classmethod
-    def read(
-        cls, recordings: Iterable[Recording], profile: Profile, *, training: bool = True
-    ) -> Self:
-        """Features of recordings, read one after the other; only the features are kept.
-
-        Args:
-            recordings: Annotated signals at the profile's rate, each of another name; those
-                without a frame are skipped.
-            profile: How blocks are cut and framed, and what to compute.
-            training: Whether the frames are for training; see `cut`.
-
-        Raises:
-            NoFrameError: If there is no frame at all.
-            DatasetError: If a name repeats.
-            ModelsError: As `Dataset.of` does.
-        """
-        found: list[Self] = []
-        hashes: dict[str, str] = {}
-        for recording in recordings:
-            if recording.name in hashes:
-                raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
-            hashes[recording.name] = recording.sha256
-            with suppress(NoFrameError):
-                dataset = Dataset.of([recording], profile, training=training)
-                found.append(cls.of(dataset, profile))
-        if not found:
-            raise NoFrameError(len(hashes), profile.classes)
-        return cls(
-            np.concatenate([each.features for each in found]),
-            np.concatenate([each.labels for each in found]),
-            np.concatenate([each.runs for each in found]),
-            MappingProxyType(hashes),
-        )
-
-    @property
-    def groups(self) -> Words:
-        """Group of each frame, shape (frames,); see `splitting.group_of`."""
-        return np.array([group_of(name) for name in self.runs.tolist()])
-
-    def __len__(self) -> int:
-        return len(self.labels)

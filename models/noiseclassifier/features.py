@@ -1,4 +1,8 @@
-"""Features: log-band energies of the frames, pooled over time.
+"""Features: log-band energies of the frames of a signal, pooled over time.
+
+Frame ``i`` holds the samples from ``i * hop`` up to ``i * hop + length``; a stretch at the end that
+is shorter than a hop belongs to no frame (paper, Sec. III-A, Framing). `FrameFeatures` takes a
+signal in chunks of any size; a whole signal is a single chunk. `features` takes frames alone.
 
 Conventions: a spectrogram has the axes (frames, time, frequency). Signals follow one after the
 other, among the log-band energies of a window as well as in a feature vector. A feature vector of
@@ -6,16 +10,57 @@ NoisyTest and the paper has the coefficients over time of the first band first, 
 the second.
 """
 
-from collections.abc import Sequence
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from noiseclassifier.errors import SignalError
-from noiseclassifier.pooling import pooled, spectra, statistics
-from noiseclassifier.profile import Profile, Resolution
-from noiseclassifier.types import Array, Index, Real
+from noiseclassifier.profile import STATISTICS, Profile, Resolution, columns, spectra
+from noiseclassifier.reference import RunningReference
+from noiseclassifier.signals import Signals, by_joint, stacked
+from noiseclassifier.types import Array, Index, Mask, Real
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+AT_ONCE = 2**16
+"""How many samples are transformed at once, of all rows: more leave the cache of the processor."""
+LENGTHS = 2
+"""Frames' lengths of samples that are taken at once: more do not fit into the cache."""
+
+Frames: TypeAlias = tuple[Index, Array]
+"""First sample of each frame, shape (frames,), and its features, not yet standardised, shape
+(frames, features)."""
+
+
+# --- frames alone
+
+
+def frame(signal: NDArray[Scalar], *, length: int = 4000, hop: int = 1000) -> NDArray[Scalar]:
+    """Overlapping frames of a signal.
+
+    Args:
+        signal: The noise signal, shape (samples,), or several, shape (signals, samples).
+        length: Samples of a frame.
+        hop: Samples from the start of one frame to the start of the next.
+
+    Returns:
+        A read-only view, shape (frames, length), or (frames, signals, length) of several.
+
+    Raises:
+        SignalError: If the signal has another shape or is shorter than one frame.
+    """
+    if signal.ndim not in (1, 2):
+        raise SignalError(f"a signal of shape {signal.shape}, expected (samples,)")
+    if signal.shape[-1] < length:
+        raise SignalError(
+            f"a signal of {signal.shape[-1]} samples is too short: one frame takes {length}"
+        )
+    windows = np.lib.stride_tricks.sliding_window_view(signal, length, axis=-1)
+    return np.moveaxis(windows[..., ::hop, :], -2, 0)
 
 
 def features(frames: Real, profile: Profile) -> Array:
@@ -32,23 +77,41 @@ def features(frames: Real, profile: Profile) -> Array:
     Raises:
         SignalError: If the frames have another shape or values that are not finite.
     """
-    _check(frames, profile)
+    _check_frames(frames, profile)
     rows = frames.shape[1] if frames.ndim > 2 else 1
     exact = rounded(frames, profile).reshape(len(frames), rows, profile.length).swapaxes(0, 1)
     energies = [
-        log_band_energies(_windows(exact, each.window, each.stride), profile, each)
+        log_band_energies(_windows_of(exact, each.window, each.stride), profile, each)
         for each in profile.resolutions
     ]
     found = temporal_pooling(energies, profile)
     return np.concatenate((found, 0.0 * found), axis=1) if profile.reference else found
 
 
-def rounded(samples: Real, profile: Profile) -> Array:
-    """Samples as 64-bit numbers, rounded to the precision of the profile.
+def _check_frames(frames: Real, profile: Profile) -> None:
+    count, norms = len(profile.signals), profile.norms
+    shape: tuple[int | str, ...] = (profile.length,) if count == 1 else (count, profile.length)
+    fit = frames.shape[1:] == shape
+    if norms < count:
+        shape = f"{norms} + {count - norms} joints", profile.length
+        rows = frames.shape[1] - norms if frames.ndim == 3 else 0
+        fit = rows > 0 and rows % (count - norms) == 0 and frames.shape[2] == profile.length
+    if not fit:
+        raise SignalError(
+            f"frames of shape {frames.shape}, expected (frames, {', '.join(map(str, shape))})"
+            f" for profile {profile.name!r} at {profile.rate:g} Hz"
+        )
+    if not np.isfinite(frames).all():
+        plain = frames.reshape(len(frames), -1)
+        number = int(np.flatnonzero(~np.isfinite(plain).all(axis=1))[0])
+        raise SignalError(f"frame {number} holds a value that is not finite")
 
-    Args:
-        samples: A noise signal, any shape.
-    """
+
+# --- from windows to features
+
+
+def rounded(samples: Real, profile: Profile) -> Array:
+    """Samples as 64-bit numbers, rounded to the precision of the profile."""
     if profile.single_precision:
         samples = samples.astype(np.float32, copy=False)
     return samples.astype(np.float64, copy=False)
@@ -105,18 +168,76 @@ def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
     Returns:
         Features, not yet standardised, shape (frames, features).
     """
-    if profile.bands == "log":
-        return pooled(energies, profile)
-    flat = dct(energies[0]).reshape(len(energies[0]), feature_count(profile))
-    return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
+    if profile.bands != "log":
+        flat = dct(energies[0]).reshape(len(energies[0]), feature_count(profile))
+        return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
+    count, rows = len(profile.statistics), []
+    for each, resolution in zip(energies, profile.resolutions, strict=True):
+        found, bands = pool(each, count), len(resolution.edges) - 1
+        apart = found.reshape(len(found), count, -1, bands)  # spectrum by spectrum
+        rows.append(apart.swapaxes(1, 2).reshape(len(found), -1))
+    if not profile.relative:
+        return np.concatenate(rows, axis=1)
+    means, above = _level(profile)
+    described = np.concatenate((*rows, np.zeros((len(rows[0]), 1))), axis=1)
+    level = np.add.reduce(described.take(means, 1), 1, keepdims=True) / len(means)
+    described -= level * above
+    return described
+
+
+def pool(energies: Array, count: int = len(STATISTICS)) -> Array:
+    """Mean, maximum and standard deviation over time of each log-band energy.
+
+    Args:
+        count: How many of these statistics, 2 or 3.
+
+    Returns:
+        Statistics, which do not depend on the order in time, shape (frames, count, energies).
+    """
+    # A frame at a time is too little for NumPy's methods, which take longer than their ufuncs.
+    frames, windows, bands = energies.shape
+    found = np.empty((frames, count, bands))
+    mean, most = found[:, 0], found[:, 1]
+    np.add.reduce(energies, 1, out=mean)
+    mean /= windows
+    np.maximum.reduce(energies, 1, out=most)
+    if count < len(STATISTICS):
+        return found
+    deviation = found[:, 2]
+    squares = energies - mean[:, None]
+    squares *= squares
+    np.add.reduce(squares, 1, out=deviation)
+    deviation /= windows
+    np.sqrt(deviation, deviation)
+    return found
+
+
+@lru_cache
+def _level(profile: Profile) -> tuple[Index, Array]:
+    """Weights by which features become relative to the level of the frame.
+
+    Returns:
+        Places of the means of the norms, of which the level of the frame is the mean, shape
+        (means,); and how often that level is subtracted from each feature: once from the means and
+        maxima of norms and loudest joints, minus once from the last feature, which thereby is the
+        level itself, shape (features,).
+    """
+    means, above = [], []
+    for each in profile.resolutions:
+        for name in spectra(profile):
+            difference = " less " in name
+            for statistic in profile.statistics:
+                counts = not difference and statistic != "deviation"
+                mean = counts and statistic == "mean" and not by_joint(name)
+                means += [mean] * (len(each.edges) - 1)
+                above += [float(counts)] * (len(each.edges) - 1)
+    return np.flatnonzero(means), np.array([*above, -1.0])
 
 
 def feature_count(profile: Profile) -> int:
     """Number of features of a frame."""
     if profile.bands == "log":
-        bands = sum(len(each.edges) - 1 for each in profile.resolutions)
-        plain = len(spectra(profile)) * statistics(profile) * bands + profile.relative
-        return (1 + profile.reference) * plain
+        return len(columns(profile))
     return profile.norms * (profile.bins // 3) * profile.transforms
 
 
@@ -136,6 +257,9 @@ def standard(plain: Real, profile: Profile) -> tuple[Array, Array]:
     return mean, np.maximum(deviation, profile.least_deviation)
 
 
+# --- the Fourier transform and its bands
+
+
 def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
     """Amplitudes of the short-time Fourier transform (paper, Sec. III-A), not padded.
 
@@ -145,7 +269,7 @@ def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
     Returns:
         Amplitudes, shape (frames, time, frequency).
     """
-    return np.abs(_transform(_windows(frames, window, stride)))
+    return np.abs(_transform(_windows_of(frames, window, stride)))
 
 
 def compress(spectrum: Array, *, comb: bool = False) -> Array:
@@ -198,7 +322,7 @@ def band_shares(rate: float, resolution: Resolution) -> Array:
     return normalised
 
 
-def _windows(frames: Array, window: int, stride: int) -> Array:
+def _windows_of(frames: Array, window: int, stride: int) -> Array:
     return np.lib.stride_tricks.sliding_window_view(frames, window, axis=-1)[..., ::stride, :]
 
 
@@ -243,22 +367,275 @@ def _cosines(count: int) -> Array:
     return basis
 
 
-def _check(frames: Real, profile: Profile) -> None:
-    count, norms = len(profile.signals), profile.norms
-    shape: tuple[int | str, ...] = (profile.length,) if count == 1 else (count, profile.length)
-    fit = frames.shape[1:] == shape
-    if norms < count:
-        shape = f"{norms} + {count - norms} joints", profile.length
-        joints, rest = (
-            divmod(frames.shape[1] - norms, count - norms) if frames.ndim == 3 else (0, 0)
-        )
-        fit = joints > 0 and not rest and frames.shape[2] == profile.length
-    if not fit:
-        raise SignalError(
-            f"frames of shape {frames.shape}, expected (frames, {', '.join(map(str, shape))})"
-            f" for profile {profile.name!r} at {profile.rate:g} Hz"
-        )
-    if not np.isfinite(frames).all():
-        plain = frames.reshape(len(frames), -1)
-        number = int(np.flatnonzero(~np.isfinite(plain).all(axis=1))[0])
-        raise SignalError(f"frame {number} holds a value that is not finite")
+# --- signals, whole or in chunks
+
+
+def frame_features(signal: Signals, profile: Profile, valid: Mask | None = None) -> Frames:
+    """Features of all frames of a whole signal.
+
+    Args:
+        signal: The noise estimate, shape (samples,), or signals by name.
+        profile: How it is framed, and what to compute.
+        valid: False in gaps, shape (samples,); frames that touch a gap are left out.
+    """
+    return _joined([*frames_of([(signal, valid)], profile)])
+
+
+def frames_of(pieces: Iterable[tuple[Signals, Mask | None]], profile: Profile) -> Iterator[Frames]:
+    """Features of all frames of a signal that comes in pieces, the same as of the whole one.
+
+    Args:
+        pieces: The noise estimate, shape (samples,), or signals by name, and False in gaps, shape
+            (samples,); one piece or more.
+        profile: How it is framed, and what to compute.
+    """
+    frames = None
+    for signal, valid in pieces:
+        samples = stacked(signal, profile.signals)
+        if frames is None:
+            frames = FrameFeatures(profile, len(samples) if samples.ndim > 1 else 1)
+        yield frames.push(samples, None if valid is None else np.asarray(valid, bool))
+    assert frames is not None
+    least = profile.drop_first_sample + profile.length
+    if frames.count < least:
+        raise SignalError(f"a signal of {frames.count} samples is too short: a frame takes {least}")
+    yield frames.finish()
+
+
+class FrameFeatures:
+    """Features of the frames of a signal that comes in chunks of any size.
+
+    The features of a frame come with its last sample, and do not depend on the chunks, bit for
+    bit. Each Fourier transform is computed once, for all frames that share it: many at a time,
+    since they take little longer than one, and all but the last few before the chunk that
+    completes a frame. Memory does not grow.
+
+    Args:
+        profile: How the signal is framed, and what to compute.
+        rows: Number of norms, and of joints of all signals that go joint by joint.
+
+    Attributes:
+        count: Samples so far.
+    """
+
+    def __init__(self, profile: Profile, rows: int) -> None:
+        self._profile = profile
+        # Room for a frame, and for as much as is taken at once.
+        self._at_once = LENGTHS * profile.length
+        self._samples = np.zeros((rows, profile.length + self._at_once))
+        self._valid = np.zeros(self._samples.shape[1], dtype=bool)
+        self._windows = [_Windows(self._samples, profile, each) for each in profile.resolutions]
+        self._nothing = np.empty(0, dtype=np.intp), np.empty((0, feature_count(profile)))
+        # Longest latency of a window: its samples have to be in the buffer still.
+        self._latency = profile.length - max(each.window for each in profile.resolutions)
+        self._lead = min(profile.hop // 2, *(each.stride for each in profile.resolutions))
+        self._begin()
+
+    def _begin(self) -> None:
+        self.count = 0
+        self._held = 0  # samples in the buffer
+        self._first = int(self._profile.drop_first_sample)
+        self._frame = self._first  # start of the next frame
+        self._relative = RunningReference()
+        for windows in self._windows:
+            windows.done = 0
+        self._due = self._next_due(0)  # count with which there is work to do
+
+    def push(self, samples: Real, valid: Mask | None = None) -> Frames:
+        """Features of the frames that samples complete.
+
+        Args:
+            samples: Any number of them, also none, shape (samples,) or (rows, samples).
+            valid: False in gaps, shape (samples,); frames that touch a gap are left out.
+        """
+        count = samples.shape[-1]
+        if samples.ndim > 1 and len(samples) != len(self._samples):
+            raise SignalError(
+                f"{len(samples)} rows of norms and joints, expected {len(self._samples)}"
+            )
+        if valid is not None and valid.shape != (count,):
+            raise SignalError(
+                f"samples of shape {samples.shape} and validity of shape {valid.shape},"
+                " expected (samples,) for both"
+            )
+        if not np.isfinite(samples).all():
+            plain = samples.reshape(-1, count)
+            row, place = np.argwhere(~np.isfinite(plain))[0].tolist()
+            raise SignalError(
+                f"sample {self.count + place} of the signal is not finite ({plain[row, place]})"
+            )
+        return self._take(rounded(samples, self._profile), valid)
+
+    def skip(self, samples: int) -> None:
+        """Skip a gap: the same as pushing so many samples that are not valid.
+
+        Args:
+            samples: How many were lost; a gap of hours takes no longer than one of seconds.
+        """
+        length, hop = self._profile.length, self._profile.hop
+        self._lose(min(samples, length))
+        # Pending frames lie wholly in the gap now, and so would all that are skipped.
+        hops = max(samples - length, 0) // hop
+        self.count += hops * hop
+        self._frame += hops * hop
+        self._due += hops * hop
+        for windows in self._windows:
+            windows.jump(hops)
+        self._lose(samples - min(samples, length) - hops * hop)
+
+    def finish(self) -> Frames:
+        """End the signal; what is pushed next begins another one."""
+        profile, found = self._profile, self._nothing
+        last = self.count - profile.length
+        flush = profile.flush_end and last > self._first
+        if flush and (last - self._first) % profile.hop and self._is_whole(last):
+            energies = [windows.of_place(last - self._base) for windows in self._windows]
+            found = np.array([last]), self._features(energies)
+        self._begin()
+        return found
+
+    def _take(self, exact: Array, valid: Mask | None) -> Frames:
+        found: list[Frames] = []
+        for first in range(0, exact.shape[-1], self._at_once):
+            piece = slice(first, first + self._at_once)
+            self._keep(exact[..., piece], True if valid is None else valid[piece])
+            if self.count >= self._due:
+                found += self._advance(exact.shape[-1])
+        return _joined(found) if found else self._nothing
+
+    def _lose(self, samples: int) -> None:
+        self._take(np.zeros((len(self._samples), samples)), np.zeros(samples, dtype=bool))
+
+    def _keep(self, samples: Array, valid: Mask | bool) -> None:
+        """Append samples to the buffer, at most as many as are taken at once."""
+        length = self._profile.length
+        count = samples.shape[-1]
+        if self._held + count > len(self._valid):
+            for buffer in (self._samples, self._valid):
+                buffer[..., :length] = buffer[..., self._held - length : self._held]
+            self._held = length
+        stop = self._held + count
+        self._samples[..., self._held : stop], self._valid[self._held : stop] = samples, valid
+        self._held = stop
+        self.count += count
+
+    def _advance(self, chunk: int) -> list[Frames]:
+        """Transform the windows that are complete, and pool those of the frames that are.
+
+        Args:
+            chunk: Samples of the last chunk; the next one is expected to have as many.
+        """
+        profile = self._profile
+        for windows in self._windows:
+            windows.advance(self.count - self._first, self._base - self._first)
+        frames = range(self._frame, self.count - profile.length + 1, profile.hop)
+        self._frame += len(frames) * profile.hop
+        self._due = self._next_due(chunk)
+        whole = np.array([frame for frame in frames if self._is_whole(frame)], dtype=np.intp)
+        if not len(whole):
+            return []
+        numbers = (whole - self._first) // profile.hop
+        energies = [windows.of_frames(numbers) for windows in self._windows]
+        return [(whole, self._features(energies))]
+
+    def _features(self, energies: list[Array]) -> Array:
+        """Features of frames, in order, unchanged and relative to those so far."""
+        found = temporal_pooling(energies, self._profile)
+        if not self._profile.reference:
+            return found
+        return np.concatenate((found, self._relative.relative(found)), axis=1)
+
+    def _next_due(self, chunk: int) -> int:
+        """Count at which to go on: before the chunk that completes a frame, and after it."""
+        complete = self._frame + self._profile.length
+        early = complete - max(chunk, self._lead)
+        return min(early if early > self.count else complete, self.count + self._latency)
+
+    @property
+    def _base(self) -> int:
+        """Number of the first sample in the buffer."""
+        return self.count - self._held
+
+    def _is_whole(self, frame: int) -> bool:
+        """Whether no gap touches the frame that starts at a sample."""
+        place = frame - self._base
+        return bool(self._valid[place : place + self._profile.length].all())
+
+
+class _Windows:
+    """Log-band energies of a signal's windows at one resolution, each computed once.
+
+    Frames start every hop, and their windows at the same phases of each hop. Windows are numbered
+    in order of time. Samples are counted from the start of the first frame.
+
+    Args:
+        samples: Buffer of the signal, shape (rows, samples).
+
+    Attributes:
+        done: How many windows are transformed.
+    """
+
+    def __init__(self, samples: Array, profile: Profile, resolution: Resolution) -> None:
+        self._profile, self._resolution = profile, resolution
+        steps = resolution.stride * np.arange(resolution.transforms(profile.length))
+        hops, phase = np.divmod(steps, profile.hop)
+        phases, rank = np.unique(phase, return_inverse=True)
+        self._of_frame = hops * len(phases) + rank  # those of the first frame
+        self._in_frame = steps
+        self._phases: list[int] = phases.tolist()
+        self._windows = np.lib.stride_tricks.sliding_window_view(samples, resolution.window, -1)
+        cycle = samples.shape[1] // profile.hop + 2
+        self._rows, self._cycle = len(phases) * cycle, cycle * profile.hop
+        # Window i is in row i modulo rows; two cycles, so that no slice ends at the last row.
+        around = np.arange(2 * self._rows)
+        self._row_of = around % self._rows
+        self._start_of = around // len(phases) * profile.hop + phases[around % len(phases)]
+        one = log_band_energies(self._windows[:, 0], profile, resolution)
+        self._energies = np.zeros((self._rows, *one.shape))
+        self._at_once = max(1, AT_ONCE // (samples.shape[0] * resolution.window))
+        self.done = 0
+
+    def jump(self, hops: int) -> None:
+        """Skip so many hops of a gap."""
+        self.done += hops * len(self._phases)
+
+    def advance(self, count: int, base: int) -> None:
+        """Transform the windows that are complete.
+
+        Args:
+            count: Samples so far.
+            base: Number of the first one in the buffer.
+        """
+        hops, phase = divmod(count - self._resolution.window, self._profile.hop)
+        complete = hops * len(self._phases) + bisect_right(self._phases, phase)
+        if complete <= self.done:
+            return
+        cycles, first = divmod(self.done, self._rows)
+        fresh = slice(first, first + complete - self.done)
+        starts = self._start_of[fresh] + (cycles * self._cycle - base)
+        rows = self._row_of[fresh]
+        for few in range(0, len(starts), self._at_once):
+            part = slice(few, few + self._at_once)
+            one = len(starts[part]) == 1  # a slice copies nothing
+            chosen = slice(starts[few], starts[few] + 1) if one else starts[part]
+            self._energies[rows[part]] = log_band_energies(
+                self._windows[:, chosen], self._profile, self._resolution
+            )
+        self.done = complete
+
+    def of_frames(self, frames: Index) -> Array:
+        """Log-band energies of frames whose windows are transformed, by their numbers in hops."""
+        windows = (frames * len(self._phases))[:, None] + self._of_frame
+        return self._energies.take(windows, axis=0, mode="wrap")
+
+    def of_place(self, place: int) -> Array:
+        """Log-band energies of the frame that starts at a place in the buffer."""
+        windows = self._windows[:, place + self._in_frame]
+        return log_band_energies(windows, self._profile, self._resolution)[None]
+
+
+def _joined(parts: list[Frames]) -> Frames:
+    if len(parts) == 1:
+        return parts[0]
+    starts, found = zip(*parts, strict=True)
+    return np.concatenate(starts), np.concatenate(found)

@@ -9,26 +9,23 @@ other, without missing features.
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
 from noiseclassifier import modelfile
-from noiseclassifier.classifier import Classifier
+from noiseclassifier.classifier import Classifier, targets_of
 from noiseclassifier.confusion import Evaluation
-from noiseclassifier.errors import DatasetError, MissingSignalError, RateError
+from noiseclassifier.errors import MissingSignalError, RateError
 from noiseclassifier.estimators.decision import unthinned
 from noiseclassifier.estimators.trees import Detector, Trees
 from noiseclassifier.evaluation.matching import OK, UNCLEAR, truth_of, within
-from noiseclassifier.features import standard
-from noiseclassifier.framefeatures import frame_features
+from noiseclassifier.features import frame_features, standard
 from noiseclassifier.labels import UNKNOWN
-from noiseclassifier.logbands import HIGHEST, INPUTS, LOWEST, LogBands
-from noiseclassifier.pooling import RELATIVE
-from noiseclassifier.profile import TOLERANCE
+from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, RELATIVE, TOLERANCE, LogBands
 from noiseclassifier.recording import Recording, group_of
-from noiseclassifier.signals import NOISE, feeds, named
-from noiseclassifier.types import Array, Index, Real, Words
+from noiseclassifier.signals import EFFORT, NOISE, feeds, named
+from noiseclassifier.types import Array, Real, Words
 
 LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
 """Of the inputs, those that training takes of each log: the others lack features of the first."""
@@ -43,7 +40,7 @@ class Frames:
     Attributes:
         features: Not yet standardised; NaN where a feature is missing, shape (frames, features).
         labels: Class of each frame, shape (frames,).
-        groups: Group of each, see `splitting.group_of`, shape (frames,).
+        groups: Group of each, see `recording.group_of`, shape (frames,).
         hashes: SHA-256 of each recording, by name.
     """
 
@@ -56,12 +53,11 @@ class Frames:
     def joined(cls, parts: Iterable[Self]) -> Self:
         """Frames of all parts, one or more."""
         every = list(parts)
-        hashes = {name: digest for part in every for name, digest in part.hashes.items()}
         return cls(
             np.concatenate([part.features for part in every]),
             np.concatenate([part.labels for part in every]),
             np.concatenate([part.groups for part in every]),
-            hashes,
+            {name: digest for part in every for name, digest in part.hashes.items()},
         )
 
 
@@ -106,19 +102,12 @@ class General:
         Raises:
             DatasetError: If the frames are of fewer than two classes.
         """
-        there = set(frames.labels.tolist())
-        classes = tuple(name for name in recipe.classes if name in there)
-        if len(classes) < 2 or there - set(classes):
-            raise DatasetError(
-                f"training takes two classes or more of {', '.join(recipe.classes)};"
-                f" the frames are {', '.join(sorted(there))}"
-            )
+        classes, targets = targets_of(frames.labels, recipe.classes)
         # A feature that no frame has tells nothing, wherever its frames would be.
         unknown = np.isnan(frames.features).all(axis=0)
         features = np.where(unknown, 0.0, frames.features)
         profile = recipe.bound(HIGHEST)
         mean, scale = standard(features, profile)
-        targets = np.array([classes.index(label) for label in frames.labels.tolist()])
         scaled = (features - mean) / scale
         trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising)
         relative = np.array([name.startswith(RELATIVE) for name in recipe.columns])
@@ -164,10 +153,10 @@ class General:
             self.estimator.at(there),
             self.mean[there],
             self.scale[there],
-            runs=self.runs,
-            metrics=self.metrics,
-            versions=self.versions,
-            sha256=self.sha256,
+            self.runs,
+            self.metrics,
+            self.versions,
+            self.sha256,
         )
 
     @classmethod
@@ -180,10 +169,10 @@ class General:
             Detector.of(arrays, recipe.bound(HIGHEST)),
             arrays["mean"],
             arrays["scale"],
-            runs=manifest["runs"],
-            metrics=manifest["metrics"],
-            versions=manifest["versions"],
-            sha256=sha256,
+            manifest["runs"],
+            manifest["metrics"],
+            manifest["versions"],
+            sha256,
         )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
@@ -192,17 +181,9 @@ class General:
         Raises:
             OutputError: If the file exists or cannot be written.
         """
-        manifest = {
-            "recipe": asdict(self.recipe),
-            "profile": self.recipe.bound(HIGHEST).as_dict(),
-            "classes": list(self.classes),
-            "rate": HIGHEST,
-            "runs": dict(self.runs),
-            "metrics": dict(self.metrics),
-            "versions": dict(self.versions),
-        }
-        arrays = {**self.estimator.arrays(), "mean": self.mean, "scale": self.scale}
-        modelfile.write(path, manifest, arrays, overwrite=overwrite)
+        profile = self.recipe.bound(HIGHEST).as_dict()
+        settings = {"recipe": asdict(self.recipe), "profile": profile, "rate": HIGHEST}
+        modelfile.write(path, self, settings, overwrite=overwrite)
 
 
 def frames_of(
@@ -227,7 +208,7 @@ def frames_of(
     Yields:
         Frames of a recording.
     """
-    count = len(recipe.columns)
+    efforts = np.array([name.startswith(EFFORT) for name in recipe.columns])
     for recording in recordings:
         fed = [names for names in inputs if feeds(named(recording.signal), names)]
         for number, names in enumerate(fed):
@@ -235,22 +216,65 @@ def frames_of(
             starts, features = frame_features(recording.signal, profile, recording.valid)
             begin, step = recording.start + starts / recording.rate, 1.0 / recording.rate
             truth = truth_of(begin, begin + profile.duration, within(recording), step=step)
-            known = kept(truth, thin, first=not number)
-            full = np.full((len(known), count), np.nan, dtype=np.float32)
-            full[:, recipe.places(profile)] = features[known]
-            full[:, recipe.without_unit] = np.nan
+            ok = truth == OK
+            kept = np.flatnonzero((truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0)))
+            kept = kept[::2] if number else kept
+            full = np.full((len(kept), len(efforts)), np.nan, dtype=np.float32)
+            full[:, recipe.places(profile)] = features[kept]
+            full[:, efforts] = np.nan  # their unit is not known, but relative to the run it is none
             groups = np.full(len(full), group_of(recording.name))
-            yield Frames(full, truth[known], groups, {recording.name: recording.sha256})
+            yield Frames(full, truth[kept], groups, {recording.name: recording.sha256})
 
 
-def kept(truth: Words, thin: int, *, first: bool = True) -> Index:
-    """Frames to train on: all of a known class, but only every ``thin``-th `ok` one.
+# --- files, and the choice of a model
+
+Model: TypeAlias = Classifier | General
+"""A model of one rate, or of any."""
+
+
+def load(path: str | Path) -> Model:
+    """Read a model file, of one rate or of any; nothing in it is unpickled or run.
+
+    Raises:
+        FileError: If the file is missing, damaged, no model file, or of another version.
+    """
+    manifest, arrays = modelfile.read(path)
+    kind = General if "recipe" in manifest else Classifier
+    return kind.of(manifest, arrays, modelfile.digest(path))
+
+
+def nearest(
+    models: Mapping[str, Model], rate: float, signals: Collection[str] = (NOISE,)
+) -> tuple[str, Classifier]:
+    """Model of the nearest rate at or below that of the signals, bound to them.
+
+    Of models of one rate, it is the one of most signals. A general model has any rate.
 
     Args:
-        truth: True class of each frame, `UNCLEAR` where that is not known, shape (frames,).
-        first: Whether they are of the first input that a recording feeds; of the others, every
-            other frame is enough.
+        models: Models of any rates, by name.
+        rate: Sample rate of the signals, in [Hz].
+        signals: Names of the signals that there are.
+
+    Returns:
+        Its name, and the model at its rate.
+
+    Raises:
+        MissingSignalError: If each model needs a signal that is missing.
+        RateError: If all others are of higher rates, or there are no models.
     """
-    ok = truth == OK
-    known = np.flatnonzero((truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0)))
-    return known if first else known[::2]
+    found: dict[str, Classifier] = {}
+    lacking: list[MissingSignalError] = []
+    rates: list[float] = []
+    for name, model in models.items():
+        try:
+            found[name] = model.at(rate, signals)
+        except MissingSignalError as error:
+            lacking.append(error)
+        except RateError as error:
+            rates += error.known
+    if found:
+        name = max(found, key=lambda each: (found[each].rate, len(found[each].profile.signals)))
+        return name, found[name]
+    if lacking and not rates:
+        raise min(lacking, key=lambda error: len(error.lacking))
+    raise RateError(rate, rates)

@@ -29,8 +29,7 @@ from noiseclassifier.estimators import ESTIMATORS
 from noiseclassifier.estimators.trees import Trees
 from noiseclassifier.features import feature_count
 from noiseclassifier.jsontext import from_json
-from noiseclassifier.logbands import HIGHEST, LogBands
-from noiseclassifier.profile import Profile
+from noiseclassifier.profile import HIGHEST, LogBands, Profile
 from noiseclassifier.types import Array
 
 FORMAT = "noise-model/6"
@@ -65,19 +64,25 @@ def versions() -> dict[str, str]:
 
 
 def write(
-    path: str | Path,
-    manifest: Mapping[str, Any],
-    arrays: Mapping[str, Array],
-    *,
-    overwrite: bool = False,
+    path: str | Path, model: Any, settings: Mapping[str, Any], *, overwrite: bool = False
 ) -> None:
     """Write a model file, whole or not at all.
 
     Args:
-        manifest: What is known of the model, as JSON can hold it.
+        model: A classifier, or a general model.
+        settings: Its profile, its rate, and its recipe if it is for any rate.
         overwrite: Whether a file that exists may be replaced.
     """
-    text = json.dumps({"format": FORMAT, **manifest}, sort_keys=True, allow_nan=False)
+    manifest = {
+        "format": FORMAT,
+        **settings,
+        "classes": list(model.classes),
+        "runs": dict(model.runs),
+        "metrics": dict(model.metrics),
+        "versions": dict(model.versions),
+    }
+    arrays = {**model.estimator.arrays(), "mean": model.mean, "scale": model.scale}
+    text = json.dumps(manifest, sort_keys=True, allow_nan=False)
     content = io.BytesIO()
     np.savez(content, allow_pickle=False, manifest=np.array(text), **arrays)  # dated 1980 always
     _replace(Path(path), content.getvalue(), overwrite=overwrite)

@@ -1,39 +1,53 @@
-"""The profile: every setting of framing, features and estimator."""
+"""Profiles: every setting of frames, features and estimator, for one rate or for any.
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from functools import cached_property
+A `Profile` is in samples and of one rate: NoisyTest's, the paper's, or the profile that a recipe in
+seconds and hertz (`LogBands`) has at that rate.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property, lru_cache
 from itertools import pairwise
-from math import isfinite
+from math import ceil, isfinite
 from typing import Any, Literal, Self, TypeAlias, get_args
 
+import numpy as np
+
 from noiseclassifier.errors import ProfileError
-from noiseclassifier.signals import EFFORT, JOINTS, by_joint
+from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE, by_joint
+from noiseclassifier.types import Index
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 """NoisyTest's classes, in its order; `ok` is the first of every model."""
-
 MOST_LEAVES = 16
 """Leaves that a tree may have: a bit for each."""
-
 TOLERANCE = 1e-3
 """Two sample rates are the same if they differ by less than this share."""
-
 NOMINAL = 0.02
-"""Two nominal rates, such as those of jittering stamps, are the same up to this share; what is
+"""Two nominal rates, such as those of jittering timestamps, are the same up to this share; what is
 computed of the spectrum is off by as much."""
+STATISTICS = ("mean", "maximum", "deviation")
+"""Statistics over a frame of each log-band energy. Beside a reference, the last one adds nothing on
+robots left out, and is not computed."""
+RELATIVE = "relative"
+"""What the names of features begin with that are relative to a reference."""
 
-Bands: TypeAlias = Literal["adjacent", "comb", "log"]
 Kernel: TypeAlias = Literal["linear", "rbf"]
 EstimatorKind: TypeAlias = Literal["svm", "networks", "trees", "detector"]
 Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
 
-_CHOICES = {"bands": Bands, "kernel": Kernel, "estimator": EstimatorKind, "multiclass": Multiclass}
-
-
-_POSITIVE = (
+_CHOICES = {
+    "bands": ("adjacent", "comb", "log"),
+    "kernel": get_args(Kernel),
+    "estimator": get_args(EstimatorKind),
+    "multiclass": get_args(Multiclass),
+}
+_ABOVE_ZERO = (
     *("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma"),
     *("networks", "units", "epochs", "rounds", "learning_rate", "alarm"),
+)
+_ZERO_OR_MORE = (
+    *("open_end", "widen_extra", "least_deviation", "decay", "penalty", "quick_window"),
 )
 
 
@@ -60,10 +74,10 @@ class Resolution:
 
 @dataclass(frozen=True, kw_only=True)
 class Profile:
-    """Settings of framing, features and estimator; defaults are the paper's.
+    """Settings of frames, features and estimator; defaults are the paper's.
 
     Raises:
-        ProfileError: If a setting is out of its range or two do not fit together.
+        ProfileError: If a setting is out of its range, or two do not fit together.
     """
 
     name: str
@@ -83,7 +97,7 @@ class Profile:
     """Samples of the Hann window of one Fourier transform."""
     stride: int = 834
     """Samples from one Fourier transform to the next (the paper's s_fft)."""
-    bands: Bands = "adjacent"
+    bands: Literal["adjacent", "comb", "log"] = "adjacent"
     """How bins become bands: three adjacent ones, NoisyTest's comb, or ``edges``."""
     edges: tuple[float, ...] = ()
     """Edges of the bands of ``log``, ascending, in [Hz]."""
@@ -158,19 +172,14 @@ class Profile:
 
     def __post_init__(self) -> None:
         """Check every setting once."""
-        _check_types(self)
-        _check_ranges(self)
-        _check_signals(self)
-        _check_bands(self)
+        for check in (_check_types, _check_ranges, _check_signals, _check_bands):
+            check(self)
 
     @classmethod
     def noisytest(cls, kernel: Kernel = "rbf") -> Self:
-        """NoisyTest 0.0.1, decision by decision, with its quirks.
-
-        Args:
-            kernel: Kernel of the support vector machine; each has parameters of its own.
-        """
-        return cls(
+        """NoisyTest 0.0.1, decision by decision, with its quirks."""
+        return replace(
+            cls.paper(kernel),
             name="noisytest",
             bands="comb",
             multiclass="one-vs-one",
@@ -180,24 +189,18 @@ class Profile:
             open_end=1000,
             widen_extra=1,
             pad_widened=True,
-            **_tuned(kernel),
         )
 
     @classmethod
     def paper(cls, kernel: Kernel = "rbf") -> Self:
-        """The text of the paper, Sec. III and its table of hyper-parameters.
-
-        Args:
-            kernel: Kernel of the support vector machine; each has parameters of its own.
-        """
-        return cls(name="paper", **_tuned(kernel))
+        """The text of the paper, Sec. III and its table of hyper-parameters."""
+        if kernel == "linear":
+            return cls(name="paper", kernel=kernel, stride=401, regularization=1.0)
+        return cls(name="paper", kernel=kernel, stride=834, regularization=1.1, gamma=5.7e-4)
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> Self:
         """Profile with the settings that `as_dict` gave.
-
-        Args:
-            settings: A value for each field.
 
         Raises:
             ProfileError: If a field is missing, unknown or wrong.
@@ -230,6 +233,11 @@ class Profile:
         return self.relative or self.reference
 
     @property
+    def statistics(self) -> tuple[str, ...]:
+        """Statistics of each log-band energy."""
+        return STATISTICS[: len(STATISTICS) - self.reference]
+
+    @property
     def bins(self) -> int:
         """Bins of one Fourier transform, from 0 Hz up to half the rate."""
         return self.window // 2 + 1
@@ -252,18 +260,45 @@ class Profile:
         return self.length / self.rate
 
 
-def _tuned(kernel: Kernel) -> dict[str, Any]:
-    """Hyper-parameters of a kernel in the paper's table."""
-    if kernel == "linear":
-        return {"kernel": kernel, "stride": 401, "regularization": 1.0}
-    return {"kernel": kernel, "stride": 834, "regularization": 1.1, "gamma": 5.7e-4}
+def spectra(profile: Profile) -> tuple[str, ...]:
+    """Names of the spectra of a window, in the order of `features.log_band_energies`."""
+    norms, joints = profile.signals[: profile.norms], profile.signals[profile.norms :]
+    if not profile.differences:
+        return norms
+    moving = joints[: profile.moving]
+    return (
+        *norms,
+        *(f"{late} less {early}" for early, late in pairwise(norms)),
+        *joints,
+        *(f"{late} less {early}" for early, late in pairwise(moving)),
+        *(f"{name} less mean" for name in joints * profile.relative),
+    )
+
+
+@lru_cache
+def columns(profile: Profile) -> tuple[str, ...]:
+    """Names of the features of log bands, in order.
+
+    A feature has one name at any rate: the spectrum, the kind of window, the statistic and the
+    lower edge of the band, in [Hz], after `RELATIVE` where it is relative to the reference. The
+    last one of a relative profile is the level of the frame.
+    """
+    plain = [
+        f"{spectrum} {kind} {statistic} {edge:.4g}"
+        for kind, resolution in zip(("long", "short"), profile.resolutions, strict=False)
+        for spectrum in spectra(profile)
+        for statistic in profile.statistics
+        for edge in resolution.edges[:-1]
+    ]
+    if profile.reference:
+        return (*plain, *(f"{RELATIVE} {name}" for name in plain))
+    return (*plain, *["level"] * profile.relative)
 
 
 def _check_types(profile: Profile) -> None:
     for field in fields(profile):
         value, kind = getattr(profile, field.name), field.type
-        if field.name in _CHOICES:
-            choices = get_args(_CHOICES[field.name])
+        if choices := _CHOICES.get(field.name):
             fits, wanted = value in choices, f"one of {', '.join(choices)}"
         elif kind is float:
             fits, wanted = type(value) in (int, float) and isfinite(value), "a finite number"
@@ -278,10 +313,10 @@ def _check_types(profile: Profile) -> None:
 
 
 def _check_ranges(profile: Profile) -> None:
-    for name in _POSITIVE:
+    for name in _ABOVE_ZERO:
         if getattr(profile, name) <= 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected more than 0")
-    for name in ("open_end", "widen_extra", "least_deviation", "decay", "penalty", "quick_window"):
+    for name in _ZERO_OR_MORE:
         if getattr(profile, name) < 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected 0 or more")
     if not 2 <= profile.leaves <= MOST_LEAVES:
@@ -301,53 +336,268 @@ def _check_ranges(profile: Profile) -> None:
 
 
 def _check_signals(profile: Profile) -> None:
-    if not profile.signals or len(set(profile.signals)) < len(profile.signals):
+    names, norms, log = profile.signals, profile.norms, profile.bands == "log"
+    signals = f"signals are {', '.join(names) or 'none'}"
+    if not names or len(set(names)) < len(names):
+        raise ProfileError(f"{signals}, expected one or more, each once")
+    if not norms or any(map(by_joint, names[:norms])):
         raise ProfileError(
-            f"signals are {', '.join(profile.signals) or 'none'}, expected one or more, each once"
+            f"{signals}, expected norms, and after them those that go joint by joint"
         )
-    if not profile.norms or any(map(by_joint, profile.signals[: profile.norms])):
+    if norms < len(names) and not (log and profile.differences):
         raise ProfileError(
-            f"signals are {', '.join(profile.signals)}, expected norms, and after them those that"
-            " go joint by joint"
+            f"{signals}, with bands {profile.bands!r}, relative {profile.relative} and reference"
+            f" {profile.reference}, expected 'log' and one of both for those that go joint by joint"
         )
-    if profile.norms < len(profile.signals) and not (
-        profile.bands == "log" and profile.differences
-    ):
+    if EFFORT in names and (names[-1] != EFFORT or not profile.reference):
         raise ProfileError(
-            f"signals are {', '.join(profile.signals)}, with bands {profile.bands!r}, relative"
-            f" {profile.relative} and reference {profile.reference}, expected 'log' and one of both"
-            " for those that go joint by joint"
+            f"{signals} with reference {profile.reference}, expected {EFFORT} last, and True"
         )
-    if EFFORT in profile.signals and (profile.signals[-1] != EFFORT or not profile.reference):
-        raise ProfileError(
-            f"signals are {', '.join(profile.signals)} with reference {profile.reference}, expected"
-            f" {EFFORT} last, and True"
-        )
-    if profile.reference and (profile.bands != "log" or profile.relative):
+    if profile.reference and (not log or profile.relative):
         raise ProfileError(
             f"reference is True with bands {profile.bands!r} and relative {profile.relative},"
             " expected 'log' and False"
         )
-    repeated = len(set(profile.classes)) < len(profile.classes)
-    if repeated or len(profile.classes) < 2 or profile.classes[0] != "ok":
+    classes = profile.classes
+    if len(set(classes)) < len(classes) or len(classes) < 2 or classes[0] != "ok":
         raise ProfileError(
-            f"classes are {', '.join(profile.classes) or 'none'},"
-            " expected 'ok' and others, each once"
+            f"classes are {', '.join(classes) or 'none'}, expected 'ok' and others, each once"
         )
 
 
 def _check_bands(profile: Profile) -> None:
-    if profile.bands == "log":
-        for edges in (each.edges for each in profile.resolutions):
-            if len(edges) < 2 or any(low >= high for low, high in pairwise(edges)):
-                raise ProfileError(f"edges are {edges}, expected two or more, ascending")
-            if edges[0] < 0 or edges[-1] > profile.rate / 2:
-                raise ProfileError(
-                    f"edges reach from {edges[0]:g} to {edges[-1]:g} Hz,"
-                    f" expected 0 to half the rate, {profile.rate / 2:g} Hz"
-                )
-    elif profile.bins % 3:
-        raise ProfileError(
-            f"window of {profile.window} samples has {profile.bins} bins, expected a multiple"
-            " of three (256, 1024, 4096)"
+    if profile.bands != "log":
+        if profile.bins % 3:
+            raise ProfileError(
+                f"window of {profile.window} samples has {profile.bins} bins, expected a multiple"
+                " of three (256, 1024, 4096)"
+            )
+        return
+    for edges in (each.edges for each in profile.resolutions):
+        if len(edges) < 2 or any(low >= high for low, high in pairwise(edges)):
+            raise ProfileError(f"edges are {edges}, expected two or more, ascending")
+        if edges[0] < 0 or edges[-1] > profile.rate / 2:
+            raise ProfileError(
+                f"edges reach from {edges[0]:g} to {edges[-1]:g} Hz,"
+                f" expected 0 to half the rate, {profile.rate / 2:g} Hz"
+            )
+
+
+# --- for any rate
+
+LOWEST, HIGHEST = 80.0, 10_000.0
+"""Rates that a general model takes, in [Hz]; faster logs are decimated."""
+INPUTS = (
+    (*MOTION, *JOINTS, EFFORT),
+    (*MOTION, *JOINTS),
+    MOTION,
+    ("measured", "measured_joints", EFFORT),
+    ("measured", "measured_joints"),
+    ("measured",),
+    (NOISE,),
+)
+"""Signals that a general model takes: the first of these that a log has."""
+SPEED = 1.5
+"""Bins of a Hann window that the mean leaks into: up to here, a quick band is the speed itself."""
+WIDE = 2.0 ** (4 / 3)
+"""From the lower to the upper edge of a quick window's other bands."""
+FEWEST = 2
+"""Fewest bands that a profile has."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogBands:
+    """Recipe: energies of log-spaced bands, pooled over time and standardised, at any rate.
+
+    Band edges do not depend on the sample rate; bands that reach beyond half the rate drop out.
+    """
+
+    # As in `Profile`:
+    classes: tuple[str, ...] = CLASSES
+    signals: tuple[str, ...] = (NOISE,)
+    relative: bool = False
+    reference: bool = False
+    estimator: EstimatorKind = "svm"
+    alarm: float = 0.5
+    rounds: int = 100
+    leaves: int = 16
+    regularization: float = 10.0
+    least_deviation: float = 0.5
+    floor: float = 3e-5
+    """Added to the amplitude of a band, in [rad/s]: about the noise of the best encoders."""
+    # In seconds and hertz:
+    frame: float = 0.4
+    """Duration of a frame, in [s]."""
+    hop: float = 0.1
+    """Time from the start of one frame to the start of the next, in [s]."""
+    window: float = 0.1
+    """Duration of the window of one Fourier transform, in [s]."""
+    stride: float = 0.025
+    """Time from one Fourier transform to the next, in [s]."""
+    lowest: float = 15.0
+    """Lower edge of the first band: below, the mean leaks through a Hann window, in [Hz]."""
+    highest: float = 5000.0
+    """No band reaches beyond, in [Hz]."""
+    per_octave: float = 4.0
+    """Bands in an octave, where they are wider than what the window resolves."""
+    quick: float = 0.0
+    """Duration of a second, shorter window, in [s]; 0 for none. Its bands are few and wide: it
+    resolves time rather than frequency."""
+    quick_stride: float = 0.01
+    """Time from one of its transforms to the next, in [s]."""
+    speed: bool = False
+    """Whether the first quick band, below all others, is the speed itself."""
+    softness: float = 0.5
+    """Kernel parameter times the number of features: below 1, frames out of distribution still get
+    the class of the nearest training frames."""
+
+    def at(self, rate: float) -> Profile:
+        """Profile for a sample rate, each duration rounded to the nearest sample, windows up.
+
+        Args:
+            rate: Sample rate of the signal, in [Hz].
+
+        Returns:
+            The profile: at 1 kHz a frame is 400 samples, every 100.
+
+        Raises:
+            ProfileError: If fewer than ``FEWEST`` bands lie below half the rate.
+        """
+        edges, quick = self._edges(rate / 2), self._quick_edges(rate / 2)
+        if len(edges) <= FEWEST:
+            least = self._upper(self._upper(self.lowest))  # of the second band
+            raise ProfileError(
+                f"a rate of {rate:g} Hz leaves {len(edges) - 1} bands up to {rate / 2:g} Hz,"
+                f" expected {FEWEST} or more: take a rate of {ceil(2 * least)} Hz at least"
+            )
+        return Profile(
+            name="logbands",
+            classes=self.classes,
+            signals=self.signals,
+            rate=rate,
+            length=round(self.frame * rate),
+            hop=round(self.hop * rate),
+            # A window that is shorter by a fraction lets the speed leak into the first band.
+            window=ceil(self.window * rate - 1e-6),
+            stride=round(self.stride * rate),
+            bands="log",
+            edges=edges,
+            quick_window=round(self.quick * rate) if quick else 0,
+            quick_stride=round(self.quick_stride * rate) if quick else 0,
+            quick_edges=quick,
+            relative=self.relative,
+            reference=self.reference,
+            floor=self.floor,
+            least_deviation=self.least_deviation,
+            estimator=self.estimator,
+            alarm=self.alarm,
+            rounds=self.rounds,
+            leaves=self.leaves,
+            kernel="rbf",
+            regularization=self.regularization,
+            # Two frames' n standardised features differ by 2 n in squares, whatever the rate.
+            gamma=self.softness / (len(STATISTICS) * (len(edges) - 1)),
+            multiclass="one-vs-one",
+            # Padding would make a train of impacts of one; frames to classify have none.
+            pad_short=False,
+            spread_failures=True,
+            flush_end=True,
         )
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> Self:
+        """Recipe with the settings of a model file.
+
+        Raises:
+            ProfileError: If a field is missing, unknown or wrong.
+        """
+        names = {field.name for field in fields(cls)}
+        if not isinstance(settings, Mapping) or names != settings.keys():
+            raise ProfileError(f"a recipe has {', '.join(sorted(names))}, and nothing else")
+        for field in fields(cls):
+            value = settings[field.name]
+            # Bands of no width, or from minus infinity, would be without end.
+            if field.type is float and not (type(value) in (int, float) and 0 <= value <= HIGHEST):
+                raise ProfileError(
+                    f"{field.name} is {value!r}, expected a number from 0 to {HIGHEST:g}"
+                )
+        lists = {key: tuple(each) for key, each in settings.items() if isinstance(each, list)}
+        try:
+            recipe = cls(**{**settings, **lists})
+            for rate in (LOWEST, HIGHEST):
+                recipe.bound(rate)
+        except (TypeError, ValueError, ArithmeticError) as error:
+            raise ProfileError(f"a setting of the recipe is wrong ({error})") from error
+        return recipe
+
+    def bound(self, rate: float, signals: Sequence[str] = INPUTS[0]) -> Profile:
+        """Profile for a sample rate and signals."""
+        return replace(self, signals=tuple(signals)).at(rate)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all features of a general model, of all inputs at the highest rate."""
+        every = (columns(self.bound(HIGHEST, names)) for names in INPUTS)
+        return tuple(dict.fromkeys(name for names in every for name in names))
+
+    def places(self, profile: Profile) -> Index:
+        """Indices among all features of those that a profile has, ascending, shape (features,)."""
+        number = {name: place for place, name in enumerate(self.columns)}
+        return np.array([number[name] for name in columns(profile)])
+
+    @cached_property
+    def rising(self) -> Index:
+        """1 for each feature that rises with the level of a fault, else 0, shape (features,).
+
+        These are the energies of what is measured and of its error, but for the speed itself.
+        """
+        plain = [name.removeprefix(f"{RELATIVE} ") for name in self.columns]
+        fixed = ("desired", "error less", "error_joints less")
+        return np.array(
+            [not name.startswith(fixed) and not name.endswith(" 0") for name in plain],
+            dtype=np.intp,
+        )
+
+    def _upper(self, edge: float) -> float:
+        """Upper edge of the band from an edge on: as wide as the window resolves, or wider."""
+        ratio: float = 2.0 ** (1.0 / self.per_octave)
+        return max(edge + 1.0 / self.window, edge * ratio)
+
+    def _edges(self, nyquist: float) -> tuple[float, ...]:
+        """Edges up to the Nyquist frequency."""
+        edges = [self.lowest]
+        while (upper := self._upper(edges[-1])) <= min(self.highest, nyquist):
+            edges.append(upper)
+        return tuple(edges)
+
+    def _quick_edges(self, nyquist: float) -> tuple[float, ...]:
+        """Edges of the bands of the quick window, none if not even the first one fits."""
+        if not self.quick or nyquist * self.quick < SPEED:
+            return ()
+        edges = [0.0, SPEED / self.quick] if self.speed else [SPEED / self.quick]
+        while (upper := edges[-1] * WIDE) <= min(self.highest, nyquist):
+            edges.append(upper)
+        return tuple(edges) if len(edges) > 1 else ()
+
+
+SCALAR = LogBands(relative=True, floor=1e-3, estimator="networks", alarm=0.5, quick=0.02)
+"""For the noise alone. Failures are louder than 0.03 rad/s; amplitudes far below depend on encoders
+and simulators."""
+GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.6, leaves=4, speed=True)
+"""For runs with measured and desired motion; with fewer false positives in fault-free motion. The
+noise alone does not separate a fast motion without sensor noise from a failure. Trees find more
+failures that resemble the training set; networks more that do not, say a rattle on a motion without
+any other noise, which the noise alone does not show as an error."""
+EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.6, rounds=40)
+"""For runs that name their joints: the norm of all masks a single one."""
+ANY = LogBands(
+    reference=True,
+    floor=1e-3,
+    estimator="detector",
+    quick=0.02,
+    speed=True,
+    rounds=300,
+    leaves=16,
+    alarm=0.83,
+)
+"""For any rate and whatever signals there are; features relative to a reference beside."""

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from noiseclassifier.errors import MissingSignalError, SignalError
-from noiseclassifier.types import Mask, Real
+from noiseclassifier.types import Real
 
 NOISE = "noise"
 """The one signal of the paper, p_hat = sqrt(|qd|^2 + |qd_desired|^2) (Sec. II-A)."""
@@ -54,14 +54,12 @@ def feeds(there: Collection[str], names: Sequence[str]) -> bool:
 
 
 def stacked(signals: Signals, names: Sequence[str]) -> Real:
-    """Signals as rows of one array.
+    """Signals by their names, norms first, as rows of one array.
 
-    Args:
-        names: Those to stack, norms first. ``noise`` is computed from ``measured`` and ``desired``
-            where it is missing.
+    ``noise`` is computed from ``measured`` and ``desired`` where it is missing.
 
     Returns:
-        One norm as it is, shape (samples,); several signals as rows, shape (rows, samples).
+        A norm alone, shape (samples,); several signals as rows, shape (rows, samples).
     """
     there = named(signals)
     if lacking := [name for name in names if name not in there]:
@@ -73,9 +71,7 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
         found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
         joints = ", and (joints, samples) joint by joint" * any(map(by_joint, names))
         raise SignalError(f"a signal has another shape, {found}, expected (samples,){joints}")
-    if len(chosen) == 1:
-        return chosen[0]
-    return np.vstack(chosen)
+    return chosen[0] if len(chosen) == 1 else np.vstack(chosen)
 
 
 def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
@@ -84,23 +80,3 @@ def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
     wanted = [joints + count if by_joint(name) else count for name in names]
     alike = [each.shape for each in chosen] == wanted
     return alike and len(count) == 1 and len(joints) == by_joint(names[-1]) and 0 not in joints
-
-
-def check(samples: Real, valid: Mask | None, *, first: int) -> None:
-    """Check the input of a classifier.
-
-    Args:
-        valid: False in gaps; None if there are none.
-    """
-    count = samples.shape[-1]
-    if valid is not None and valid.shape != (count,):
-        raise SignalError(
-            f"samples of shape {samples.shape} and validity of shape {valid.shape},"
-            " expected (samples,) for both"
-        )
-    if not np.isfinite(samples).all():
-        plain = samples.reshape(-1, count)
-        number, row = np.argwhere(~np.isfinite(plain))[0].tolist()
-        raise SignalError(
-            f"sample {first + row} of the signal is not finite ({plain[number, row]})"
-        )

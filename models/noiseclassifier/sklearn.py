@@ -52,8 +52,7 @@ from noiseclassifier.errors import ProfileError, SignalError
 from noiseclassifier.estimators import ESTIMATORS
 from noiseclassifier.estimators.decision import Probable
 from noiseclassifier.features import feature_count, features, standard
-from noiseclassifier.logbands import GENERAL, SCALAR, LogBands
-from noiseclassifier.profile import Profile
+from noiseclassifier.profile import GENERAL, SCALAR, LogBands, Profile
 from noiseclassifier.types import Array
 
 RECIPES = {"scalar": SCALAR, "general": GENERAL}
