@@ -47,6 +47,5 @@ def test_legs_in_the_air_are_ok_though_their_desired_positions_come_in_coarse_st
     assert imported.returncode == 0, imported.stderr
     classified = inspector(tmp_path, "classify", "run.npz")
     assert classified.returncode == 0, classified.stdout
-    assert "differentiated from positions in steps of 0.026 rad: it was left out." in (
-        classified.stdout
-    )
+    assert "differentiated from positions in steps of 0.026 rad" in classified.stdout
+    assert "it was left out." in classified.stdout

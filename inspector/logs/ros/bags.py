@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 from inspector.errors import LogError
 from inspector.logs.log import Log, LogReader, Progress
@@ -65,7 +65,7 @@ def _log_of(path: Path, bag: Bag, options: ReadOptions, progress: Progress) -> L
     total = sum(max(bag.topics[name].count, 0) for name in chosen)
     for name, received, data in progress(bag.messages(chosen), total):
         if isinstance(received, int) and abs(received) < LATEST and isinstance(data, Bytes):
-            chosen[name].add(received, cast("bytes", data))
+            chosen[name].add(received, bytes(data))
         else:
             odd += 1
     if odd:

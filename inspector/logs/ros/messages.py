@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from rosbags.serde import SerdeError
@@ -239,8 +239,10 @@ def _aligned(place: int, size: int) -> int:
     return place + -(place - 4) % size
 
 
-Numbers = Sequence[float] | bytes | memoryview
+Numbers: TypeAlias = Sequence[float] | bytes
 """Numbers of a message, or the bytes of its float64 numbers."""
+Row: TypeAlias = tuple[tuple[str, ...], int, dict[str, Numbers]]
+"""What a message tells at one time: joints, stamp in [ns], and numbers by the array's name."""
 
 
 @dataclass
@@ -248,16 +250,16 @@ class Group:
     """Messages about one set of joints, as rows of float64 numbers.
 
     Attributes:
-        joints: The joints, in the order of the first message.
+        joints: The joints, in the order of the first message; none of a base.
         logged: Stamps in the messages' headers, in [ns].
         received: When the recorder received them, in [ns].
         arrays: Numbers by the name of the array, row after row.
     """
 
     joints: tuple[str, ...]
+    arrays: dict[str, "array[float]"]
     logged: "array[int]" = field(default_factory=lambda: array("q"))
     received: "array[int]" = field(default_factory=lambda: array("q"))
-    arrays: dict[str, "array[float]"] = field(default_factory=dict)
 
     @property
     def stamps(self) -> Stamps:
@@ -266,32 +268,52 @@ class Group:
         remark = "" if any(self.logged) else RECORDER
         return Stamps.of_nanoseconds(np.frombuffer(chosen, dtype=np.int64), remark=remark)
 
-    def rows(self, name: str, width: int) -> Any:
-        """Numbers of an array, shape (messages, width)."""
-        return np.frombuffer(self.arrays[name]).reshape(-1, width)
 
-
-class JointBuffer:
-    """Numbers of the messages of one topic, by array.
+class MotionReader:
+    """Collects the messages of a topic with the motion of joints or of a base.
 
     Publishers that share a topic, such as an arm's and a gripper's, have a group each.
     """
 
-    def __init__(self, topic: str) -> None:
-        self.topic = topic
-        self.groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
+    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
+        self._decode = Decoder(path, topic, ros1=ros1)
+        self._topic, self._ros1 = topic, ros1
+        self._rows, self._signals = MOTION[topic.type]
+        self._is_state = topic.type == JOINT_STATE
+        if self._is_state and any(word in topic.name.lower() for word in COMMANDED):
+            self._signals = {
+                "position": ("position_desired", 1),
+                "velocity": ("velocity_desired", 1),
+            }
+        self._layout: Layout | None = None
+        self._groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
 
-    def add(
+    def add(self, received: int, data: bytes) -> None:
+        """Add a message that was received at a time in [ns]."""
+        if self._is_state and not self._ros1:
+            if self._layout is None or not self._layout.fits(data):
+                self._layout = Layout.of(data)
+            if self._layout is not None:
+                numbers = (data[start:stop] for start, stop in self._layout.arrays)
+                parts: dict[str, Numbers] = dict(zip(ARRAYS, numbers, strict=True))
+                self._add(self._layout.names, stamp(data), received, parts)
+                return
+        for joints, logged, parts in self._rows(self._decode(data)):
+            self._add(joints, logged, received, parts)
+
+    def _add(
         self, joints: tuple[str, ...], logged: int, received: int, parts: Mapping[str, Numbers]
     ) -> None:
-        """Append a message; arrays whose length is not that of the joints are ignored."""
+        """Append a row; arrays whose length is not that of the joints are ignored."""
         present = tuple(
-            name for name, numbers in parts.items() if _count(numbers) == len(joints) > 0
+            name
+            for name, numbers in parts.items()
+            if _count(numbers) == BASE_WIDTHS.get(name, len(joints)) > 0
         )
-        group = self.groups.get((frozenset(joints), present))
+        group = self._groups.get((frozenset(joints), present))
         if group is None:
-            group = self.groups[frozenset(joints), present] = Group(joints)
-            group.arrays = {name: array("d") for name in present}
+            group = Group(joints, {name: array("d") for name in present})
+            self._groups[frozenset(joints), present] = group
         group.logged.append(logged)
         group.received.append(received)
         for name in present:
@@ -299,113 +321,102 @@ class JointBuffer:
             if joints != group.joints:
                 values = (
                     np.frombuffer(numbers)
-                    if isinstance(numbers, bytes | memoryview)
+                    if isinstance(numbers, bytes)
                     else np.asarray(numbers, dtype=np.float64)
                 )
                 numbers = values[[joints.index(joint) for joint in group.joints]].tobytes()
-            if isinstance(numbers, bytes | memoryview):
+            if isinstance(numbers, bytes):
                 group.arrays[name].frombytes(numbers)
             else:
                 group.arrays[name].extend(numbers)
 
-    def fields(self, signals: Mapping[str, tuple[str, int]]) -> Iterator[Field]:
-        """Fields of the arrays, by the signal and rank of each name."""
-        for group in self.groups.values():
-            if not group.arrays:
-                continue
+    def fields(self) -> Iterator[Field]:
+        """Fields of the messages; of several transforms, that of the smoothest fixed frame."""
+        groups = [group for group in self._groups.values() if group.arrays]
+        if self._topic.type in TRANSFORMS:
+            groups = sorted(groups, key=lambda group: FRAMES.index(next(iter(group.arrays))))[:1]
+        for group in groups:
             stamps = group.stamps
-            for name in group.arrays:
-                signal, rank = signals[name]
+            for name, numbers in group.arrays.items():
+                signal, rank = self._signals.get(name, ("", 0))
                 yield Field(
-                    f"{self.topic}/{name}",
-                    group.rows(name, len(group.joints)),
+                    f"{self._topic.name}/{name}",
+                    np.frombuffer(numbers).reshape(len(stamps.time), -1),
                     stamps,
                     joints=group.joints,
                     signal=signal,
-                    source=self.topic,
+                    source=self._topic.name,
                     rank=rank,
                 )
 
 
 def _count(numbers: Numbers) -> int:
-    serialised = isinstance(numbers, bytes | memoryview)
-    return len(numbers) // 8 if serialised else len(numbers)
+    return len(numbers) // 8 if isinstance(numbers, bytes) else len(numbers)
 
 
-class TopicReader(Protocol):
-    """Collects the messages of a topic, and makes fields of them."""
-
-    def add(self, received: int, data: bytes) -> None:
-        """Add a message that was received at a time in [ns]."""
-
-    def fields(self) -> Iterator[Field]:
-        """Fields of the messages."""
+def _of_state(message: Any) -> Iterator[Row]:
+    """Row of a ``sensor_msgs/JointState``."""
+    parts = {name: getattr(message, name) for name in ARRAYS}
+    yield tuple(message.name), stamp_of(message), parts
 
 
-class JointStates:
-    """``sensor_msgs/JointState``: measured motion, or desired by the topic's name."""
-
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.decode = Decoder(path, topic, ros1=ros1)
-        self.buffer = JointBuffer(topic.name)
-        self.layout: Layout | None = None
-        self.ros1 = ros1
-        self.signals = {name: (signal, 0) for name, signal in ARRAYS.items()}
-        if any(word in topic.name.lower() for word in COMMANDED):
-            self.signals = {
-                "position": ("position_desired", 1),
-                "velocity": ("velocity_desired", 1),
-                "effort": ("", 1),
-            }
-
-    def add(self, received: int, data: bytes) -> None:
-        """Add a message."""
-        if self.layout is None or not self.layout.fits(data):
-            self.layout = None if self.ros1 else Layout.of(data)
-        if self.layout is not None:
-            numbers = (data[start:stop] for start, stop in self.layout.arrays)
-            parts: dict[str, Numbers] = dict(zip(ARRAYS, numbers, strict=True))
-            self.buffer.add(self.layout.names, stamp(data), received, parts)
-            return
-        message = self.decode(data)
-        parts = {name: getattr(message, name) for name in ARRAYS}
-        self.buffer.add(tuple(message.name), stamp_of(message), received, parts)
-
-    def fields(self) -> Iterator[Field]:
-        """Positions, velocities and efforts."""
-        return self.buffer.fields(self.signals)
+def _of_controller(message: Any) -> Iterator[Row]:
+    """Row of a controller's state; of the two names of a stage the one that is not empty."""
+    parts = {}
+    for stages in (("reference", "desired"), ("feedback", "actual")):
+        for stage in stages:
+            point = getattr(message, stage, None)
+            if point is not None and (len(point.positions) or len(point.velocities)):
+                for name in POINT:
+                    if f"{stage}/{name}" in CONTROLLED:
+                        parts[f"{stage}/{name}"] = getattr(point, name, ())
+                break
+    yield tuple(message.joint_names), stamp_of(message), parts
 
 
-class ControllerStates:
-    """``control_msgs/JointTrajectoryControllerState``: measured and desired, with one stamp."""
+def _of_odometry(message: Any) -> Iterator[Row]:
+    """Row of a ``nav_msgs/Odometry``: pose of the base in the world, velocity in body axes."""
+    pose, twist = message.pose.pose, message.twist.twist
+    velocity = [getattr(part, axis) for part in (twist.linear, twist.angular) for axis in "xyz"]
+    yield (
+        (),
+        stamp_of(message),
+        {"pose": _pose(pose.position, pose.orientation), "twist": velocity},
+    )
 
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.decode = Decoder(path, topic, ros1=ros1)
-        self.buffer = JointBuffer(topic.name)
-        self.signals = {
-            f"{stage}/{name}": (f"{signal}_desired" if desired else signal, 0 if desired else 1)
-            for stage, desired in STAGES.items()
-            for name, signal in POINT.items()
-            if not (desired and signal == "effort")
-        }
 
-    def add(self, received: int, data: bytes) -> None:
-        """Add a message; of the two names of a stage the one that is not empty is used."""
-        message = self.decode(data)
-        parts = {}
-        for stages in (("reference", "desired"), ("feedback", "actual")):
-            for stage in stages:
-                point = getattr(message, stage, None)
-                if point is not None and (len(point.positions) or len(point.velocities)):
-                    for name in POINT:
-                        if f"{stage}/{name}" in self.signals:
-                            parts[f"{stage}/{name}"] = getattr(point, name, ())
-                    break
-        self.buffer.add(tuple(message.joint_names), stamp_of(message), received, parts)
+def _of_transforms(message: Any) -> Iterator[Row]:
+    """Rows of transforms from a fixed frame to a base."""
+    for each in message.transforms:
+        pair = f"{each.header.frame_id.lstrip('/')}/{each.child_frame_id.lstrip('/')}"
+        if pair in FRAMES:
+            pose = _pose(each.transform.translation, each.transform.rotation)
+            yield (), stamp_of(each), {pair: pose}
 
-    def fields(self) -> Iterator[Field]:
-        """Measured and desired positions and velocities, and measured efforts."""
-        return self.buffer.fields(self.signals)
+
+def _pose(position: Any, turn: Any) -> list[float]:
+    return [position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w]
+
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+FRAMES = [f"{world}/{base}" for world in FIXED_FRAMES for base in BASE_FRAMES]
+BASE_WIDTHS = {"pose": 7, "twist": 6, **dict.fromkeys(FRAMES, 7)}
+CONTROLLED = {
+    f"{stage}/{name}": (f"{signal}_desired" if desired else signal, 0 if desired else 1)
+    for stage, desired in STAGES.items()
+    for name, signal in POINT.items()
+    if not (desired and signal == "effort")
+}
+MOTION: Mapping[str, tuple[Callable[[Any], Iterator[Row]], Mapping[str, tuple[str, int]]]] = {
+    JOINT_STATE: (_of_state, {name: (signal, 0) for name, signal in ARRAYS.items()}),
+    STATE: (_of_controller, CONTROLLED),
+    "nav_msgs/msg/Odometry": (
+        _of_odometry,
+        {"pose": ("base_pose", 0), "twist": ("base_velocity", 0)},
+    ),
+    **dict.fromkeys(TRANSFORMS, (_of_transforms, dict.fromkeys(FRAMES, ("base_pose", 1)))),
+}
+"""By the type of messages, the rows of a message, and signal and rank of each of its arrays."""
 
 
 class Trajectories:
@@ -451,68 +462,6 @@ class Trajectories:
                     )
 
 
-class Odometries:
-    """``nav_msgs/Odometry``: pose of the base in the world, velocity in body axes."""
-
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.decode = Decoder(path, topic, ros1=ros1)
-        self.topic = topic.name
-        self.group = Group((), arrays={"pose": array("d"), "twist": array("d")})
-
-    def add(self, received: int, data: bytes) -> None:
-        """Add a message."""
-        message = self.decode(data)
-        self.group.logged.append(stamp_of(message))
-        self.group.received.append(received)
-        pose, twist = message.pose.pose, message.twist.twist
-        self.group.arrays["pose"].extend(_pose(pose.position, pose.orientation))
-        for part in (twist.linear, twist.angular):
-            self.group.arrays["twist"].extend(getattr(part, axis) for axis in "xyz")
-
-    def fields(self) -> Iterator[Field]:
-        """Pose and velocity."""
-        stamps = self.group.stamps
-        for name, signal, width in (("pose", "base_pose", 7), ("twist", "base_velocity", 6)):
-            values = self.group.rows(name, width)
-            yield Field(f"{self.topic}/{name}", values, stamps, signal=signal, source=self.topic)
-
-
-class Transforms:
-    """``tf2_msgs/TFMessage``: the pose of the base."""
-
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.decode = Decoder(path, topic, ros1=ros1)
-        self.topic = topic.name
-        self.pairs: dict[tuple[str, str], Group] = {}
-
-    def add(self, received: int, data: bytes) -> None:
-        """Add a message."""
-        for each in self.decode(data).transforms:
-            pair = each.header.frame_id.lstrip("/"), each.child_frame_id.lstrip("/")
-            if pair[0] in FIXED_FRAMES and pair[1] in BASE_FRAMES:
-                group = self.pairs.setdefault(pair, Group((), arrays={"pose": array("d")}))
-                group.logged.append(stamp_of(each))
-                group.received.append(received)
-                group.arrays["pose"].extend(
-                    _pose(each.transform.translation, each.transform.rotation)
-                )
-
-    def fields(self) -> Iterator[Field]:
-        """Pose of the base in the smoothest of the fixed frames."""
-        for world, base in sorted(
-            self.pairs, key=lambda pair: (FIXED_FRAMES.index(pair[0]), BASE_FRAMES.index(pair[1]))
-        )[:1]:
-            group = self.pairs[world, base]
-            yield Field(
-                f"{self.topic}/{world}/{base}",
-                group.rows("pose", 7),
-                group.stamps,
-                signal="base_pose",
-                source=self.topic,
-                rank=1,
-            )
-
-
 class Descriptions:
     """``std_msgs/String``: the robot's URDF."""
 
@@ -531,12 +480,12 @@ class Descriptions:
         return iter(())
 
 
-TOPIC_READERS: Mapping[str, Callable[..., TopicReader]] = {
-    "sensor_msgs/msg/JointState": JointStates,
-    STATE: ControllerStates,
+TopicReader: TypeAlias = MotionReader | Trajectories | Descriptions
+TOPIC_READERS: Mapping[str, type[MotionReader] | type[Trajectories]] = {
+    JOINT_STATE: MotionReader,
+    STATE: MotionReader,
     "trajectory_msgs/msg/JointTrajectory": Trajectories,
-    "nav_msgs/msg/Odometry": Odometries,
-    **dict.fromkeys(TRANSFORMS, Transforms),
+    **dict.fromkeys(("nav_msgs/msg/Odometry", *TRANSFORMS), MotionReader),
 }
 """Readers by the type of messages."""
 
@@ -550,7 +499,3 @@ def topic_reader(path: Path, topic: Topic, *, ros1: bool) -> TopicReader | None:
         return Descriptions(path, topic, ros1=ros1)
     kind = TOPIC_READERS.get(topic.type)
     return kind(path, topic, ros1=ros1) if kind else None
-
-
-def _pose(position: Any, turn: Any) -> tuple[float, ...]:
-    return (position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w)
