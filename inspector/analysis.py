@@ -235,7 +235,7 @@ def analyse(
     Args:
         run: The run, a run file, or any log that `inspector import` reads.
         library: Models to choose from, see `inspector.load_library`; those that ship unless given.
-        name: Name of the run; that of its file unless given.
+        name: Name of the run; by default the file's name.
         sha256: SHA-256 of the file that it came from.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
 

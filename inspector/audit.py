@@ -4,7 +4,7 @@ The limits of a class:
 
 - *Its bands.* The paper puts oscillations at 20 to 1000 Hz (its table of scenarios: multi-sines of
   20-30 up to 900-1000 Hz). It gives no band for impacts and high accelerations, which are short and
-  broad: theirs is that of the model, from its first band to its last.
+  broad: they take the model's band, from its first band to its last.
 - *The model.* A run is labelled by the general model at the rate of its values, or by the model of
   the nearest rate at or below. Outside of its bands nothing is observable; below all models the
   status is *cannot tell*.

@@ -138,7 +138,7 @@ class Differentiator:
             rate: Sample rate, in [Hz].
 
         Returns:
-            Amplitude of the velocity by that of the position, shape (frequency,), in [1/s].
+            Amplitude of the velocity divided by the position's, shape (frequency,), in [1/s].
         """
         taps = np.arange(len(self.weights)) - (len(self.weights) - 1) / 2
         turns = np.exp(2j * np.pi * np.outer(frequency, taps) / rate)

@@ -375,7 +375,7 @@ def main() -> None:
 class _StandardOutput(io.FileIO):
     """Standard output that keeps its first error, and drops what comes after it.
 
-    Libraries end a program whose reader is gone with 1, which would be that of a finding.
+    Libraries end a program whose reader is gone with 1, the exit status of a finding.
     """
 
     lost: OSError | None = None

@@ -3,7 +3,7 @@
 Each class has a contrast of at least 3:1 (WCAG 2.2, 1.4.11) against the backgrounds of the viewer
 and against the white of reports. Any two of NoisyTest's own, `louder` and `unknown` differ by a
 CIEDE2000 of at least 15 as deuteranopes and protanopes see them (Machado, Oliveira and Fernandes
-2009); found by search under these conditions. No class is told by its colour alone: each has a row
+2009); found by search under these conditions. No class is shown by its colour alone: each has a row
 or a name.
 """
 

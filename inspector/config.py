@@ -3,7 +3,7 @@
 The nearest of these files counts, from the working folder up to the top of the repository. Keys are
 the long names of options, without dashes before them. Options on reading logs, `model` and `jobs`
 stand at the top and hold for all commands that have them; a table such as
-``[tool.noise-inspector.classify]`` has those of one command, with its arguments (``runs``). The
+``[tool.noise-inspector.classify]`` is for one command, with its arguments (``runs``). The
 command line wins. Nothing that is written can be set here: a file must not replace others.
 """
 

@@ -3,7 +3,7 @@
 /joint_states and /joint_states/desired of an MCAP are ROS 2 JointStates, a message for each sample,
 which `inspector import` reads as well. The other topics are JSON: /noise for each sample, /level
 each 50 ms, /labels at the middle of each frame, /class where the class changes, /findings and
-/annotations at their start, and /log with a line for each finding. Times are those of the run,
+/annotations at their start, and /log with a line for each finding. Times are the run's,
 added to the first stamp in its ``meta``. MCAP has no negative times: a run that starts before 0 is
 shifted.
 

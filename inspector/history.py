@@ -23,7 +23,7 @@ from noisemodel.types import Array
 SHORTEST = 4
 """Commits from which a stretch has a level of its own."""
 LEAST_DB, LEAST_FINDINGS = 2.0, 0.5
-"""Smallest change that is told: of a level in [dB], and of findings per run."""
+"""Smallest change that the page names: of a level in [dB], and of findings per run."""
 WIDTH, HEIGHT = 900, 120
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 LOOK = """

@@ -5,7 +5,7 @@
 - *csv*: columns start, stop and label, in any order; findings also have a score;
 - *audacity*: a line for each label, with start, stop and text between tabs.
 
-Times are those of the run, in [s]; numbers are written with all digits.
+Times are the run's, in [s]; numbers are written with all digits.
 """
 
 import csv

@@ -20,7 +20,7 @@ STEP = 0.05
 RANGE_DB = 60.0
 """Range of a scale that follows a run, in [dB]."""
 FLOOR_DB = -100.0
-"""Least level of a velocity, below that of any encoder, in [dB re 1 rad/s]; less is raised."""
+"""Least level of a velocity, below any encoder's, in [dB re 1 rad/s]; lower levels are raised."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ SPECTRUM = Scale(-60.0, 0.0, "dB re 1 rad/s")
 def velocity_levels(
     velocity: Real, valid: Mask, rate: float, *, start: float = 0.0
 ) -> tuple[Array, Array]:
-    """The level of velocities above 10 Hz over time: that of a noise, or of each joint.
+    """The level of velocities above 10 Hz over time, of a noise or of each joint.
 
     Args:
         velocity: Shape (samples, joints), in [rad/s]; a noise is a single column.

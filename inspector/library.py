@@ -56,7 +56,7 @@ def load_library(paths: Sequence[str | Path] = ()) -> Library:
 
 
 def for_robot(library: Library, robot: str | None) -> Library:
-    """Models without those of one rate that go joint by joint and know other robots alone.
+    """Leave out models of one rate that go joint by joint and know other robots alone.
 
     Signals of single joints generalise to new robots less than norms. A model whose runs name no
     robot stays, and so do all if none would be left.
@@ -124,7 +124,7 @@ def _watched(run: nm.Run, lasting: nc.Lasting) -> Iterator[tuple[dict[str, Real]
 def nearest(
     library: Library, rate: float, signals: Collection[str], *, logged: float
 ) -> tuple[str, nc.Classifier]:
-    """Model of the nearest rate at or below that of a log's values, bound to them.
+    """Model of the nearest rate at or below the rate of a log's values, bound to them.
 
     Args:
         rate: Rate of the log's values, in [Hz].

@@ -26,7 +26,7 @@ COLUMNS = 200
 def orders(analysis: Analysis) -> tuple[str, Spectrogram] | None:
     """Compute the order spectrogram of the noise over the angle of one joint.
 
-    The joint is that of the first finding with an order; else the one that vibrates most while it
+    The joint is the first finding's with an order; else the one that vibrates most while it
     moves.
 
     Returns:

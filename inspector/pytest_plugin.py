@@ -87,7 +87,7 @@ class Noise:
 
         Args:
             runs: A run or its file, or several repetitions.
-            name: Name of the scenario; that of the test unless given.
+            name: Name of the scenario; by default the test's.
             allow: A class of findings that may be there, or several; or class, start and stop in
                 [s] of a stretch that such a finding has to lie in. "cannot-tell" allows runs that
                 no model can classify.
@@ -215,7 +215,7 @@ class Noise:
         return self._config.stash[_LIBRARY]
 
     def _scenario(self, name: str = "") -> str:
-        """Name of the scenario of a check: that of the test unless given."""
+        """Name of the scenario of a check: by default the test's."""
         self._count += 1
         if name:
             return name
@@ -298,10 +298,10 @@ def _allows(allowed: Iterable[Allowed], event: "Event") -> bool:
 
 
 def name_of(test: str) -> str:
-    """Name the files of a test, those of no two tests alike: its node id.
+    """Name the files of a test by its node id, differently for each test.
 
     Args:
-        test: The node id. Where its name could be that of another, a hash of it is added.
+        test: The node id. Where another test could have its name, a hash of it is added.
     """
     shown = test.replace(".py::", "::").replace("/", ".")
     return _file_name(test, shown, plain=PLAIN.fullmatch(test) is not None)

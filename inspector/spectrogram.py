@@ -67,7 +67,7 @@ def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spe
 
 
 def in_bands(frequency: Array, amplitude: Array, edges: Array) -> Array:
-    """The largest amplitude in each of several bands, such as those of a logarithmic axis.
+    """The largest amplitude in each of several bands, such as the bands of a logarithmic axis.
 
     Args:
         frequency: In order, shape (bins,).

@@ -45,7 +45,7 @@ from noisemodel.parallel import DIED, Jobs, in_order
 
 FORMAT = "noise-tuning/1"
 MAX_BYTES = 256 * 2**20
-"""Most bytes of a results file that is read: those of some hundred thousand points."""
+"""Most bytes of a results file that is read: enough for some hundred thousand points."""
 BATCHES, WORKERS = 4, 16
 """Least number of batches per job, since a stopped job loses one and all should end at nearly the
 same time; and for how many workers of a cluster there should be enough."""
@@ -152,7 +152,7 @@ class Tuned:
         }
 
     def along(self, name: str, criterion: Criterion) -> list[tuple[Any, Measures]]:
-        """Values of a setting and the measures there; all others are those of the best point."""
+        """Values of a setting and the measures there; all others are the best point's."""
         points, best = list(self.grid.points()), self.ranked(criterion)[0]
         others = {key: value for key, value in points[best].items() if key != name}
         return [

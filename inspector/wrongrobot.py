@@ -55,7 +55,7 @@ def named(run: Run) -> Run:
 
 
 def _named(joints: Sequence[str], known: Mapping[str, Limits]) -> tuple[str, ...]:
-    """Names of joints, those of the robot in place of mere numbers if it has as many joints."""
+    """Names of joints; the robot's names replace mere numbers if it has as many joints."""
     numbered = all(joint == f"joint{place}" for place, joint in enumerate(joints, start=1))
     if numbered and len(joints) <= len(known) and not set(joints) & set(known):
         return tuple(known)[: len(joints)]

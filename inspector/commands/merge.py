@@ -25,7 +25,7 @@ def merge(
 ) -> None:
     """Join the results of several jobs into one.
 
-    The exit status is that of `classify` on all of their runs.
+    The exit status is the one that `classify` has for all of their runs.
     """
     from inspector.errors import InspectorError
     from inspector.report import index

@@ -50,12 +50,6 @@ def one_of(names: Collection[str]) -> Callable[[str], str]:
     return checked
 
 
-def _above_zero(value: float) -> float:
-    if not value > 0.0:
-        raise typer.BadParameter(f"{value:g} is not above 0: say, 1")
-    return value
-
-
 def _allow(folder: Path | None) -> Path | None:
     if folder is not None:
         os.environ["NOISE_PACKAGE_ROOT"] = str(folder)  # for the workers of this process too

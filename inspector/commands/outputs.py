@@ -11,16 +11,6 @@ import typer
 Result = TypeVar("Result")
 
 
-def check_suffix(path: Path, suffix: str) -> None:
-    """Refuse a name that says another format than what is written; one without a suffix is taken.
-
-    Raises:
-        BadParameter: If it does.
-    """
-    if path.suffix.lower() not in ("", suffix):
-        raise typer.BadParameter(f"{path}: only {suffix} is written; name a {suffix} file")
-
-
 def files_of(given: Sequence[str], known: Collection[str], *, overwrite: bool) -> dict[Path, str]:
     """The files of `--write FORMAT=FILE`, with the format of each.
 

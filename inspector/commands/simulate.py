@@ -44,7 +44,7 @@ app = typer.Typer(
 List = Annotated[bool, typer.Option("--list", help="Print what there is, simulate nothing.")]
 To = Annotated[Path, typer.Option("--output", "-o", help="The folder to write.")]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")]
-Seconds = Annotated[float | None, typer.Option(help="In seconds; by default that of the motion.")]
+Seconds = Annotated[float | None, typer.Option(help="In seconds; by default the motion's.")]
 Names = Annotated[str, typer.Option(help="Names of robots, talos,go2,panda; by default all.")]
 First = Annotated[int, typer.Option(help="The first random seed.")]
 

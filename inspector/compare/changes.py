@@ -19,7 +19,7 @@ from noisemodel.types import Array
 STEP = 0.05
 """Time over which a level is taken, in [s]."""
 FLOOR_DB = -100.0
-"""Least level of the noise, below that of any encoder, in [dB re 1 rad/s]; less is raised."""
+"""Least level of the noise, below any encoder's, in [dB re 1 rad/s]; lower levels are raised."""
 LINK_RANGE_DB = 40.0
 """Links that are quieter than the loudest peak by more than this have no difference."""
 LOWEST_BAND = 16.0
@@ -137,7 +137,7 @@ def by_band(pair: Pair) -> tuple[Level, ...]:
 
 
 def by_link(pair: Pair) -> tuple[Level, ...]:
-    """The power of each link's vibration, that which changed most first.
+    """The power of each link's vibration, the largest change first.
 
     Returns:
         Levels in [dB re 1 pW]; nothing where links are not compared.

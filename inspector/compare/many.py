@@ -117,7 +117,7 @@ NAMED = 16.0
 LINE = 8.0
 """Most height of a line, in points: thick ones have round ends, so a row is several of them."""
 LETTERS = 16
-"""Of a name beside a row."""
+"""Most letters of a name beside a row."""
 SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"
 """The markers of `classes.MARKERS` as text."""
 ROWS = ("class", "levels")

@@ -38,13 +38,13 @@ PARTS = {"vibration": "above 10 Hz", "level": "whole motion"}
 CELL = (96, 44)
 """Width and height of a cell of the heat maps, in points."""
 NAMED = (150, 40)
-"""Width of the names of robots, and height of those of kinds."""
+"""Width of the names of robots, and height of the names of kinds."""
 MAPS = {
-    "correlation": "Correlation of the envelope with that of {}: 1 is dark",
-    "distance": "Distance of the spectrum to that of {} [dB]: 0 is dark",
+    "correlation": "Correlation of the envelope with {}: 1 is dark",
+    "distance": "Distance of the spectrum to {} [dB]: 0 is dark",
 }
 WORST_DB = 10.0
-"""Distance that is as light as can be, in [dB]: near that of independent noises."""
+"""Distance with the lightest colour, in [dB]: independent noises are about as far apart."""
 LIGHTEST = 0.75
 """Place on the palette of what is farthest: numbers have to be read on it."""
 WHOLE, WIDE, TITLES = 832.0, 720.0, 28.0
@@ -124,7 +124,7 @@ def shades(numbers: Array, name: str) -> NDArray[np.uint8]:
     """Colour the numbers of a heat map: the farther from the reference, the lighter.
 
     Returns:
-        Red, green and blue, shape (robots, kinds, 3); of NaN that of the background.
+        Red, green and blue, shape (robots, kinds, 3); NaN has the background's.
     """
     far = 1.0 - numbers if name == "correlation" else numbers / WORST_DB
     rgb = colors.heat(LIGHTEST * np.clip(np.nan_to_num(far), 0.0, 1.0))[..., :3]

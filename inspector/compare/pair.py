@@ -122,7 +122,7 @@ class Pair:
     """Two runs over the stretch of time that both cover.
 
     Attributes:
-        before: The run before the change; its times are those of both.
+        before: The run before the change; both have its times.
         after: The run after the change.
         alignment: How they were laid beside each other.
         remarks: What is not compared and why, a sentence each.

@@ -93,7 +93,7 @@ def _correlations(axes: "Axes", found: Sequence[RobotComparison]) -> None:
         )
     axes.set_xlim(right=1.05)
     axes.grid(alpha=0.4)
-    axes.set_xlabel(f"correlation of the envelope with that of {kinds[reference]!r}")
+    axes.set_xlabel(f"correlation of the envelope with {kinds[reference]!r}")
     _legend(axes)
 
 

@@ -71,7 +71,7 @@ DETAILS = 184.0
 """Height of the panels that lie behind each other."""
 LEVEL, CHANGED, NOISE_PANEL = Panel("level", 118.0), Panel("change", 84.0), Panel("noise", DETAILS)
 BANDS, WIDTH = 48, 5.0
-"""Of a spectrogram, and the height of one in points."""
+"""Bands of a spectrogram, and the height of one in points."""
 SPAN_DB = 24.0
 """Change of level at the upper end of its axis, in [dB], or a multiple where it is larger."""
 
@@ -273,7 +273,7 @@ def _log_class_row(
 
 
 JOINT_POINTS = 2000
-"""Of a line: there are three for each signal of a joint."""
+"""Points of a line: there are three for each signal of a joint."""
 
 
 def log_joints(

@@ -3,22 +3,22 @@
 A classifier labels frames (0.4 s, every 0.1 s). A finding begins with its first frame, most of
 which the failure has not reached yet. The onset is the time t in the first frame that splits the
 power into two levels best. For n samples of mean power p, of which n1 before t have p1 and n2
-after it p2, the log likelihood of two levels exceeds that of one by
+after it p2, the log likelihood of two levels exceeds the one of a single level by
 
     (n log p - n1 log p1 - n2 log p2) / 2
 
 if samples are independent and normal. This is the criterion by which seismologists pick the onset
 of waves (Maeda 1985), and of a change of variance in general (Inclan & Tiao 1994). Only a rise
 counts. Samples of a vibration are not independent: a time of `INDEPENDENT` counts as one sample.
-The mean of the log likelihoods of two powers is taken: that of the tracking error (of the motion,
-if no velocity is desired) above 10 Hz, and that of the sudden changes of the motion, as
+The mean of the log likelihoods of two powers is taken: of the tracking error (of the motion,
+if no velocity is desired) above 10 Hz, and of the sudden changes of the motion, as
 `inspector.localisation.innovation` has them. Both filters are causal, so that nothing rises before
 it happens.
 
 The frame before the first was not labelled, so that the failure sets in during the first frame's
 last hop. This is the prior: a normal distribution with `ONSET` and `DEVIATION`. Its mean is the
 result where nothing stands out. Where no frame fits in before the first one, because the run
-begins or a gap ends there, the mean is the frame's start, and the deviation that of a frame.
+begins or a gap ends there, the mean is the frame's start, and the deviation a frame's.
 
 The end is the onset of the same stretch reversed in time, with the prior `END`.
 
@@ -62,7 +62,7 @@ def extent(
         start: Start of the finding's first frame, in [s].
         stop: Stop of its last frame, in [s].
         frame: Duration of a frame, in [s].
-        hop: Time from the start of a frame to that of the next, in [s].
+        hop: Time from the start of a frame to the start of the next, in [s].
 
     Returns:
         Onset, from ``start`` to the stop of the first frame, and end, after the onset and up to

@@ -1,4 +1,4 @@
-"""Links of a fault: those of the largest excess power, and those moved by the joints that fail."""
+"""Links of a fault: of the largest excess power, and moved by the joints that fail."""
 
 from collections.abc import Sequence
 from typing import TypeAlias

@@ -111,7 +111,7 @@ def best_lines(run: Run, failure: Event | Block) -> tuple[Order | None, float, f
     without, above 10 Hz.
 
     Returns:
-        The order, its share of the joint's vibration, and that of the best line of a fixed
+        The order, its share of the joint's vibration, and the share of the best line of a fixed
         frequency, between 0 and 1; None, 0 and 0 without vibration or without motion.
     """
     parts = _parts(run, failure)

@@ -127,8 +127,8 @@ LEFT, MIDDLE, RIGHT = 14.0, 78.0, 8.0
 STEPS = 24
 """Colours of a scale."""
 GROWN = 1.15
-"""Times that a panel is as high as in a window of 1440 x 900, between those of that window and of
-one of 1920 x 1080: labels stand as well in either."""
+"""Factor from the height of a panel in a window of 1440 x 900 to its height between that and one
+of 1920 x 1080: labels stand as well in either."""
 APART = 17.0
 """Least distance of two ticks, in points."""
 
@@ -289,7 +289,7 @@ def log_verdict(
 
 
 EMPTY = (*colors.BACKGROUNDS[0], 255)
-"""Of a row where nothing is known: that of the viewer."""
+"""Colour of a row where nothing is known: the viewer's background."""
 SHADES = 32
 """Colours of a row: few change rarely."""
 
@@ -332,5 +332,5 @@ def log_rows(
 
 
 def blanked(rgba: NDArray[np.uint8], known: Mask) -> NDArray[np.uint8]:
-    """Colours without those of columns of which nothing is known, shape (rows, columns, 4)."""
+    """Blank the columns of which nothing is known; colours, shape (rows, columns, 4)."""
     return np.where(known[None, :, None], rgba, np.array(EMPTY, dtype=np.uint8))

@@ -130,7 +130,7 @@ def outermost(urdf: Path) -> dict[str, Array]:
     """The outermost points of the links that are drawn.
 
     Returns:
-        By link, in its axes, shape (points, 3), in [m]. Of a mesh that only the viewer can read,
+        By link, in its axes, shape (points, 3), in [m]. For a mesh that only the viewer can read,
         its origin.
     """
     found: dict[str, list[Array]] = {}

@@ -14,8 +14,8 @@ from inspector.recording.panels import TOP_HZ, Curve, Detail, Plot
 from inspector.recording.unstable import Part
 
 HEAD, PARAGRAPH, LINE, FOOT = 36.0, 31.0, 15.5, 28.0
-"""Of a text, in points: from the top to the middle of its title, on to the first line of the next
-paragraph, to the next line, and from the last one to the end."""
+"""Heights in a text, in points: from the top to the middle of its title, to the first line of the
+next paragraph, to the next line, and from the last one to the end."""
 COLUMNS = 72
 """Characters of a line at the left of a window of 1440 x 900, at least."""
 TALLEST = 264.0

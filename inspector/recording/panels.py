@@ -171,7 +171,7 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> Panel | No
 
 
 def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
-    """The colours of all classes of runs, found or annotated, those of their models first."""
+    """The colours of all classes of runs, found or annotated, the models' classes first."""
     known = dict.fromkeys(name for side in sides if side.labels for name in side.labels.classes)
     others = {name for side in sides for *_, name in (*side.lane, *annotated(side.run))}
     others |= {event.label for side in sides for event in side.findings}
@@ -410,7 +410,7 @@ def _log_probability(recording: rr.RecordingStream, analysis: Analysis, alarm: f
 
 
 JOINT_POINTS = 4000
-"""Of a line, so that a long run has no more than a short one."""
+"""Points of a line, so that a long run has no more than a short one."""
 UNITS = {"velocity": "rad/s", "position": "rad", "effort": "N m"}
 
 
@@ -532,7 +532,7 @@ def log_signal(
 
 
 STRIP_ROW = 18.0
-"""Height of a row, in points; what is drawn is lower, so that rows are told apart."""
+"""Height of a row, in points; what is drawn is lower, so that rows stand apart."""
 STRIP_WIDTH, STROKES = 7.0, 3
 """Of the lines of a row, in points, and how many there are."""
 ROBOT_SHADES = 16
@@ -668,7 +668,7 @@ BANDS = 48
 BARS = 60
 LINE_WIDTH = 5.0
 HEIGHT = 160.0
-"""Of a spectrogram, in points."""
+"""Height of a spectrogram, in points."""
 
 
 def log_spectrogram(

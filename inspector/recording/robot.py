@@ -85,7 +85,7 @@ def frame(tree: UrdfTree, link: str) -> str:
 
 
 def root(tree: UrdfTree, *, floating: bool) -> str:
-    """The frame that the robot is drawn in: that of its base, or of the world if that floats."""
+    """The frame that the robot is drawn in: its base, or the world if the base floats."""
     return frame(tree, WORLD if floating else tree.root_link().name)
 
 
@@ -253,7 +253,7 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
     """Rewrite a URDF for drawing.
 
     Textures and simulator extensions are left out, addresses of meshes become absolute: rerun
-    refuses empty textures and needs an environment variable for ``package://``. Of a link without
+    refuses empty textures and needs an environment variable for ``package://``. For a link without
     visual shapes the collision shapes are drawn; a robot without any shape is drawn as sticks.
     """
     tree = ET.parse(urdf).getroot()  # noqa: S314

@@ -64,8 +64,8 @@ def plot(
     """Plot scalars over time.
 
     Args:
-        between: Range of values that is shown; that of the lines unless given.
-        during: Stretch of time that is shown, in [s]; unless given, that of all other views.
+        between: Range of values that is shown; by default the range of the lines.
+        during: Stretch of time that is shown, in [s]; by default as in all other views.
         last: Time up to the cursor that is shown in place of that, in [s].
     """
     corner = (

@@ -16,7 +16,7 @@ from noisemodel.types import Array
 PAD = 20
 """Frames for which a repetition is held before its start and after its end: delays."""
 STEP_COST = 1e-3
-"""Of a frame that is skipped or held, in squared standard deviations of the motion."""
+"""Cost of a frame that is skipped or held, in squared standard deviations of the motion."""
 LARGEST = 4_000_000
 """Cells of a matrix of costs; of longer runs every second frame is aligned, and so on."""
 STILL = 0.05
@@ -44,7 +44,7 @@ class Aligned:
 
     @property
     def slope(self) -> float:
-        """Speed of the run over that of the repetition."""
+        """Speed of the run divided by the repetition's."""
         moved = np.flatnonzero(self.inside)
         if len(moved) < 2:
             return float("nan")

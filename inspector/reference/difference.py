@@ -198,7 +198,7 @@ class Difference:
 
     @property
     def exit_status(self) -> int:
-        """The worst of all scenarios and files; "cannot tell" if that is all that is told."""
+        """The worst of all scenarios and files; "cannot tell" if none has another status."""
         codes = [EXIT[self.status(row)] for row in self.rows]
         told = [code for code in codes if code != EXIT[Status.CANNOT_TELL]] or codes
         bad = [
@@ -218,7 +218,7 @@ def difference(
     unknown: Unknown = Unknown.FINDING,
     jobs: Jobs = 1,
 ) -> Difference:
-    """Compare the runs of a folder with those of another.
+    """Compare the runs of a folder with the runs of another.
 
     Args:
         margin: Least margin from which a run is louder, in [dB].

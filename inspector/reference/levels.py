@@ -292,7 +292,7 @@ def _energies(
 def _response(frequency: Array, band: tuple[float, float], rate: float) -> NDArray[np.complex128]:
     """Response of a digital Butterworth band-pass of second order, by the bilinear transform.
 
-    It is that of ``scipy.signal.butter``, which takes half a second to import.
+    It is the filter of ``scipy.signal.butter``, which takes half a second to import.
     """
     low, high = np.tan(np.pi * np.array(band) / rate)
     s = 1j * np.tan(np.pi * np.clip(frequency, 1e-9, rate * (0.5 - 1e-9)) / rate)

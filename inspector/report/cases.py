@@ -175,7 +175,7 @@ def github(job: Job) -> str:
 def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
     """Write a job for its summary or a comment: a table, the worst first, and a picture.
 
-    GitHub takes no pictures inside the text: that of the worst case is linked if its address is
+    GitHub takes no pictures inside the text: the worst case's is linked if its address is
     known, and else its file is named.
 
     Args:

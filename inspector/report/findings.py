@@ -103,7 +103,7 @@ class Group:
         return self.verdicts[0]
 
     def found(self, *, fails: bool) -> list[tuple[Verdict, Event, str]]:
-        """Findings that fail their runs, or those that do not, once for those of repetitions."""
+        """Findings that fail their runs, or that do not; repetitions of one finding count once."""
         folded: list[list[tuple[Verdict, Event]]] = []
         for verdict in self.verdicts:
             for event in verdict.failing if fails else verdict.excused:

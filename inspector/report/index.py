@@ -23,7 +23,7 @@ from noisemodel.files import replacing
 PAGE = "index.html"
 PICTURES = "pictures"
 WIDTH = 1000
-"""Of a timeline, in units of its own."""
+"""Width of a timeline, in units of its own."""
 POLICY = "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'"
 """Policy for browsers: nothing but the pictures is fetched, also from a page on a disk."""
 ROWS = """
