@@ -51,7 +51,7 @@ PATIENCE = 2.0
 SETTINGS = ("how logs are read", "--unknown", "--report", "--reference")
 """The first settings of a header; what follows are files that options name."""
 MAX_BYTES = 256 * 2**20
-"""Most bytes of a state file that is read: those of some hundred thousand runs."""
+"""Most bytes of a state file that is read: enough for some hundred thousand runs."""
 DRAWING = 0.4
 """About how long a picture takes, in [s]."""
 LONGEST_LINE = 2**16
@@ -218,7 +218,7 @@ class Beside:
         bounds: What is known of the margins, by kind of evidence, a sentence or two each.
         worst: Largest score of a frame over the reference, in [dB]; None without one.
         quieter: By how much it is quieter than each repetition, in [dB]; 0 if it is not.
-        speed: Its speed over that of the repetitions; None without.
+        speed: Its speed divided by the repetitions'; None without.
         failures: What it lacks of its scenario, and why.
         words: The evidence, in a line.
     """

@@ -8,7 +8,7 @@ By moment, the first evidence that there is decides:
 
 A cell is a joint's velocity or tracking error in an octave. Its exceedance is its level over the
 loudest of the references within 0.15 s, both above a floor. The score of a frame is the mean of its
-two largest exceedances, or that of a neighbour if this is lower: one frame alone is no evidence.
+two largest exceedances, or a neighbour's score if this is lower: one frame alone is no evidence.
 """
 
 from collections.abc import Mapping, Sequence
@@ -244,7 +244,7 @@ class Comparison:
         margins: By kind of evidence.
         exceedances: Stretches that are louder, in order of time.
         quieter: By how much the run is quieter than each repetition, in [dB]; 0 if it is not.
-        slope: Speed of the run over that of the repetitions; NaN without.
+        slope: Speed of the run divided by the repetitions'; NaN without.
         band: Level of the noise of the quietest and of the loudest repetition at each frame, shape
             (frames, 2), in [dB re 1 rad/s]; NaN without.
         remarks: What is not compared, and why, a sentence each.

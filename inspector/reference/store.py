@@ -45,8 +45,8 @@ FORMAT = "noise-reference/1"
 NEWEST = 10
 """Repetitions that are kept of a scenario."""
 MOST_SCENARIOS = 5000
-CHANGED = f"was changed, or is not that of {NAME}; accept the runs again"
-OTHERS = f"its arrays are not those of {NAME}; accept the runs again"
+CHANGED = f"was changed, or does not belong to {NAME}; accept the runs again"
+OTHERS = f"its arrays do not belong to {NAME}; accept the runs again"
 TOLERANCE = 0.2
 """By how much earlier or later an accepted finding may come, in [s]."""
 CALIBRATED = 3
