@@ -315,7 +315,7 @@ def test_a_store_that_is_wrong_is_one_line(own, change, told):
 def test_levels_that_were_changed_or_are_hostile_are_one_line(own):
     path = own / "reference" / "pick.npz"
     path.write_bytes(path.read_bytes()[:-30])
-    assert "was changed, or is not that of" in call("classify", own / "runs")[2]
+    assert "was changed, or does not belong to" in call("classify", own / "runs")[2]
     path.unlink()
     os.mkfifo(path)
     assert "no regular one" in call("classify", own / "runs")[2]

@@ -45,8 +45,6 @@ FORMAT = "noise-reference/1"
 NEWEST = 10
 """Repetitions that are kept of a scenario."""
 MOST_SCENARIOS = 5000
-CHANGED = f"was changed, or does not belong to {NAME}; accept the runs again"
-OTHERS = f"its arrays do not belong to {NAME}; accept the runs again"
 TOLERANCE = 0.2
 """By how much earlier or later an accepted finding may come, in [s]."""
 CALIBRATED = 3
@@ -636,7 +634,7 @@ class _Row:
                 digest = hashlib.file_digest(stream, "sha256").hexdigest()
             if digest != self.get("sha256", str):
                 raise StoreError(
-                    path, f"was changed, or is not that of {NAME}; accept the runs again"
+                    path, f"was changed, or does not belong to {NAME}; accept the runs again"
                 )
             arrays = runfile.read_npz(path)
         except (OSError, runfile.ArchiveError) as error:
@@ -670,9 +668,9 @@ class _Row:
         )
         for each, shape, kind in zip(found, shapes, "uff", strict=True):
             if each.shape != shape or each.dtype.kind != kind:
-                raise StoreError(path, f"its arrays are not those of {NAME}; accept the runs again")
+                raise StoreError(path, f"its arrays do not belong to {NAME}; accept the runs again")
         if len(set(joints)) < len(joints) or not all(np.isfinite(each).all() for each in found[1:]):
-            raise StoreError(path, f"its arrays are not those of {NAME}; accept the runs again")
+            raise StoreError(path, f"its arrays do not belong to {NAME}; accept the runs again")
         return Levels(
             of.get("name", str),
             self.get("run", str, ""),
