@@ -101,6 +101,8 @@ KEY = axes.Panel("key", 360.0)
 """The scale beside the robot."""
 ROOM = 1.3
 """What the camera sees of a robot that moves its base, by its size as it stands at first."""
+MOST_POSES = 1200
+"""Poses in a message to a file without a viewer, at last: a minute."""
 POSES = 200
 """Random poses within the limits of the joints, of which the camera sees all."""
 AROUND = np.array([[-20.0, -20.0], [20.0, 20.0]])
@@ -157,7 +159,7 @@ class LiveRobot:
         base = [str(tree.root_link().name), framing.VIEW] if floating else []
         self.children = [joint.child_link for joint in joints] + base
         self._carriers = [joint.parent_link for joint in joints] + len(base) * [scene.WORLD]
-        self._at_once = at_once
+        self._at_once, self._shown = at_once, 0
         self._waiting: list[tuple[float, Array, Array]] = []
         self._names = [joint.name for joint in joints]
         self._recording = recording
@@ -238,6 +240,9 @@ class LiveRobot:
             turns = np.vstack((turns, base_pose[3:], UPRIGHT))
         self._waiting.append((time, places, turns))
         if len(self._waiting) >= self._at_once:
+            self._shown += len(self._waiting)
+            if self._at_once > 1:  # fewer messages in long files, as of the lines
+                self._at_once = min(max(self._shown // 100, self._at_once), MOST_POSES)
             self.flush()
 
     def flush(self) -> None:
