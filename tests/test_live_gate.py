@@ -142,12 +142,48 @@ def test_a_touch_that_was_accepted_is_excused_at_the_end(live, simulate, tmp_pat
     status, out, err = live("--reference", good, text=text, rate=1000)
     assert status == 0, out + err
     assert "does not count: as reference: as loud as 3 of place" in out
+    assert out.startswith("6000 samples, ")  # nothing before the end
 
 
-def test_a_reference_and_an_early_end_exclude_each_other(live, accepted):
-    status, _, err = live("--reference", accepted, "--fail-fast")
-    assert status == 2
-    assert "exclude each other" in err
+@pytest.mark.parametrize("scenario", ["pick", "place", "wave"])
+def test_a_stream_like_its_reference_has_no_finding_while_it_runs(
+    live, accepted, simulate, scenario
+):
+    text = streamed(simulate.run(scenario, 6, "harmless"))
+    status, out, _ = live("--reference", accepted, "--format", "json", text=text, rate=1000)
+    (summary,) = map(json.loads, out.splitlines())
+    assert (status, summary["event"]) == (0, "summary")
+
+
+def test_what_is_louder_than_its_reference_is_told_while_the_stream_runs(live, accepted, simulate):
+    text = streamed(simulate.run("place", 5, "impact"))
+    options = ("--reference", accepted, "--format", "json", "--fail-fast")
+    status, out, _ = live(*options, text=text, rate=1000)
+    begin, summary = map(json.loads, out.splitlines())
+    assert (status, begin["event"], begin["label"]) == (1, "begin", "impact")
+    assert begin["start"] == pytest.approx(2.5, abs=0.15)
+    assert begin["evidence"]["joint"] == "upperarm"
+    assert summary["duration"] < begin["start"] + 4.3
+
+
+def test_a_chatter_that_lasts_is_told_once(live, accepted, simulate):
+    text = streamed(simulate.run("pick", 5, "chatter"))
+    options = ("--reference", accepted, "--format", "json")
+    _, out, _ = live(*options, text=text, rate=1000)
+    begin, _ = map(json.loads, out.splitlines())
+    assert (begin["start"] < 0.2, begin["evidence"]["joint"]) == (True, "elbow")
+
+
+def test_a_stream_too_long_to_be_kept_is_compared_while_it_runs(
+    live, accepted, simulate, monkeypatch
+):
+    monkeypatch.setattr("inspector.reference.levels.LONGEST", 5.0)
+    options = ("--reference", accepted)
+    status, out, err = live(*options, text=streamed(simulate.run("pick", 5, "chatter")), rate=1000)
+    assert status == 1
+    assert "elbow" in out.splitlines()[0]
+    assert "minutes are not compared as a whole" in err
+    assert live(*options, text=streamed(simulate.run("pick", 5)), rate=1000)[0] == 0
 
 
 def test_levels_that_come_in_pieces_are_those_of_the_whole(simulate):

@@ -49,8 +49,8 @@ def live(
         Path | None,
         typer.Option(
             "--reference",
-            help="Accepted runs, or a folder of good ones, that all of the stream is compared with"
-            " at its end; while it runs, the general model decides.",
+            help="Accepted runs, or a folder of good ones, that the stream is compared with: 6 s"
+            " every 3 s, told at most 4.3 s later, and all of it at its end.",
         ),
     ] = None,
     model: ModelFiles = None,
@@ -89,8 +89,6 @@ def live(
         raise LiveError(
             "samples are read from standard input; pipe them in: robot | inspector live"
         )
-    if reference is not None and fail_fast:
-        raise typer.BadParameter("--reference and --fail-fast exclude each other")
     library = load_library(assets.model_files(model))
     known = None if reference is None else Reference.load(reference)
     gate = Gate(_tell, as_json=format is Format.JSON, reference=known)
@@ -105,6 +103,7 @@ def live(
         keep_levels=known is not None,
         on_warning=partial(typer.echo, err=True),
         on_finding=gate.take,
+        on_levels=None if known is None else gate.compare,
     )
     given = tuple(name.strip() for name in names.split(",") if name.strip())
     summary = follow(

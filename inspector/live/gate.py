@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from inspector.live.session import Summary
+from inspector.reference.judging import GAP
+from inspector.reference.levels import Levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, judge
 from inspector.status import EXIT, Status
-from inspector.verdict import Verdict, counts
+from inspector.verdict import Evidence, Verdict, counts
 from inspector.version import program_version
 from noiseclassifier import Event
 from noiseclassifier.labels import interval
@@ -25,7 +27,8 @@ class Gate:
     """Prints findings while they come.
 
     Args:
-        reference: What the stream is compared with at its end; None leaves it to the model.
+        reference: What the stream is compared with, a stretch after the other while it runs and as
+            a whole at its end; None leaves it to the model.
 
     Attributes:
         failed: Whether a finding counts so far.
@@ -42,13 +45,39 @@ class Gate:
         self._tell, self._as_json = tell, as_json
         self._reference = reference
         self._found: dict[tuple[str, float], Event] = {}
+        self._told: dict[Event, Evidence] = {}
+        self._compared, self._begin, self._heard = False, 0.0, 0.0
 
     def take(self, event: Event, over: bool) -> None:
-        """Print a finding when it is there, and when it is over."""
+        """Print a finding when it is there, and when it is over; beside a reference, keep it."""
         self._found[event.label, event.start] = event
-        verdict = Verdict(NAME, Status.FINDINGS, events=tuple(self._found.values()))
+        if self._reference is None:
+            verdict = Verdict(NAME, Status.FINDINGS, events=tuple(self._found.values()))
+            self._print(verdict, event, over=over)
+
+    def compare(self, latest: Levels) -> None:
+        """Print the findings in the latest stretch of the stream beside the reference, each once.
+
+        Args:
+            latest: Levels of the last 6 s, 3 s of which have been there before.
+        """
+        assert self._reference is not None
+        if not self._compared:
+            self._compared, self._begin, self._heard = True, latest.start, latest.start
+        found = tuple(self._found.values())
+        verdict = Verdict(NAME, Status.OK, events=found, begin=self._begin)
+        verdict = self._beside(verdict, self._reference, latest)
+        for event in verdict.failing:
+            if event.start > latest.time[-1] or event.stop < latest.start:
+                continue
+            if event.start >= self._heard:
+                self._told[event] = verdict.evidence[event]
+                self._print(verdict, event, over=False)
+            self._heard = max(self._heard, event.stop + GAP)
+
+    def _print(self, verdict: Verdict, event: Event, *, over: bool) -> None:
         self.failed = self.failed or event in verdict.failing
-        ruled = verdict.ruled(event)
+        ruled, evidence = verdict.ruled(event), verdict.evidence.get(event)
         if self._as_json:
             line: dict[str, Any] = {
                 "event": "end" if over else "begin",
@@ -61,9 +90,11 @@ class Gate:
                 "ruling": ruled.ruling.value,
                 "reason": ruled.reason,
             }
+            if evidence is not None:
+                line["evidence"] = evidence.as_dict()
             self._tell(json.dumps({"format": FORMAT, **line}))
         elif not over:
-            became = f" ({ruled})" if str(ruled) else ""
+            became = f" ({ruled})" if str(ruled) else f": {evidence}" if evidence else ""
             self._tell(f"{event.label} from {event.start:.2f} s{event.novelty}{became}")
 
     def end(self, summary: Summary) -> int:
@@ -85,12 +116,12 @@ class Gate:
                 "warnings": dict(summary.warnings),
                 "where": summary.where,
             }
-            if verdict.beside is not None:
+            if self._reference is not None:
                 known = verdict.as_dict()
                 line |= {"reference": known["reference"], "findings": known["events"]}
             self._tell(json.dumps({"format": FORMAT, **line}))
             return EXIT[verdict.status]
-        shown = summary.findings if verdict.beside is None else verdict.failing
+        shown = summary.findings if self._reference is None else verdict.failing
         self._tell(str(replace(summary, status=verdict.status, findings=shown)))
         for event, evidence in verdict.evidence.items():
             if not evidence.excused:
@@ -114,12 +145,21 @@ class Gate:
             tuple(summary.findings),
             duration=summary.samples / summary.rate,
         )
-        if self._reference is None or summary.levels is None:
+        if self._reference is None or (summary.levels is None and not self._compared):
             return verdict
-        verdict = replace(verdict, begin=summary.levels.start)
-        comparison = self._reference.compare(summary.levels)
-        verdict = beside(verdict, comparison, self._reference)
-        verdict = judge(verdict, self._reference, today=date.today())
+        if summary.levels is None:  # too long to be compared as a whole
+            status = Status.FINDINGS if self._told else Status.OK
+            verdict = replace(
+                verdict, status=status, events=tuple(self._told), evidence=dict(self._told)
+            )
+        else:
+            verdict = replace(verdict, begin=summary.levels.start)
+            verdict = self._beside(verdict, self._reference, summary.levels)
         if summary.status is Status.CANNOT_TELL and summary.model and verdict.status is Status.OK:
             return replace(verdict, status=Status.CANNOT_TELL)  # too little of it was seen
         return verdict
+
+    @staticmethod
+    def _beside(verdict: Verdict, reference: Reference, levels: Levels) -> Verdict:
+        verdict = beside(verdict, reference.compare(levels), reference)
+        return judge(verdict, reference, today=date.today())

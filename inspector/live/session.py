@@ -167,7 +167,7 @@ class Worker:
         if self._stream is not None:
             self.levels = self._stream.finish()
             if self._stream.too_long:
-                line = f"more than {LONGEST / 60:.0f} minutes are not compared with a reference"
+                line = f"more than {LONGEST / 60:.0f} minutes are not compared as a whole"
                 self._warnings.note("streams too long for a reference", line)
         self._news.update(self.findings, float("inf"))
         if self._sink.alive:
@@ -370,6 +370,7 @@ class LiveSession:
         overwrite: Whether a file that exists may be replaced.
         keep_levels: Whether octave levels are kept, of an hour at most, 8 kB a second of 7 joints
             at 1 kHz, which `Reference.compare` takes at the end.
+        on_levels: Called every 3 s with the levels of the last 6 s, a second after these came.
         on_warning: Called with a line for what cannot be shown, once per kind.
         on_finding: Called with each finding as soon as it is confirmed, and False; and with it and
             True when it is over. The latter are those of the summary.
@@ -391,6 +392,7 @@ class LiveSession:
         connect: str | None = None,
         overwrite: bool = False,
         keep_levels: bool = False,
+        on_levels: Callable[[Levels], None] | None = None,
         on_warning: Callable[[str], None] = lambda line: None,
         on_finding: Callable[[Event, bool], None] | None = None,
     ) -> None:
@@ -400,6 +402,7 @@ class LiveSession:
         self._library = load_library() if library is None else library
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
         self._on_finding, self._keep_levels = on_finding, keep_levels
+        self._on_levels = on_levels
         self._latest = -1.0 / rate
         self._buffer: SampleBuffer | None = None
         self._worker: Worker | None = None
@@ -537,7 +540,9 @@ class LiveSession:
         size = max(1, round(BATCH * self._rate))
         # A file's name is none that a reference knows.
         robot = "" if self._robot is None or Path(self._robot).suffix else self._robot
-        stream = LevelStream(tuple(names), self._rate, robot) if self._keep_levels else None
+        stream = None
+        if self._keep_levels or self._on_levels is not None:
+            stream = LevelStream(tuple(names), self._rate, robot, self._on_levels)
         worker = Worker(
             self._sink,
             rate=self._rate,

@@ -4,7 +4,7 @@ A frame lasts 0.2 s and the next one begins 0.05 s later. Octaves go from 8 Hz t
 Each joint has two signals: its velocity, and its tracking error where a velocity is desired.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -24,8 +24,10 @@ LOWEST, HIGHEST = 8.0, 0.45
 """Lower edge of the first octave, in [Hz], and upper edge of the last as a share of the rate."""
 SETTLING = 1.0
 """Time after which filters have rung out, in [s]."""
-PIECE, LONGEST = 6.0, 3600.0
-"""Stretch of a stream that is measured at once, and longest stream that is, in [s]."""
+PIECE, LONGEST = 3.0, 3600.0
+"""Stretch of a stream that is measured at once, and longest stream that is kept, in [s]."""
+LATEST = 2
+"""Pieces of a stream that are compared while it runs."""
 SIGNALS = ("velocity", "tracking error")
 LEAST_DB, STEP_DB, ABSENT = -100.0, 0.5, 255
 """What code 0 of a stored level stands for, the step between codes, and the code of no level."""
@@ -132,15 +134,23 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
 
 
 class LevelStream:
-    """Measures the levels of a run while it comes, 6 s at a time, so that no sample is kept.
+    """Measures the levels of a run while it comes, 3 s at a time, so that no sample is kept.
 
     Args:
         rate: In [Hz].
         robot: The robot's name; empty without.
+        tell: Called with the levels of the last 6 s after every 3 s, a second later.
     """
 
-    def __init__(self, joint_names: tuple[str, ...], rate: float, robot: str = "") -> None:
+    def __init__(
+        self,
+        joint_names: tuple[str, ...],
+        rate: float,
+        robot: str = "",
+        tell: Callable[[Levels], None] | None = None,
+    ) -> None:
         self._joints, self._rate, self._robot = joint_names, rate, robot
+        self._tell, self._frames = tell, 0
         self._start: float | None = None
         self._held: dict[str, NDArray[np.float32]] = {}
         self._valid = np.zeros(0, dtype=bool)
@@ -174,20 +184,28 @@ class LevelStream:
         """Levels of what came; None of less than a frame, or of more than an hour."""
         if not self.too_long and len(self._valid) > 1:
             self._measure(len(self._valid), None)
-        if self.too_long or not self._parts or self._start is None:
+        if self.too_long or not self._parts:
             return None
+        return replace(self._joined(self._parts), duration=self._count / self._rate)
+
+    def _joined(self, parts: Sequence[Levels]) -> Levels:
+        """The last pieces as one."""
+        assert self._start is not None
         whole: dict[str, Any] = {
-            name: np.concatenate([getattr(each, name) for each in self._parts])
+            name: np.concatenate([getattr(each, name) for each in parts])
             for name in ("level", "guide", "pace")
         }
-        last = self._parts[-1]
-        return replace(last, start=self._start, duration=self._count / self._rate, **whole)
+        frames = len(whole["guide"])
+        start = self._start + (self._frames - frames) * HOP
+        return replace(parts[-1], start=start, duration=(frames + BINS - 1) * HOP, **whole)
 
     def _add_gap(self, lost: int, widths: Mapping[str, int]) -> None:
-        if lost > LONGEST * self._rate:
-            self.too_long = True
         piece = round(PIECE * self._rate)
-        while lost and not self.too_long:
+        if lost > LONGEST * self._rate:
+            assert self._start is not None
+            self.too_long, self._start = True, self._start + (lost - piece) / self._rate
+            lost = piece
+        while lost:
             count = min(lost, piece)
             lost -= count
             self._add({n: np.zeros((count, w)) for n, w in widths.items()}, np.zeros(count, bool))
@@ -196,8 +214,7 @@ class LevelStream:
         self._count += len(valid)
         self.too_long = self.too_long or self._count > LONGEST * self._rate
         if self.too_long:
-            self._held, self._valid, self._parts = {}, self._valid[:0], []
-            return
+            self._parts = self._parts[-LATEST:]
         for name, values in signals.items():
             new = np.where(valid[:, None], values, 0.0).astype(np.float32)
             held = self._held.get(name)
@@ -239,6 +256,9 @@ class LevelStream:
         part = replace(found, guide=guide[taken], level=level[taken], pace=found.pace[taken])
         if len(part.guide):
             self._parts.append(part)
+            self._frames += len(part.guide)
+            if self._tell is not None and frames is not None:
+                self._tell(self._joined(self._parts[-LATEST:]))
 
 
 def encoded(level: NDArray[np.float32]) -> Codes:
