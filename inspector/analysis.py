@@ -404,6 +404,8 @@ def _missing(run: nm.Run) -> Iterator[str]:
         yield f"{lost} samples lie in gaps; frames that touch one are not labelled."
 
 
+NOTHING = r"^Nothing stands out[^.]*\.\s*"
+"""What is said of a run without findings."""
 MOST = 3
 LOUDEST = "loudest"
 

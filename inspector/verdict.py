@@ -116,12 +116,14 @@ class Missing:
         start: The earliest onset, in [s]; None if any.
         stop: The latest onset, in [s]; None if any.
         reason: Why it is required; may be empty.
+        line: Of the file that requires it, from 1; 0 if that is not known.
     """
 
     label: str
     start: float | None = None
     stop: float | None = None
     reason: str = ""
+    line: int = 0
 
     def __str__(self) -> str:
         when = "" if self.start is None else f" from {self.start:.2f} s to {self.stop:.2f} s"
@@ -136,6 +138,11 @@ class Missing:
     def words(self) -> str:
         """What that is of its scenario, in a word."""
         return "MISSING" if self.scenario else "CUT" if self.label == END else "FAIL"
+
+    @property
+    def rule(self) -> str:
+        """Its kind, for programs that count them."""
+        return f"missing-{'log' if self.scenario else self.label.replace(' ', '-')}"
 
     @property
     def told(self) -> str:

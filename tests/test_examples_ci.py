@@ -72,6 +72,8 @@ def check(job, **inputs):
         "OPTIONS": "",
         "REPORT": "noise-report",
         "DIFF": "",
+        "REFERENCE": "",
+        "ACCEPT": "",
         "NAME": "noise",
     }
     files = {"RUNNER_TEMP": "temp", "GITHUB_STEP_SUMMARY": "summary.md", "GITHUB_OUTPUT": "outputs"}
@@ -165,6 +167,140 @@ def test_the_comment_of_the_action_is_made_once_and_then_replaced(job, known, me
     asked, sent = (job.folder / "calls").read_text().splitlines()
     assert "<!-- noise-inspector nightly -->" in asked
     assert sent == f"api --method {method} --field body=@temp/noise-nightly.md --silent"
+
+
+class Repository:
+    """A repository whose workflow is run as GitHub runs it; ``gh`` keeps the comment in a file."""
+
+    def __init__(self, job):
+        self.job, self.folder, self.origin = job, job.folder, job.folder / "origin.git"
+        self.git("init", "--quiet", "--bare", "--initial-branch=main", self.origin)
+        (self.folder / "comment").mkdir()
+        line = (
+            'for each; do case $each in body=@*) cp "${each#body=@}" ../comment/body.md; esac; done'
+        )
+        tool(self.folder, "gh", line)
+        work = self.checked_out()
+        for path in ("examples/accept/simulate.py", "examples/ci/github.yml"):
+            shutil.copy(ROOT / path, work)
+        (work / "change").write_text("")
+        (work / "simulate.sh").write_text(
+            f'#!/bin/sh\nexec {shlex.quote(sys.executable)} simulate.py "$1" $(cat change)\n'
+        )
+        (work / "simulate.sh").chmod(0o755)
+        self.push("main")
+
+    def git(self, *command):
+        names = ("-c", "user.name=a", "-c", "user.email=a@b")
+        done = self.job("git", "-C", self.folder / "work", *names, *command)
+        if not (self.folder / "work").exists():
+            done = self.job("git", *command)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    def checked_out(self, branch=""):
+        shutil.rmtree(self.folder / "work", ignore_errors=True)
+        self.job("git", "clone", "--quiet", self.origin, "work")
+        if branch:
+            self.git("checkout", "--quiet", "-B", branch, f"origin/{branch}")
+        return self.folder / "work"
+
+    def push(self, branch):
+        self.git("add", "--all")
+        self.git("commit", "--quiet", "--message", branch)
+        self.git("push", "--quiet", "origin", f"HEAD:refs/heads/{branch}")
+
+    def run(self, event, branch, **inputs):
+        """Run the workflow; the exit status of its first step that fails, and what was written."""
+        work, temp = self.checked_out(branch), self.folder / "temp"
+        temp.mkdir(exist_ok=True)
+        (temp / "summary").write_text("")
+        variables = {"GITHUB_REF": f"refs/heads/{branch}", "GITHUB_ACTOR": "ann"}
+        variables |= {"RUNNER_TEMP": str(temp), "GITHUB_STEP_SUMMARY": str(temp / "summary")}
+        known = {"inputs": inputs, "github.event_name": event, "github.repository": "o/r"}
+        known |= {"github.event.pull_request.number": "7", "runner.temp": str(temp)}
+        status, said = 0, ""
+        for step in read("examples/ci/github.yml")["jobs"]["noise"]["steps"]:
+            action = step.get("uses", "")
+            if not action.startswith("OWNER/"):
+                steps_of = [] if action else [step]
+                own = known
+            else:
+                steps_of = read("action.yml")["runs"]["steps"]
+                given = {name: filled(value, known) for name, value in step["with"].items()}
+                defaults = {
+                    k: v.get("default", "") for k, v in read("action.yml")["inputs"].items()
+                }
+                own = known | {"inputs": defaults | given}
+            for each in steps_of:
+                if not holds(each.get("if", "success()"), own, status):
+                    continue
+                if each.get("uses", "").startswith("actions/upload-artifact"):
+                    kept = work / filled(each["with"]["path"], own)
+                    assert (kept / "index.html").exists()
+                    own[f"steps.{each['id']}.outputs.artifact-url"] = "https://host/artifact/1"
+                if "run" not in each or each.get("name") == "Install":  # what is tested is there
+                    continue
+                env = {name: filled(value, own) for name, value in each.get("env", {}).items()}
+                (temp / "outputs").write_text("")
+                env |= variables | {"GITHUB_OUTPUT": str(temp / "outputs")}
+                done = self.job("env", "-C", work, *bash(each["run"]), **env)
+                said += done.stdout + done.stderr
+                status = status or done.returncode
+        return status, said, (temp / "summary").read_text()
+
+
+def filled(text, known):
+    """A text with the expressions in it replaced by what they stand for."""
+
+    def value(found):
+        place, _, name = found[1].partition(".")
+        return str(known["inputs"].get(name, "") if place == "inputs" else known.get(found[1], ""))
+
+    return re.sub(r"\$\{\{ *([\w.-]+) *\}\}", value, text)
+
+
+def holds(condition, known, status):
+    """Whether a step is run."""
+    parts = condition.split(" && ")
+    if "always()" not in parts and status:
+        return False
+    facts = [part.split() for part in parts if "()" not in part]
+    return all(
+        (filled(f"${{{{ {name} }}}}", known) == word.strip("'")) == (sign == "==")
+        for name, sign, word in facts
+    )
+
+
+@pytest.mark.slow
+def test_runs_are_accepted_changed_shown_and_accepted_after_review(job):
+    repository = Repository(job)
+    status, said, summary = repository.run("workflow_dispatch", "main", reason="first release")
+    assert (status, "pick: new, 3 repetitions" in summary) == (0, True), said
+    work = repository.checked_out("main")
+    assert 'by = "ann"' in (work / "reference" / "reference.toml").read_text()
+    assert "Accept runs: first release" in repository.git("log", "-1", "--format=%an %s")
+    for change, expected in (("harmless", 0), ("chatter", 1)):
+        (repository.checked_out("main") / "change").write_text(change)
+        repository.push(change)
+        status, said, summary = repository.run("pull_request", change)
+        assert status == expected, said
+    assert re.search(
+        r"::error file=logs/pick-\d.npz,title=pick::findings: .*elbow.* 32-64 Hz", said
+    )
+    assert re.search(r"\| `pick` \| FAIL \| .*elbow.*, 32-64 Hz, \+\d+ dB over 3 rep", summary)
+    comment = (repository.folder / "comment" / "body.md").read_text()
+    assert comment.startswith("<!-- noise-inspector noise -->\n### Noise: 9 runs: 3 with findings")
+    assert re.search(r"elbow +\|#{50,}\| 6.0 s", comment)
+    assert "[Page with pictures](https://host/artifact/1)" in comment
+    reason = """it's "new"; $(touch pwned) `touch pwned`"""
+    inputs = {"reason": reason, "options": "--only 'pick'"}
+    status, said, summary = repository.run("workflow_dispatch", "chatter", **inputs)
+    assert (status, "pick: 3 repetitions replace the accepted" in summary) == (0, True), said
+    assert not (repository.folder / "work" / "pwned").exists()
+    status, said, _ = repository.run("pull_request", "chatter")
+    assert status == 0, said
+    assert "9 runs: 9 ok" in (repository.folder / "comment" / "body.md").read_text()
 
 
 def test_the_workflow_uses_inputs_that_the_action_has():

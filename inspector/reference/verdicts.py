@@ -1,6 +1,7 @@
 """What becomes of a verdict beside a reference: findings by moment, rulings, and missing runs."""
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inspector.analysis import Analysis
+from inspector.analysis import NOTHING, Analysis
 from inspector.library import Library
 from inspector.logs.read import Reading
 from inspector.reference.judging import (
@@ -21,7 +22,7 @@ from inspector.reference.judging import (
     compare,
 )
 from inspector.reference.levels import HOP, Levels, levels
-from inspector.reference.store import NAME, Reference, find, scenario_of
+from inspector.reference.store import NAME, Reference, find, line_of, scenario_of
 from inspector.status import Status
 from inspector.verdict import END, LOG, Beside, Evidence, Missing, Ruled, Ruling, Verdict
 from noiseclassifier import UNKNOWN, Event, Labels
@@ -119,6 +120,7 @@ class References:
                     reason=f"{names[each.name]} of {each.at_least} logs"
                     if names[each.name]
                     else f"no log; it had {len(each.repetitions)}",
+                    line=line_of(each.name, path),
                 )
                 for each in reference.scenarios
                 if each.required
@@ -223,6 +225,7 @@ def beside(
     return replace(
         verdict,
         status=status,
+        message=re.sub(NOTHING, "", verdict.message) if failing else verdict.message,
         events=events,
         evidence=evidence,
         beside=known,

@@ -35,6 +35,7 @@ class Case:
     Attributes:
         name: What it is of, a file or a scenario.
         path: The file that it is about.
+        line: Its line there, from 1; 0 without.
         status: What became of it, as machines read it.
         words: The same, as people read it.
         outcome: What that is as a test.
@@ -67,6 +68,7 @@ class Case:
     picture: Path | None = None
     picture_url: str = ""
     timeline: str = ""
+    line: int = 0
 
     @property
     def told(self) -> str:
@@ -220,6 +222,8 @@ def published(picture: Path | None, folder: Path | None, address: str) -> str:
 
 def _annotation(kind: str, case: Case) -> str:
     about = {"file": str(case.path)}
+    if case.line:
+        about["line"] = str(case.line)
     if case.name != about["file"]:
         about["title"] = case.name
     listed = ",".join(

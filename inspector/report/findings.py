@@ -145,6 +145,19 @@ class Group:
         return [sentence(*each) for each in self.found(fails=False)]
 
 
+def each_missing(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """The verdicts with one for each scenario that has no log."""
+    return [
+        one
+        for verdict in verdicts
+        for one in (
+            [verdict]
+            if verdict.of_run
+            else [replace(verdict, missing=(each,)) for each in verdict.missing]
+        )
+    ]
+
+
 def groups(verdicts: Sequence[Verdict]) -> list[Group]:
     """Runs by scenario, the worst first.
 
@@ -153,12 +166,11 @@ def groups(verdicts: Sequence[Verdict]) -> list[Group]:
     """
     found: dict[tuple[str, str], list[Verdict]] = {}
     absent = []
-    for verdict in sorted(verdicts, key=lambda each: each.severity):
+    for verdict in sorted(each_missing(verdicts), key=lambda each: each.severity):
         if verdict.of_run:
             found.setdefault(_key(verdict), []).append(verdict)
         else:
-            each_alone = [replace(verdict, missing=(each,)) for each in verdict.missing]
-            absent += [Group(one.missing[0].scenario, [one]) for one in each_alone]
+            absent.append(Group(verdict.missing[0].scenario, [verdict]))
     return absent + [
         Group(name if len(each) > 1 else str(each[0].path), each)
         for (_, name), each in found.items()
@@ -189,19 +201,25 @@ def _alike(one: tuple[Verdict, Event], other: tuple[Verdict, Event]) -> bool:
 
 
 def timeline(verdict: Verdict, width: int = 60) -> str:
-    """The findings that fail a run over time as text, a line for each class."""
+    """The findings that fail a run over time as text, a line for each class and joint."""
     if not verdict.duration:
         return ""
-    lines = []
-    for label in dict.fromkeys(event.label for event in verdict.failing):
-        marks = ["."] * width
-        for event in verdict.failing:
-            if event.label == label:
-                times = (event.start - verdict.begin, event.stop - verdict.begin)
-                first, last = (int(width * time / verdict.duration) for time in times)
-                marks[max(first, 0) : last + 1] = "#" * (min(last + 1, width) - max(first, 0))
-        lines.append((label, f"|{''.join(marks)}| {verdict.duration:.1f} s"))
-    return "\n".join(table(lines, gap="  "))
+    lines: dict[tuple[str, str], list[str]] = {}
+    for event in verdict.failing:
+        marks = lines.setdefault((event.label, _joint(verdict, event)), ["."] * width)
+        times = (event.start - verdict.begin, event.stop - verdict.begin)
+        first, last = (int(width * time / verdict.duration) for time in times)
+        marks[max(first, 0) : last + 1] = "#" * (min(last + 1, width) - max(first, 0))
+    rows = [(*of, f"|{''.join(marks)}| {verdict.duration:.1f} s") for of, marks in lines.items()]
+    return "\n".join(table(rows, gap="  "))
+
+
+def _joint(verdict: Verdict, event: Event) -> str:
+    """The joint of a finding; empty if it is not known."""
+    known, where = verdict.evidence.get(event), verdict.localisations.get(event)
+    if where is not None and where.joints:
+        return where.joints[0][0]
+    return known.joint if known else ""
 
 
 def table(rows: Sequence[Sequence[str]], gap: str = "   ") -> list[str]:

@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from inspector.analysis import NOTHING
 from inspector.report import cases
 from inspector.report.cases import Case, Job, Outcome
 from inspector.report.findings import (
     COUNTED,
     WORDS,
     Group,
+    each_missing,
     excused,
     failing,
     groups,
@@ -34,8 +36,6 @@ SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
 MOST = 20
 """Findings of a scenario that are listed."""
-NOTHING = r"^Nothing stands out[^.]*\.\s*"
-"""The sentence that a row says."""
 REPEATED = r"\d+% by \d+ repetitions? of "
 """What the line on the reference says for all runs."""
 AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
@@ -180,7 +180,7 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
     first line where there is no other. Expected findings are counted, but no results: GitHub would
     show them. Bad input is a notification of the tool, and so is what cannot be told.
     """
-    ranked = sorted(verdicts, key=lambda verdict: verdict.severity)
+    ranked = sorted(each_missing(verdicts), key=lambda verdict: verdict.severity)
     results = [result for verdict in ranked for result in _results(verdict)]
     rules = dict.fromkeys(result["ruleId"] for result in results)
     notes = [
@@ -249,8 +249,9 @@ def _job(verdicts: Sequence[Verdict]) -> Job:
     """All runs as cases, for programs that count runs."""
     found = [
         Case(
-            name=str(verdict.path),
+            name=str(verdict.path) if verdict.of_run else verdict.missing[0].scenario,
             path=verdict.path,
+            line=0 if verdict.of_run else verdict.missing[0].line,
             status=verdict.status,
             words=WORDS[verdict.status],
             outcome=_outcome(verdict),
@@ -265,7 +266,7 @@ def _job(verdicts: Sequence[Verdict]) -> Job:
             picture=verdict.picture,
             picture_url=verdict.picture_url,
         )
-        for verdict in verdicts
+        for verdict in each_missing(verdicts)
     ]
     remarks = (IGNORED,) if _ignoring(verdicts) else ()
     return Job("Noise", summary(verdicts), counts(verdicts), found, remarks)
@@ -325,18 +326,18 @@ def _results(verdict: Verdict) -> list[dict[str, Any]]:
         )
         for event in verdict.failing
     ]
-    facts += [
-        (f"missing-{each.label.replace(' ', '-')}", str(each), {}) for each in verdict.missing
-    ]
+    facts += [(each.rule, str(each), {}) for each in verdict.missing]
+    line = 0 if verdict.of_run else verdict.missing[0].line
+    name = f"{verdict.path}" if verdict.of_run else verdict.missing[0].scenario
     for rule, told, span in facts:
         number[rule] += 1
-        same = f"{_uri(verdict.path)}:{rule}:{number[rule]}"
+        same = f"{name if line else _uri(verdict.path)}:{rule}:{number[rule]}"
         results.append(
             {
                 "ruleId": rule,
                 "level": "error",
-                "message": {"text": f"{verdict.path}: {told}"},
-                "locations": [_location(verdict.path)],
+                "message": {"text": f"{name}: {told}"},
+                "locations": [_location(verdict.path, line or 1)],
                 "partialFingerprints": {
                     "primaryLocationLineHash": hashlib.sha256(same.encode()).hexdigest()[:16]
                 },
@@ -346,11 +347,11 @@ def _results(verdict: Verdict) -> list[dict[str, Any]]:
     return results
 
 
-def _location(path: Path) -> dict[str, object]:
+def _location(path: Path, line: int = 1) -> dict[str, object]:
     return {
         "physicalLocation": {
             "artifactLocation": {"uri": _uri(path)},
-            "region": {"startLine": 1},
+            "region": {"startLine": line},
         }
     }
 
@@ -362,6 +363,12 @@ def _uri(path: Path) -> str:
 
 
 def _described(rule: str) -> str:
+    known = {
+        "missing-log": "A scenario that was accepted has no log.",
+        "louder": "A joint is louder than in accepted runs.",
+    }
+    if rule in known:
+        return known[rule]
     label = rule.removeprefix("missing-")
     if label != rule:
         return f"A required finding of class {label.replace('-', ' ')} was not found."
