@@ -10,6 +10,7 @@ goes on where it was; only at the end are the files that ship replaced.
 """
 
 import argparse
+import os
 import shutil
 import time
 from collections.abc import Callable
@@ -112,9 +113,10 @@ def main() -> None:
 
 def timed(what: str, step: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
     """The result of a step, whose time is printed."""
-    start = time.monotonic()
+    start, used = time.monotonic(), sum(os.times()[:4])
     found = step(*args, **kwargs)
-    print(f"{what}: {time.monotonic() - start:.0f} s", flush=True)
+    took, used = time.monotonic() - start, sum(os.times()[:4]) - used
+    print(f"{what}: {took:.0f} s, {used:.0f} s of processor time", flush=True)
     return found
 
 
