@@ -141,7 +141,7 @@ class Noise:
         verdict = Verdict.of(Path(scenario), analysis)
         if not reference.scenarios:
             return analysis, judge(verdict, today=date.today()), None
-        comparison = compare(levels(run, name=scenario), reference.scenarios)
+        comparison = compare(levels(analysis.run, name=scenario), reference.scenarios)
         verdict = beside(verdict, comparison, reference, analysis.labels)
         return analysis, judge(verdict, reference, today=date.today()), comparison
 
@@ -163,6 +163,7 @@ class Noise:
         reason: str,
     ) -> None:
         """Accept runs as repetitions of a scenario."""
+        from inspector.audit_signals import without_placeholder
         from inspector.reference.levels import levels
         from inspector.reference.store import accept_into, digest, wanted_in, who
 
@@ -172,7 +173,7 @@ class Noise:
             for each, file in zip(given, files, strict=True)
         ]
         measured = [
-            levels(run, name=scenario, file=file, sha256=digest(run))
+            levels(without_placeholder(run)[0], name=scenario, file=file, sha256=digest(run))
             for run, file in zip(runs, files, strict=True)
         ]
         events = {

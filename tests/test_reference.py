@@ -377,6 +377,17 @@ def test_levels_of_a_tone_are_its_root_mean_square_in_its_octave(simulate):
     assert np.isnan(found.level[:, :, 1]).all()
 
 
+def test_a_desired_velocity_that_is_a_placeholder_tells_no_error(tmp_path, simulate):
+    run = simulate.run("pick", 1)
+    zeros = replace(run, velocity_desired=np.zeros_like(run.velocity))
+    zeros.save(tmp_path / "pick-1.npz")
+    reference = Reference.load(tmp_path)
+    (kept,) = reference.scenarios[0].repetitions
+    without = levels(replace(run, velocity_desired=None))
+    np.testing.assert_array_equal(kept.level, without.level)
+    np.testing.assert_array_equal(reference.compare(zeros).run.level, without.level)
+
+
 def test_levels_are_kept_in_half_decibels():
     level = np.array([[-120.0, -99.9, -20.3, 5.0, np.nan, 90.0]], dtype=np.float32)
     kept = decoded(encoded(level))

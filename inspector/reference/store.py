@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from inspector.audit_signals import without_placeholder
 from inspector.errors import FileError, InspectorError
 from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.reference.judging import (
@@ -103,7 +104,8 @@ class Reference:
             The `Comparison`: dB over the reference by joint, octave and time, and findings.
         """
         if isinstance(run, Run):
-            run = levels(run, name=str(run.meta.get("scenario", "")))
+            name = str(run.meta.get("scenario", ""))
+            run = levels(without_placeholder(run)[0], name=name)
         return compare(run, self.scenarios)
 
     def named(self, name: str) -> Scenario | None:
@@ -168,8 +170,8 @@ def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Leve
 def levels_of(source: Source, root: Path | None, reading: Reading | None = None) -> Levels:
     """Measure the levels of a run that was found in a folder."""
     opened = open_source(source, reading)
-    name = scenario_of(opened.run, source.shown, root)
-    return levels(opened.run, name=name, file=str(source.shown), sha256=opened.sha256)
+    name, (run, _) = scenario_of(opened.run, source.shown, root), without_placeholder(opened.run)
+    return levels(run, name=name, file=str(source.shown), sha256=opened.sha256)
 
 
 def of_runs(runs: Sequence[Levels]) -> tuple[Scenario, ...]:
