@@ -238,10 +238,10 @@ def difference(
     verdicts: list[dict[Path, Verdict]] = []
     for place, own in enumerate(found):
         other = references[1 - place]
-        readable = {each.run for each in sides[place]}
-        runs = [each for each in own if str(each.shown) in readable]
-        names = {Path(each.run): each.name for each in sides[place]}
-        beside = References({other.path: other}, {each.shown: other.path for each in runs}, names)
+        measured = {Path(each.run): each for each in sides[place]}
+        runs = [each for each in own if each.shown in measured]
+        of = {each.shown: other.path for each in runs}
+        beside = References({other.path: other}, of, measured)
         classified = classify_files(runs, library, unknown=unknown, reference=beside, jobs=jobs)
         verdicts.append({each.path: each for each in classified})
         failed += [
@@ -335,7 +335,7 @@ def _row(
     """Compare a scenario."""
     own = [each for each in reference.scenarios if each.name == name] or list(reference.scenarios)
     found = [compare(replace(each, name=name), own) for each in after]
-    back = [compare(replace(each, name=name), of_runs(tuple(after))) for each in before]
+    back = [compare(replace(each, name=name), of_runs(tuple(after))).worst for each in before]
     margin = max([least, *(each.margins[Kind.REPETITIONS].db for each in found if each.scenarios)])
     scores = [each.worst for each in found if each.scenarios and np.isfinite(each.worst)]
     changes = _changes(found)
@@ -363,7 +363,7 @@ def _row(
 
 def _outcome(
     found: Sequence[Comparison],
-    back: Sequence[Comparison],
+    back: Sequence[float],
     scores: Sequence[float],
     margin: float,
     changes: Sequence[Change],
@@ -383,7 +383,7 @@ def _outcome(
         return Outcome.WORSE, told
     if max(scores) > margin + RARE:
         return Outcome.WORSE, f"{max(scores):+.1f} dB in one of {len(scores)} runs, {told}"
-    returned = [each.worst for each in back if np.isfinite(each.worst)]
+    returned = [score for score in back if np.isfinite(score)]
     if returned and median(returned) > margin:
         return Outcome.BETTER, f"{-median(returned):+.1f} dB, the runs before were louder"
     return Outcome.SAME, told

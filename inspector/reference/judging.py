@@ -40,6 +40,8 @@ OTHERS_FLOOR = 0.3
 """`FLOOR_SHARE` beside other motions, whose contacts are at other speeds."""
 APART = 1.0
 """Time from which moments of one motion stand for moments of another, in [s]."""
+ROWS = 256
+"""Frames that are compared at once."""
 POOL = 12_000
 """Most frames of other motions that are looked at."""
 ASSUMED_DB = 6.0
@@ -330,7 +332,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     known = [each for each in scenarios if _robot_fits(run, each)]
     joints, octaves, remarks = _common(run, known, scenarios)
     frames = len(run.guide)
-    over = np.full((frames, len(joints), len(SIGNALS), len(octaves)), np.nan, dtype=np.float32)
+    over = _unknown(frames, joints, octaves)
     kind = np.full(frames, KINDS.index(Kind.GENERAL), dtype=np.int8)
     score = np.full(frames, np.nan)
     margins: dict[Kind, Margin] = {}
@@ -339,21 +341,21 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     if frames and joints and octaves:
         matched, told = _matching(run, known, joints)
         remarks += told
-        mine = _view(run, joints, octaves)
         references = [each for scenario in matched for each in scenario.repetitions]
         count = len(references)
         if references:
-            found, covered, aligned = _over_repetitions(run, mine, references, joints, octaves)
-            over[covered], kind[covered] = found[covered], KINDS.index(Kind.REPETITIONS)
+            aligned = align(*_guides(run, references, joints))
+            quieter = _quieter(run, references, aligned, joints, octaves)
+            band = _band(references, aligned, joints, octaves)
+            over, covered = _over_repetitions(run, references, aligned, joints, octaves)
+            kind[covered] = KINDS.index(Kind.REPETITIONS)
             scores = [score for scenario in known for score in scenario.scores]
             margins[Kind.REPETITIONS] = margin_of(scores, count)
             slope = float(np.nanmedian([each.slope for each in aligned]))
-            quieter = _quieter(mine, references, aligned, joints, octaves)
-            band = _band(references, aligned, joints, octaves)
         left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
         others = [each for s in known if s not in matched for each in s.repetitions]
         if len(left) and (others or references):
-            found = _over_others(run, mine, left, others or references, joints, octaves)
+            found = _over_others(run, left, others or references, joints, octaves)
             covered = np.isfinite(_largest(found.reshape(len(left), -1)))
             over[left[covered]] = found[covered]
             kind[left[covered]] = KINDS.index(Kind.OTHER_MOTIONS)
@@ -387,9 +389,8 @@ def leave_one_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
         if shared:
             joints = tuple(j for j in run.joints if all(j in each.joints for each in shared))
             octaves = tuple(o for o in run.octaves if all(o in each.octaves for each in shared))
-            mine = _view(run, joints, octaves)
-            over, covered, _ = _over_repetitions(run, mine, shared, joints, octaves)
-            over[~covered] = np.nan
+            aligned = align(*_guides(run, shared, joints))
+            over, _ = _over_repetitions(run, shared, aligned, joints, octaves)
             found.append(_top(scores_of(over)))
     return tuple(found)
 
@@ -401,20 +402,23 @@ def leave_one_moment_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
         joints = tuple(j for j in run.joints if all(j in each.joints for each in repetitions))
         octaves = tuple(o for o in run.octaves if all(o in each.octaves for each in repetitions))
         if joints and octaves and len(run.guide):
-            mine, rows = _view(run, joints, octaves), np.arange(len(run.guide))
-            over = _over_others(run, mine, rows, repetitions, joints, octaves, apart=APART)
+            rows = np.arange(len(run.guide))
+            over = _over_others(run, rows, repetitions, joints, octaves, apart=APART)
             found.append(_top(scores_of(over)))
     return tuple(score for score in found if np.isfinite(score))
 
 
 def scores_of(over: NDArray[np.float32]) -> Array:
     """Score of each frame, shape (frames,), in [dB]; NaN without reference."""
-    flat = over.reshape(len(over), -1)
+    flat, own = over.reshape(len(over), -1), np.full(len(over), np.nan)
     if not flat.size:
-        return np.full(len(over), np.nan)
-    known = np.where(np.isnan(flat), -np.inf, flat)
-    top = -np.partition(-known, min(CELLS, known.shape[1]) - 1, axis=1)[:, :CELLS]
-    own = np.where(np.isfinite(top).all(axis=1), top.mean(axis=1), np.nan)
+        return own
+    for first in range(0, len(flat), ROWS):
+        known = flat[first : first + ROWS]
+        known = np.where(np.isnan(known), -np.inf, known)
+        top = -np.partition(-known, min(CELLS, known.shape[1]) - 1, axis=1)[:, :CELLS]
+        finite = np.isfinite(top).all(axis=1)
+        own[first : first + ROWS] = np.where(finite, top.mean(axis=1), np.nan)
     around = np.fmax(np.append(np.nan, own[:-1]), np.append(own[1:], np.nan))
     return np.asarray(np.where(np.isnan(own), np.nan, np.fmin(own, around)))
 
@@ -548,32 +552,38 @@ def _spread(level: NDArray[np.float32]) -> NDArray[np.float32]:
     return loud
 
 
+def _unknown(
+    frames: int, joints: Sequence[str], octaves: Sequence[tuple[float, float]]
+) -> NDArray[np.float32]:
+    """Cells of which nothing is known yet."""
+    return np.full((frames, len(joints), len(SIGNALS), len(octaves)), np.nan, dtype=np.float32)
+
+
 def _over_repetitions(
     run: Levels,
-    mine: NDArray[np.float32],
     references: Sequence[Levels],
+    aligned: Sequence[Aligned],
     joints: Sequence[str],
     octaves: Sequence[tuple[float, float]],
-) -> tuple[NDArray[np.float32], NDArray[np.bool_], list[Aligned]]:
-    """Exceedance over the loudest repetition, frames that one covers, and the alignments."""
-    own, guides = _guides(run, references, joints)
-    aligned = align(own, guides)
-    views = [_view(each, joints, octaves) for each in references]
-    floor = floor_of(views)
-    loudest = np.full(mine.shape, np.nan, dtype=np.float32)
-    covered = np.zeros(len(mine), dtype=bool)
-    for view, path in zip(views, aligned, strict=True):
-        same = path.residual <= RESIDUAL
-        loud = _spread(view)[path.frame]
-        loud[~same] = np.nan
-        loudest = np.fmax(loudest, loud)
-        covered |= same
-    return _raised(mine, floor) - _raised(loudest, floor), covered, aligned
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Exceedance over the loudest repetition, NaN without one, and frames that one covers."""
+    over = _unknown(len(run.guide), joints, octaves)
+    covered = np.any([path.residual <= RESIDUAL for path in aligned], axis=0)
+    # Joint by joint: of long runs, all levels at once take several times the memory.
+    for place, joint in enumerate(joints):
+        views = [_view(each, [joint], octaves) for each in references]
+        floor, loudest = floor_of(views), _unknown(len(over), [joint], octaves)
+        for view, path in zip(views, aligned, strict=True):
+            loud = _spread(view)[path.frame]
+            loud[path.residual > RESIDUAL] = np.nan
+            loudest = np.fmax(loudest, loud)
+        own = _raised(_view(run, [joint], octaves), floor) - _raised(loudest, floor)
+        over[covered, place] = own[covered, 0]
+    return over, covered
 
 
 def _over_others(
     run: Levels,
-    mine: NDArray[np.float32],
     rows: NDArray[np.int64],
     references: Sequence[Levels],
     joints: Sequence[str],
@@ -586,54 +596,62 @@ def _over_others(
     are known.
     """
     shared = [j for j in joints if all(j in each.joints for each in references)]
-    found = np.full((len(rows), *mine.shape[1:]), np.nan, dtype=np.float32)
+    found = _unknown(len(rows), joints, octaves)
     if not shared:
         return found
     speed = np.concatenate(
         [each.speed[:, [each.joints.index(j) for j in shared]] for each in references]
     )
-    views = [_view(each, joints, octaves) for each in references]
-    floor = floor_of(views, OTHERS_FLOOR)
-    level = np.concatenate([_spread(view) for view in views])
     time = np.concatenate([each.time - each.start for each in references])
     thin = -(-len(speed) // POOL)
-    speed, level, time = speed[::thin], level[::thin], time[::thin]
+    speed, time = speed[::thin], time[::thin]
     scale = speed.std(axis=0) + 0.05
     wanted = run.speed[rows][:, [run.joints.index(j) for j in shared]] / scale
     speed = speed / scale
-    for first in range(0, len(rows), 256):
-        part = wanted[first : first + 256]
+    near = np.empty((len(rows), min(NEAREST, len(speed))), dtype=np.int32)
+    close = np.empty(near.shape, dtype=bool)
+    for first in range(0, len(rows), ROWS):
+        own = slice(first, first + ROWS)
+        part = wanted[own]
         square = (part**2).mean(1)[:, None] + (speed**2).mean(1) - 2 * part @ speed.T / len(scale)
         if apart:
-            when = run.time[rows[first : first + 256]] - run.start
+            when = run.time[rows[own]] - run.start
             square[np.abs(when[:, None] - time) < apart] = np.inf
-        near = np.argpartition(square, min(NEAREST, square.shape[1]) - 1, axis=1)[:, :NEAREST]
-        close = np.take_along_axis(square, near, axis=1) <= NEAR**2
-        loud = np.where(close[:, :, None, None, None], level[near], np.float32(np.nan))
-        loudest = np.where(np.isnan(loud), -np.inf, loud).max(axis=1)
-        loudest = np.where(np.isfinite(loudest), loudest, np.nan).astype(np.float32)
-        own = mine[rows[first : first + 256]]
-        found[first : first + 256] = _raised(own, floor) - _raised(loudest, floor)
+        near[own] = np.argpartition(square, near.shape[1] - 1, axis=1)[:, :NEAREST]
+        close[own] = np.take_along_axis(square, near[own], axis=1) <= NEAR**2
+    for place, joint in enumerate(joints):
+        views = [_view(each, [joint], octaves) for each in references]
+        floor, mine = floor_of(views, OTHERS_FLOOR), _view(run, [joint], octaves)
+        level = np.concatenate([_spread(view) for view in views])[::thin, 0]
+        level[np.isnan(level)] = -np.inf
+        for first in range(0, len(rows), ROWS):
+            own = slice(first, first + ROWS)
+            known = close[own, :, None, None]
+            loudest = np.where(known, level[near[own]], np.float32(-np.inf)).max(axis=1)
+            loudest[~np.isfinite(loudest)] = np.nan
+            raised = _raised(mine[rows[own]], floor) - _raised(loudest[:, None], floor)
+            found[own, place] = raised[:, 0]
     tracked = np.isfinite(found[:, :, 1]).any(axis=(0, 2))
     found[:, tracked, 0] = np.nan
     return found
 
 
 def _quieter(
-    mine: NDArray[np.float32],
+    run: Levels,
     references: Sequence[Levels],
     aligned: Sequence[Aligned],
     joints: Sequence[str],
     octaves: Sequence[tuple[float, float]],
 ) -> float:
     """By how much the run is quieter than each repetition in its loudest joint, in [dB]."""
-    views = [_view(each, joints, octaves) for each in references]
-    floor = floor_of(views)
-    louder = _spread(mine)
     margins = []
-    for view, path in zip(views, aligned, strict=True):
-        over = _raised(view[path.frame], floor) - _raised(louder, floor)
-        over[path.residual > RESIDUAL] = np.nan
+    for repetition, path in zip(references, aligned, strict=True):
+        over, same = _unknown(len(run.guide), joints, octaves), path.residual <= RESIDUAL
+        for place, joint in enumerate(joints):
+            floor = floor_of([_view(each, [joint], octaves) for each in references])
+            view = _view(repetition, [joint], octaves)[path.frame]
+            louder = _spread(_view(run, [joint], octaves))
+            over[same, place] = (_raised(view, floor) - _raised(louder, floor))[same, 0]
         margins.append(_top(scores_of(over)))
     known = [each for each in margins if np.isfinite(each)]
     return max(0.0, min(known)) if known else 0.0

@@ -106,8 +106,8 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
     frames = max(0, int(count - (sizes[-1] < 0.9 * run.rate * HOP)) - BINS + 1)
     energy = _energies(run, bands, of_sample, count)
     samples = np.maximum(_framed(sizes.astype(float), frames), 1.0)[:, None, None]
-    level = np.empty((frames, *energy.shape[1:]), np.float32)
-    for place in range(len(bands)):  # one by one: all at once take several times the memory
+    level = energy[:frames]
+    for place in range(len(bands)):  # one by one, in place: all at once take several times as much
         power = _framed(energy[..., place].astype(np.float64), frames) / samples
         level[..., place] = np.maximum(10 * np.log10(np.maximum(power, 1e-30)), LEAST_DB)
     lost = np.add.reduceat((~run.mask).astype(np.int64), firsts) > 0

@@ -43,12 +43,12 @@ class References:
     Attributes:
         loaded: References by their path.
         of: Path of the reference of each run that has one.
-        names: Scenario of each run, where it is known.
+        measured: Levels of the runs that are measured already.
     """
 
     loaded: Mapping[Path, Reference] = field(default_factory=dict)
     of: Mapping[Path, Path] = field(default_factory=dict)
-    names: Mapping[Path, str] = field(default_factory=dict)
+    measured: Mapping[Path, Levels] = field(default_factory=dict)
 
     @classmethod
     def found(
@@ -67,10 +67,12 @@ class References:
         if path is None or analysis.audit is None:
             return verdict, None
         reference = self.loaded[path]
-        name = self.names.get(verdict.path, "") or scenario_of(analysis.run, verdict.path)
-        if not self.names and reference.named(name) is None:
-            name = scenario_of(analysis.run, verdict.path, _root(verdict.path, path))
-        run = levels(analysis.run, name=name, file=str(verdict.path))
+        run = self.measured.get(verdict.path)
+        if run is None:
+            name = scenario_of(analysis.run, verdict.path)
+            if reference.named(name) is None:
+                name = scenario_of(analysis.run, verdict.path, _root(verdict.path, path))
+            run = levels(analysis.run, name=name, file=str(verdict.path))
         comparison = compare(run, reference.scenarios)
         return beside(verdict, comparison, reference, analysis.labels), comparison
 
