@@ -20,8 +20,7 @@ from typing import Any
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import noisemodel as nm
-from inspector.localisation.links import fault_links
-from inspector.localisation.localise import Localisation, localise
+from inspector.localisation.localise import Localisation, fault_links, localise
 from noiseclassifier.scenarios import ROBOTS, ScenarioError, SimulationError, simulate
 from noiseclassifier.scenarios.robots import limbs
 from noisemodel.extended import LinkNoise, link_noise

@@ -45,8 +45,8 @@ from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
-    from inspector.localisation.localise import Localisation
     from inspector.localisation.order import Order
+    from inspector.localisation.stage import Localisation
     from noisemodel.extended import LinkNoise
 
 

@@ -39,8 +39,8 @@ from noisemodel.files import also_reading
 from noisemodel.parallel import DIED, Jobs, as_done, in_order
 
 if TYPE_CHECKING:
-    from inspector.localisation.localise import Localisation
     from inspector.localisation.order import Order
+    from inspector.localisation.stage import Localisation
 
 EXPECTED = (InspectorError, nc.ModelsError, nm.NoiseModelError)
 """The errors that are printed in one line; all others are bugs."""

@@ -6,7 +6,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from inspector.localisation.localise import Localisation
+from inspector.localisation.stage import Localisation
 from inspector.report.cases import ANNOTATIONS, COMMENT, MARKER
 from inspector.report.formats import (
     FORMATS,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inspector.analysis import analyse
-from inspector.orders import orders
+from inspector.spectrogram import orders
 from noisemodel import Run
 
 RATE = 1000.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inspector.localisation.links import fault_links
+from inspector.localisation.localise import fault_links
 from inspector.localisation.stage import Localisation
 from noiseclassifier import Event
 from noisemodel import Robot, Run

@@ -6,9 +6,8 @@ import pytest
 from inspector.analysis import analyse_file
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
-from inspector.localisation.band import band
-from inspector.localisation.localise import Localisation, localise
-from inspector.localisation.quiet import quiet_stretches
+from inspector.localisation.localise import Localisation, band, localise
+from inspector.localisation.stage import quiet_stretches
 from inspector.report.html import found as tables
 from inspector.report.localisation import words
 from inspector.report.markdown import report, sentence

@@ -1,9 +1,15 @@
 import numpy as np
 import pytest
 
-from inspector.localisation.flow import flow
-from inspector.localisation.innovation import changes, quiet_statistics
-from inspector.localisation.stage import Localisation, first_stage, onset, rise
+from inspector.localisation.stage import (
+    Localisation,
+    changes,
+    first_stage,
+    flow,
+    onset,
+    quiet_statistics,
+    rise,
+)
 from noiseclassifier import Event
 from noisemodel import Block, Run
 

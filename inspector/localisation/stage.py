@@ -1,7 +1,7 @@
 """First stage of the control flow in which a failure shows, from the run alone.
 
 There is no run without the failure to compare with. The innovation of each stage shows where the
-failure enters, see `inspector.localisation.innovation`. Two kinds of failures are distinguished:
+failure enters. Two kinds of failures are distinguished:
 
 - A *blow or jump* passes one stage after the other, so these are ordered by onset. It is looked
   for where the innovation of a stage, relative to its peak in quiet stretches, first rises
@@ -18,17 +18,239 @@ failure enters, see `inspector.localisation.innovation`. Two kinds of failures a
 
 A failure lasts if its vibration is within 6 dB of its loudest 50 ms for 0.3 s in all, of the first
 second. A failure without an onset is treated as if it lasted.
+
+The *innovation* of a stage is its changes less their linear prediction. Sudden changes of
+velocities are used: over 1 ms, less the mean of such changes over the past 20 ms. Both filters are
+causal, so that nothing shows before it happens. The change of each joint at a stage is predicted
+from the changes at the stage before, now and up to 12 ms ago, by least squares over quiet stretches
+of the same run; the prediction residual is the innovation. The first stage has no prediction.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from inspector.localisation.flow import Flow, flow
-from inspector.localisation.innovation import WARM, Innovation, QuietStatistics
 from noiseclassifier import Event
 from noisemodel import Block, Run
-from noisemodel.types import Array
+from noisemodel.types import Array, Indices, Mask
+
+MOST = 16
+"""Most stretches that are picked; a long run is not read whole."""
+
+
+def quiet_stretches(
+    run: Run, failures: Sequence[Event | Block], *, length: float, most: int = MOST
+) -> list[slice]:
+    """Pick stretches without failures or gaps, spread evenly over a run.
+
+    Args:
+        length: Length of a stretch, in [s].
+    """
+    size = max(1, round(length * run.rate))
+    free = run.mask.copy()
+    for failure in failures:
+        first, last = np.searchsorted(run.time, (failure.start, failure.stop))
+        free[first:last] = False
+    count = len(free) // size
+    starts = size * np.flatnonzero(free[: count * size].reshape(count, size).all(axis=1))
+    if len(starts) > most:
+        starts = starts[np.linspace(0, len(starts) - 1, most).astype(int)]
+    return [slice(start, start + size) for start in starts.tolist()]
+
+
+DESIRED, MEASURED = "desired", "measured"
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """The velocities of a stretch of a run at each stage of the control flow.
+
+    Attributes:
+        names: Of the stages: those that the run names, in its order, then desired and measured.
+        joints: Their names.
+        velocity: Shape (stages, samples, joints), in [rad/s] or [m/s].
+        time: Shape (samples,), in [s].
+        valid: False in gaps, shape (samples,).
+        rate: Samples per second, in [Hz].
+    """
+
+    names: tuple[str, ...]
+    joints: tuple[str, ...]
+    velocity: Array
+    time: Array
+    valid: Mask
+    rate: float
+
+    def samples(self, seconds: float) -> int:
+        """Number of samples in a time, at least one."""
+        return max(1, round(seconds * self.rate))
+
+
+def flow(run: Run, part: slice) -> Flow:
+    """Gather the stages of a run, for the joints that all of them have."""
+    own = list(range(len(run.joint_names)))
+    stages = [(name, signal, own) for name, signal in run.stages.items()]
+    joints = own
+    if run.velocity_desired is not None:
+        places = {name: index for index, name in enumerate(run.desired_joint_names)}
+        joints = [index for index in own if run.joint_names[index] in places]
+        wanted = [places[run.joint_names[index]] for index in joints]
+        stages.append((DESIRED, run.velocity_desired, wanted))
+    stages.append((MEASURED, run.velocity, own))
+    return Flow(
+        names=tuple(name for name, _, _ in stages),
+        joints=tuple(run.joint_names[index] for index in joints),
+        velocity=np.array(
+            [
+                signal[part][:, columns if name == DESIRED else joints]
+                for name, signal, columns in stages
+            ],
+            dtype=np.float64,
+        ),
+        time=run.time[part],
+        valid=run.mask[part],
+        rate=run.rate,
+    )
+
+
+SPAN = 0.001
+"""Time over which a velocity's change is taken, in [s]."""
+TRAIL = 0.02
+"""Time of the mean that is subtracted from changes, in [s]."""
+LAGS = (0.0, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.006, 0.008, 0.012)
+"""Lags of the prediction, in [s]."""
+LENGTH = 0.1
+"""Length of a quiet stretch, in [s]."""
+WARM = TRAIL + LAGS[-1] + SPAN
+"""Transient of filters and prediction, in [s]."""
+PARTS = 16
+"""Most quiet stretches that the prediction is fitted to."""
+ROWS = 3000
+"""Most samples of the least squares."""
+RIDGE = 1e-3
+"""Regularisation of the least squares, as a share of the mean power."""
+
+
+@dataclass(frozen=True, eq=False)
+class Innovation:
+    """Innovation of a stretch of a run.
+
+    Attributes:
+        change: Sudden changes, shape (stages, samples, joints), in [rad/s²].
+        residual: Their prediction residual, of the same shape.
+        total: Norm of the changes over the joints, shape (stages, samples), in [rad/s²].
+        level: Norm of the residual, but no more than ``total``, shape (stages, samples), in
+            [rad/s²]: a change that was predicted and does not occur is no innovation.
+    """
+
+    change: Array
+    residual: Array
+    total: Array
+    level: Array
+
+
+@dataclass(frozen=True, eq=False)
+class QuietStatistics:
+    """Prediction and innovation of a run's stages in its quiet stretches.
+
+    Attributes:
+        weights: Of the linear prediction of each stage but the first, shape
+            (stages - 1, joints, lags).
+        power: 90th percentile over the stretches of the innovation's mean square, shape
+            (stages,), in [rad²/s⁴].
+        peak: 90th percentile of its peak, shape (stages,), in [rad/s²].
+    """
+
+    weights: Array
+    power: Array
+    peak: Array
+
+    def innovation(self, stages: Flow) -> Innovation:
+        """Compute the innovation of a stretch of the run."""
+        change = changes(stages)
+        lags = _lags(stages.rate)
+        residual = change.copy()
+        for place, weights in enumerate(self.weights):
+            for column, lag in enumerate(lags.tolist()):
+                past = change[place, : change.shape[1] - lag]
+                residual[place + 1, lag:] -= weights[:, column] * past
+        residual[:, ~stages.valid] = 0.0
+        total, rest = np.linalg.norm(change, axis=2), np.linalg.norm(residual, axis=2)
+        return Innovation(change, residual, total, np.minimum(total, rest))
+
+
+def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatistics:
+    """Fit the prediction to the quiet stretches of a run, and measure its residual there."""
+    parts = quiet_stretches(run, failures, length=LENGTH + WARM, most=PARTS)
+    stretches = [flow(run, part) for part in parts]
+    first = stretches[0] if stretches else flow(run, slice(0, 1))
+    stages, _, joints = first.velocity.shape
+    lags = _lags(run.rate)
+    zeros = np.zeros(stages)
+    if not stretches:
+        return QuietStatistics(np.zeros((stages - 1, joints, len(lags))), zeros, zeros)
+    warm = min(first.samples(WARM), first.velocity.shape[1] - 1)
+    change = [changes(each) for each in stretches]
+    size = change[0].shape[1]
+    rows = np.arange(warm, size, max(1, (size - warm) * len(change) // ROWS))
+    target = np.concatenate([each[:, rows] for each in change], axis=1)
+    past = np.concatenate([each[:-1, rows[:, None] - lags] for each in change], axis=1)
+    past = past.transpose(0, 3, 1, 2)  # stages, joints, samples, lags
+    square = past.transpose(0, 1, 3, 2) @ past
+    mean = np.trace(square, axis1=2, axis2=3)[..., None, None] / len(lags)
+    square = square + (RIDGE * mean + np.finfo(float).tiny) * np.eye(len(lags))
+    right = np.einsum("kjsl,ksj->kjl", past, target[1:])
+    weights = np.linalg.solve(square, right[..., None])[..., 0]
+    fitted = QuietStatistics(weights, zeros, zeros)
+    # stretches, stages, samples
+    level = np.array([fitted.innovation(each).level[:, warm:] for each in stretches])
+    return QuietStatistics(
+        weights,
+        power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
+        peak=np.percentile(level.max(axis=2), 90.0, axis=0),
+    )
+
+
+def changes(stages: Flow) -> Array:
+    """Sudden changes at each stage.
+
+    Returns:
+        Shape (stages, samples, joints), in [rad/s²]; 0 next to gaps.
+    """
+    return sudden(stages.velocity, stages.valid, stages.rate)
+
+
+def sudden(velocity: Array, valid: Mask, rate: float) -> Array:
+    """Change over 1 ms, less the mean of such changes over the past 20 ms.
+
+    Args:
+        velocity: Shape (..., samples, joints), in [rad/s].
+        valid: False in gaps, shape (samples,).
+        rate: Samples per second, in [Hz].
+
+    Returns:
+        Of the same shape, in [rad/s²]; 0 next to gaps.
+    """
+    step = max(1, round(SPAN * rate))
+    trail = max(1, round(TRAIL * rate), 2 * step)
+    change = np.zeros_like(velocity)
+    together = valid[step:] & valid[:-step]
+    change[..., step:, :] = (velocity[..., step:, :] - velocity[..., :-step, :]) * rate / step
+    change[..., step:, :][..., ~together, :] = 0.0
+    samples = change.shape[-2]
+    sums = np.zeros((*change.shape[:-2], samples + 1, change.shape[-1]))
+    np.cumsum(change, axis=-2, out=sums[..., 1:, :])
+    last = np.arange(1, samples + 1)
+    first = np.maximum(0, last - trail)
+    change -= (sums[..., last, :] - sums[..., first, :]) / (last - first)[:, None]
+    change[..., ~valid, :] = 0.0
+    return change
+
+
+def _lags(rate: float) -> Indices:
+    return np.unique(np.round(np.array(LAGS) * rate).astype(np.int64))
+
 
 EARLY = 0.015
 """How long before its start a failure may have set in, in [s]."""

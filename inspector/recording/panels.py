@@ -18,13 +18,12 @@ from rerun.urdf import UrdfTree
 from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps
 from inspector.levels import Scale
-from inspector.orders import orders
 from inspector.recording import axes, robot, unstable
 from inspector.recording.axes import Label, Panel, at
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
 from inspector.report.markdown import brief, classes_of, finding_of, spoken
-from inspector.spectrogram import RANGE_DB, WINDOW, Spectrogram, in_bands
+from inspector.spectrogram import RANGE_DB, WINDOW, Spectrogram, in_bands, orders
 from inspector.thinning import extremes
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run

@@ -1,6 +1,6 @@
 """Localisation of a failure in words, as reports print it."""
 
-from inspector.localisation.localise import Localisation
+from inspector.localisation.stage import Localisation
 
 LEAST = 0.05
 """Joints with a smaller share are left out."""

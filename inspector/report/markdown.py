@@ -1,8 +1,7 @@
 """The report of a recording, in Markdown."""
 
 from inspector.analysis import Analysis
-from inspector.localisation.links import fault_links
-from inspector.localisation.localise import has_stages
+from inspector.localisation.localise import fault_links, has_stages
 from inspector.report.localisation import words
 from inspector.text import counted
 from noiseclassifier import UNKNOWN, Event

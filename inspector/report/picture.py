@@ -10,10 +10,9 @@ import numpy as np
 from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, chosen, gaps, worst_joint, worst_signal
 from inspector.levels import Scale
-from inspector.orders import orders
 from inspector.reference.judging import Comparison
 from inspector.report.markdown import classes_of, spoken
-from inspector.spectrogram import Spectrogram, spectrogram
+from inspector.spectrogram import Spectrogram, orders, spectrogram
 from inspector.thinning import extremes
 from noisemodel.noise import decibel
 from noisemodel.types import Array
