@@ -11,7 +11,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -119,21 +119,6 @@ def _of_folder(path: Path) -> str:
 # Runs of logs
 
 
-@dataclass(frozen=True)
-class Job:
-    """A run of a log that is not read yet.
-
-    Attributes:
-        name: Its name.
-        episode: The episode that it is, empty for a log without episodes.
-        read: Reads it.
-    """
-
-    name: str
-    episode: str
-    read: Callable[[], Imported]
-
-
 def read_log(
     path: str | Path,
     *,
@@ -166,15 +151,20 @@ def read_log(
         >>> read_log("bag/", robot="panda").run.rate  # doctest: +SKIP
         1000.0
     """
-    chosen = read_options(mapping, **options)
-    jobs = jobs_of(Path(path), chosen, desired=Path(desired) if desired else None)
-    if episode is None and len(jobs) > 1:
+    path, chosen = Path(path), read_options(mapping, **options)
+    readers = readers_of(
+        path,
+        chosen,
+        desired=Path(desired) if desired else None,
+        episodes=None if episode is None else [episode],
+    )
+    if len(readers) > 1:
         raise LogError(
-            Path(path),
-            f"holds {len(jobs)} episodes ({listed([job.episode for job in jobs])}); choose one"
-            " (episode), or read all (read_logs)",
+            path,
+            f"holds {len(readers)} episodes ({listed([*readers])}); choose one (episode), or read"
+            " all (read_logs)",
         )
-    return _chosen(Path(path), jobs, None if episode is None else [episode])[0].read()
+    return next(iter(readers.values()))()
 
 
 def read_logs(
@@ -201,41 +191,45 @@ def read_logs(
         InspectorError: As ``read_log``.
         RobotError: As ``read_log``.
     """
-    jobs = jobs_of(
+    readers = readers_of(
         Path(path),
         options or ReadOptions(),
         desired=Path(desired) if desired else None,
         episodes=episodes,
         progress=progress,
     )
-    for job in jobs:
-        yield job.read()
+    for read in readers.values():
+        yield read()
 
 
-def jobs_of(
+def readers_of(
     path: Path,
     options: ReadOptions,
     *,
     desired: Path | None = None,
     episodes: Sequence[str] | None = None,
     progress: Progress = without_progress,
-) -> tuple[Job, ...]:
-    """Runs of a log, to be read one by one; arguments and errors are those of `read_logs`."""
+) -> dict[str, Callable[[], Imported]]:
+    """What reads each run of a log, by its episode; arguments and errors are those of `read_logs`.
+
+    The name of a log without episodes is empty.
+    """
     robot = Robot.load(options.robot) if options.robot else None
     opened = open_log(path, options)
-    opened_desired = open_log(desired, options) if desired else None
-    jobs = []
+    other = open_log(desired, options) if desired else None
     for episode in opened.episodes:
         if printable(episode) != episode:
             raise LogError(
                 path, f"an episode is called {printable(episode)}, which has control characters"
             )
-        name = f"{path.stem}-{episode}" if episode else path.stem
-        read = partial(
-            _run_of_episode, name, opened, opened_desired, episode, options, robot, progress
-        )
-        jobs.append(Job(name, episode, read))
-    return _chosen(path, tuple(jobs), episodes)
+    for episode in episodes or ():
+        if episode not in opened.episodes:
+            known = listed([each or "no episodes" for each in opened.episodes])
+            raise LogError(path, f"there is no episode {episode!r}; it has {known}")
+    return {
+        episode: partial(_read_episode, path, opened, other, episode, options, robot, progress)
+        for episode in episodes or opened.episodes
+    }
 
 
 def listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
@@ -244,17 +238,12 @@ def listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
     return (f"{path}: {opened.kind}", *(f"  {line}" for line in opened.listing()))
 
 
-def _chosen(path: Path, jobs: tuple[Job, ...], episodes: Sequence[str] | None) -> tuple[Job, ...]:
-    by_name = {job.episode: job for job in jobs}
-    for episode in episodes or ():
-        if episode not in by_name:
-            known = listed([each or "no episodes" for each in by_name])
-            raise LogError(path, f"there is no episode {episode!r}; it has {known}")
-    return tuple(by_name[episode] for episode in episodes) if episodes else jobs
+def _name(path: Path, episode: str) -> str:
+    return f"{path.stem}-{episode}" if episode else path.stem
 
 
-def _run_of_episode(
-    name: str,
+def _read_episode(
+    path: Path,
     opened: LogReader,
     desired: LogReader | None,
     episode: str,
@@ -262,6 +251,7 @@ def _run_of_episode(
     robot: Robot | None,
     progress: Progress,
 ) -> Imported:
+    name = _name(path, episode)
     if opened.run and not desired:
         run = opened.run()
         if not options.robot:
@@ -386,14 +376,14 @@ def open_source(
         raise LogError(source.shown, "its name has control characters; rename it")
     run = _run_file(source.path, reading)
     if run is None:
-        (job,) = jobs_of(
+        (read,) = readers_of(
             source.path,
             reading.options,
             desired=reading.desired,
             episodes=[source.episode] if source.episode else None,
             progress=progress,
-        )
-        imported = job.read()
+        ).values()
+        imported = read()
         return Opened(imported.run, assumed(imported, source.path), source)
     robot = reading.options.robot
     if robot:
@@ -508,8 +498,8 @@ def _episodes(path: Path, reading: Reading) -> Iterator[Source]:
     """The runs of a log; the log itself if they cannot be listed, or it is a run file."""
     if _is_folder(path) or not _is_npz(path):
         try:
-            jobs = jobs_of(path, reading.options, episodes=reading.episodes or None)
-            yield from (Source(path, job.episode) for job in jobs)
+            found = readers_of(path, reading.options, episodes=reading.episodes or None)
+            yield from (Source(path, episode) for episode in found)
         except (InspectorError, NoiseModelError):
             yield from (Source(path, each) for each in reading.episodes or ("",))
         return
@@ -595,39 +585,33 @@ def import_logs(
     several = len(logs) > 1
     if desired and several:
         raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
-    jobs: list[tuple[Path, Job]] = []
+    jobs: list[tuple[Path, str, Callable[[], Imported]]] = []
     failed: list[Written] = []
     for log in logs:
         inner = without_progress if several else progress  # there is one bar at a time
         try:
-            found = jobs_of(
+            found = readers_of(
                 log, options, desired=desired, episodes=episodes or None, progress=inner
             )
-            jobs += ((log, job) for job in found)
+            jobs += ((log, _name(log, episode), read) for episode, read in found.items())
         except (InspectorError, NoiseModelError) as error:
             if not several:
                 raise
             failed.append(Written(log, problem=str(error)))
-    digests: dict[Path, str] = {}
-
-    def digest(log: Path) -> str:
-        if log not in digests:
-            digests[log] = _digest(options, log, desired)
-        return digests[log]
-
-    targets = _targets(jobs, output, several=several)
-    for (log, _), target in zip(jobs, targets, strict=True):
+    digest = cache(lambda log: _digest(options, log, desired))
+    targets = _targets([name for _, name, _ in jobs], output, several=several)
+    for (log, _, _), target in zip(jobs, targets, strict=True):
         if not (target.exists() and targets != (output,) and _digest_in(target) == digest(log)):
             refuse_existing(target, overwrite=overwrite)
     there = {target for target in targets if target.exists() and not overwrite}
     yield from failed
-    for (log, job), target in progress(zip(jobs, targets, strict=True), len(jobs)):
+    for (log, _, read), target in progress(zip(jobs, targets, strict=True), len(jobs)):
         if target in there:
             yield Written(target, kept=True)
             continue
         try:
             made_of = digest(log) if targets != (output,) else ""
-            yield _written(job.read(), target, made_of, overwrite=overwrite)
+            yield _written(read(), target, made_of, overwrite=overwrite)
         except (InspectorError, NoiseModelError) as error:
             if len(targets) == 1 and not several:
                 raise
@@ -647,16 +631,16 @@ def _digest(options: ReadOptions, *logs: Path | None) -> str:
     return found.hexdigest()
 
 
-def _targets(jobs: Sequence[tuple[Path, Job]], output: Path, *, several: bool) -> tuple[Path, ...]:
+def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path, ...]:
     """Paths of the run files, checked before the logs are read."""
-    if len(jobs) == 1 and not several and not _is_folder(output):
+    if len(names) == 1 and not several and not _is_folder(output):
         return (output,)
     if output.suffix == ".npz" or output.is_file():
         raise InspectorError(
-            f"{output}: {len(jobs)} runs do not fit into one file; name a folder, or choose one"
+            f"{output}: {len(names)} runs do not fit into one file; name a folder, or choose one"
             " (--episode)"
         )
-    targets = tuple(output / f"{job.name}.npz" for _, job in jobs)
+    targets = tuple(output / f"{name}.npz" for name in names)
     duplicates = [path for place, path in enumerate(targets) if path in targets[:place]]
     if duplicates:
         raise InspectorError(
