@@ -7,7 +7,6 @@ from samplelogs import JOINTS, TIMES, Talk, joint_states, motion, numbers, write
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.clocks import ClockError
 
 
 def csv(path, time, velocity, suffix=""):
@@ -72,9 +71,8 @@ def test_a_periodic_motion_gives_no_offset(tmp_path):
         r" the offset cannot be estimated \(offset .*\); specify --offset SECONDS, which is added"
         r" to the desired stamps"
     )
-    with pytest.raises(ClockError, match=message) as caught:
+    with pytest.raises(LogError, match=message):
         read_log(measured, desired=desired)
-    assert not caught.value.offset.is_unambiguous
     imported = read_log(measured, desired=desired, offset=-1e6)
     assert np.allclose(imported.run.velocity_desired, imported.run.velocity, atol=1e-3)
     assert "desired.csv: offset -1e+06 s, as given" in imported.remarks
@@ -86,7 +84,7 @@ def test_unrelated_motions_give_no_offset(tmp_path):
     for shift in (0.005, 1e6):
         desired = csv(tmp_path / "desired.csv", time + shift, motion(time, seed=9)[1])
         if shift > 1:
-            with pytest.raises(ClockError, match="the offset cannot be estimated"):
+            with pytest.raises(LogError, match="the offset cannot be estimated"):
                 read_log(measured, desired=desired)
         else:
             remarks = read_log(measured, desired=desired).remarks
@@ -97,7 +95,7 @@ def test_standstill_gives_no_offset(tmp_path):
     time = np.arange(1000) / 100
     measured = csv(tmp_path / "measured.csv", time, np.zeros((1000, 3)))
     desired = csv(tmp_path / "desired.csv", time + 100, np.zeros((1000, 3)))
-    with pytest.raises(ClockError, match="no joint moves in both; specify --offset"):
+    with pytest.raises(LogError, match="no joint moves in both; specify --offset"):
         read_log(measured, desired=desired)
 
 

@@ -5,7 +5,7 @@ velocities of the same joints, which gives the offset; residual offsets of short
 drift. An offset below ``LAG`` is attributed to the controller, not to the clocks.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import pairwise
@@ -20,7 +20,7 @@ from inspector.errors import LogError
 from inspector.logs.log import SAMPLES, UNIFORM, Clock, Stamps, Track
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import TIME_UNITS, without_unit
-from noisemodel.run import resample
+from noisemodel.run import continuous_quaternions, resample
 from noisemodel.types import Array, Indices, Mask, Real
 
 UNITS = {"seconds": "1", "milliseconds": "1e-3", "microseconds": "1e-6", "nanoseconds": "1e-9"}
@@ -280,8 +280,11 @@ def common_time(tracks: Sequence[Track], main: Track) -> tuple[Array, Mask]:
     for stamps in {id(track.stamps): track.stamps for track in tracks}.values():
         if _places(time, stamps, slack) is None:
             reached = np.zeros(len(time), dtype=bool)
-            for part, _ in _parts(time, stamps, slack):
-                reached[part] = True
+            for stretch in stamps.clock.stretches:
+                inside = stamps.time[stretch]
+                if len(inside) > 1:
+                    edges = np.searchsorted(time, [inside[0] - slack, inside[-1] + slack])
+                    reached[edges[0] : edges[1]] = True
             valid &= reached
     for track in tracks:
         if track.missing is not None:
@@ -293,7 +296,8 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
     """Values of a track at the instants of a time base.
 
     Samples at an instant are taken as they are. Others, and all of a track whose samples are not
-    uniform, are interpolated monotonically (PCHIP), without overshoot.
+    uniform, are interpolated monotonically (PCHIP), without overshoot; quaternions take the shorter
+    way and have norm 1.
 
     Returns:
         Values, 0 in gaps, shape (instants, columns).
@@ -305,7 +309,10 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
         return np.where(valid[:, None], track.values[places], 0.0)
     if track.signal == "base_pose":
         pose = np.asarray(track.values, dtype=np.float64)
-        found = interpolated(pose, lambda values: _pchip(instants, track.stamps, values, slack))
+        pose = np.hstack((pose[:, :3], continuous_quaternions(pose[:, 3:])))
+        found = _pchip(instants, track.stamps, pose, slack)
+        length = np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
+        found[:, 3:] /= np.where(length > 0, length, 1.0)
     else:
         found = np.empty((len(instants), track.values.shape[1]))
         block = max(1, BLOCK // len(track.stamps.time))
@@ -318,21 +325,6 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
             found[:, part] = _pchip(instants, track.stamps, values, slack)
     found[~valid] = 0.0
     return found
-
-
-def interpolated(pose: Array, interpolate: Callable[[Array], Array]) -> Array:
-    """Interpolated poses, whose quaternions take the shorter way and have norm 1.
-
-    Returns:
-        Poses at the instants that ``interpolate`` gives, shape (instants, 7).
-    """
-    quaternion = pose[:, 3:]
-    # q and -q are one rotation: take the sign nearer to the previous sample.
-    flips = np.einsum("si,si->s", quaternion[1:], quaternion[:-1]) < 0
-    signs = np.concatenate(([1.0], np.cumprod(np.where(flips, -1.0, 1.0))))
-    found = interpolate(np.hstack((pose[:, :3], quaternion * signs[:, None])))
-    length: Array = np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
-    return np.hstack((found[:, :3], found[:, 3:] / np.where(length > 0, length, 1.0)))
 
 
 def _places(instants: Array, stamps: Stamps, slack: float) -> Indices | None:
@@ -353,15 +345,6 @@ def _beside(instants: Array, stamps: Stamps, missing: Mask, slack: float) -> Mas
 def _pchip(instants: Array, stamps: Stamps, values: Real, slack: float) -> Array:
     between = stamps.clock.stretches
     return resample(stamps.time, values, instants, between=between, slack=slack)[0]
-
-
-def _parts(instants: Array, stamps: Stamps, slack: float) -> Iterator[tuple[slice, slice]]:
-    """The instants within each stretch between gaps, and the stretch's samples."""
-    for stretch in stamps.clock.stretches:
-        known = stamps.time[stretch]
-        if len(known) > 1:
-            edges = np.searchsorted(instants, [known[0] - slack, known[-1] + slack])
-            yield slice(int(edges[0]), int(edges[1])), stretch
 
 
 # Two clocks
@@ -427,23 +410,6 @@ class Offset:
         )
 
 
-class ClockError(LogError):
-    """Two clocks that cannot be synchronised.
-
-    Args:
-        offset: The estimate, if a joint moved.
-    """
-
-    def __init__(self, path: Path, problem: str, offset: Offset | None) -> None:
-        self.offset = offset
-        why = (
-            f"the offset cannot be estimated ({offset}; expected {CONFIDENCE})"
-            if offset
-            else "no joint moves in both"
-        )
-        super().__init__(path, f"{problem}, and {why}; {HOW}")
-
-
 def synchronise(
     path: Path,
     tracks: Sequence[Track],
@@ -478,7 +444,11 @@ def synchronise(
     overlap = own[0].time[0] <= main_time[-1] and main_time[0] <= own[0].time[-1]
     if found is None or not found.is_unambiguous:
         if not overlap:
-            raise ClockError(path, no_overlap(others[0].stamps, main.stamps), found)
+            why = "no joint moves in both"
+            if found is not None:
+                why = f"the offset cannot be estimated ({found}; expected {CONFIDENCE})"
+            problem = no_overlap(others[0].stamps, main.stamps)
+            raise LogError(path, f"{problem}, and {why}; {HOW}")
         if found is None:
             return clocked, "", None
         remark = (
@@ -589,18 +559,13 @@ def _search(
     moving = scale > 0
     one, other = one[:, moving], other[:, moving] / scale[moving]
     length = fft.next_fast_len(len(one) + len(other), real=True)
-
-    def crossed(a: Array, b: Array) -> Array:
-        product = fft.rfft(a, length, axis=0) * np.conj(fft.rfft(b, length, axis=0))
-        return np.asarray(fft.irfft(product.sum(axis=1), length))
-
     weight = 1 / scale[moving]
     ones = np.ones((len(one), 1)), np.ones((len(other), 1))
-    energy = crossed((one**2 * weight).sum(axis=1, keepdims=True), ones[1])
-    energy = energy * crossed(ones[0], (other**2 / weight).sum(axis=1, keepdims=True))
-    overlap = crossed(*ones)
+    energy = _crossed((one**2 * weight).sum(axis=1, keepdims=True), ones[1], length)
+    energy = energy * _crossed(ones[0], (other**2 / weight).sum(axis=1, keepdims=True), length)
+    overlap = _crossed(*ones, length)
     least = SHARE * min(len(one), len(other))
-    correlation = crossed(one, other) / np.sqrt(np.maximum(energy, 1e-9 * energy.max()))
+    correlation = _crossed(one, other, length) / np.sqrt(np.maximum(energy, 1e-9 * energy.max()))
     correlation = np.where(overlap >= least - 0.5, correlation, -1.0)
     best = int(np.argmax(correlation))
     # The peak reaches to where the correlation falls below half of it.
@@ -613,6 +578,14 @@ def _search(
     lag = best if best < len(one) else best - length
     seconds = lag / rate + float(measured_motion.time[0] - desired_motion.time[0])
     return seconds, float(correlation[best]), next_best
+
+
+def _crossed(one: Array, other: Array, length: int) -> Array:
+    """Sum of the products of all columns at each lag, of one behind the other first."""
+    from scipy import fft
+
+    product = fft.rfft(one, length, axis=0) * np.conj(fft.rfft(other, length, axis=0))
+    return np.asarray(fft.irfft(product.sum(axis=1), length))
 
 
 def _residuals(
@@ -650,8 +623,7 @@ def _match(segment: Array, longer: Array, rate: float) -> tuple[float, float]:
     segment, longer = segment[:, moving] * weight, longer[:, moving] * weight
     reach = (len(longer) - len(segment)) // 2
     length = fft.next_fast_len(len(longer), real=True)
-    product = fft.rfft(longer, length, axis=0) * np.conj(fft.rfft(segment, length, axis=0))
-    crossed = fft.irfft(product.sum(axis=1), length)[: 2 * reach + 1]
+    crossed = _crossed(longer, segment, length)[: 2 * reach + 1]
     energy = np.concatenate(([0.0], np.cumsum((longer**2).sum(axis=1))))
     energy = (energy[len(segment) :] - energy[: -len(segment)])[: 2 * reach + 1]
     near = crossed / np.sqrt(np.maximum((segment**2).sum() * energy, np.finfo(np.float64).tiny))

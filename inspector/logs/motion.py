@@ -33,9 +33,9 @@ from noisemodel.run import METHOD, base_velocity, joint_velocity
 from noisemodel.types import Array, Indices, Mask, Real
 
 LARGEST_RATE_RATIO = 1.5
+"""Largest ratio of the specified rate to that of the stamps, or the inverse."""
 SAME_RATE = 1.01
 """Ratio of two rates up to which no band is lost from one to the other."""
-"""Largest ratio of the specified rate to that of the stamps, or the inverse."""
 MOST_SAMPLES_PER_STAMP = 20
 """Largest number of the run's samples per logged sample; above it most of the run is gaps."""
 NO_RANGE = "normalised to 0 to 100 of its range, left out since no robot is specified"
@@ -311,17 +311,10 @@ def in_radians(
     normalised_grippers: bool = False,
 ) -> tuple[Track, ...]:
     """Tracks with angles in radians, and which of their columns are angles."""
-    found = list(tracks)
-    if units == "degrees":
-        found = [
-            _to_radians(each, robot) if is_angle else _from_normalised(path, each, robot)
-            for track in tracks
-            for each, is_angle in _by_kind(track, normalised_grippers=normalised_grippers)
-            if is_angle or robot
-        ]
-    elif units == "normalised":
-        found = [_from_normalised(path, track, robot) for track in tracks]
-    elif not units:
+    if units:
+        every = (_converted(path, t, robot, units, grippers=normalised_grippers) for t in tracks)
+        tracks = [track for track in every if track is not None]
+    else:
         for track in tracks:
             _refuse_degrees(path, track, robot)
     return tuple(
@@ -329,7 +322,7 @@ def in_radians(
             track,
             angles=[track.signal.startswith("position") and t for t in is_angular(track, robot)],
         )
-        for track in found
+        for track in tracks
     )
 
 
@@ -405,49 +398,59 @@ def is_angular(track: Track, robot: Robot | None) -> list[bool]:
     return [moves and kinds.get(joint, "revolute") in TURNING for joint in track.joints]
 
 
-def _to_radians(track: Track, robot: Robot | None) -> Track:
-    angular = is_angular(track, robot)
-    if not any(angular):
+def _to_radians(track: Track, robot: Robot | None, but: Mask | None = None) -> Track:
+    """Track with all angles converted from degrees, but those of some columns."""
+    angular = np.array(is_angular(track, robot), dtype=bool)
+    if but is not None:
+        angular &= ~but
+    if not angular.any():
         return track
     return replace(track, values=np.where(angular, np.deg2rad(track.values), track.values))
 
 
-def _from_normalised(path: Path, track: Track, robot: Robot | None) -> Track:
-    """Track with -100 to 100 scaled to the range of each joint; of grippers, 0 to 100."""
-    if not track.signal.startswith(("position", "velocity")):
+def _converted(
+    path: Path, track: Track, robot: Robot | None, units: str, *, grippers: bool
+) -> Track | None:
+    """Track in radians of one in units that are given; None if no column is left.
+
+    Args:
+        grippers: Whether grippers are normalised whatever the others are.
+    """
+    shares = np.array(
+        [units == "normalised" or (grippers and _is_gripper(joint)) for joint in track.joints],
+        dtype=bool,
+    )
+    shares &= units != "radians"
+    if robot is None and units == "degrees" and shares.any():  # their range is not known
+        kept = np.flatnonzero(~shares).tolist()
+        return _to_radians(_columns(track, kept), robot) if kept else None
+    if units == "degrees":
+        track = _to_radians(track, robot, shares)
+    if not shares.any() or not track.signal.startswith(("position", "velocity")):
         return track
     if robot is None:
         raise LogError(
             path, "normalised units are shares of the joints' ranges; name the robot (--robot)"
         )
-    joints = {joint.name: joint for joint in robot.joints}
-    scales, zeros = [], []
-    for name in track.joints:
-        place = joints[name].first_q
-        lower = float(robot.model.lowerPositionLimit[place])
-        span = float(robot.model.upperPositionLimit[place]) - lower
-        if joints[name].kind == "continuous" or not 0 < span < 1e3:
-            raise LogError(path, f"normalised units: joint {name!r} of {robot.name!r} has no range")
-        scales.append(span / (100 if _is_gripper(name) else 200))
-        zeros.append(lower if _is_gripper(name) else lower + span / 2)
+    scales, zeros = np.ones(len(shares)), np.zeros(len(shares))
+    for place in np.flatnonzero(shares).tolist():
+        scales[place], zeros[place] = _share_of_range(path, track.joints[place], robot)
     moved = zeros if track.signal.startswith("position") else 0.0
-    return replace(track, values=track.values * np.array(scales) + moved)
+    return replace(track, values=track.values * scales + moved)
+
+
+def _share_of_range(path: Path, name: str, robot: Robot) -> tuple[float, float]:
+    """What 1 of -100 to 100 of a joint's range is, and 0; of a gripper, of 0 to 100."""
+    joint = next(each for each in robot.joints if each.name == name)
+    lower = float(robot.model.lowerPositionLimit[joint.first_q])
+    span = float(robot.model.upperPositionLimit[joint.first_q]) - lower
+    if joint.kind == "continuous" or not 0 < span < 1e3:
+        raise LogError(path, f"normalised units: joint {name!r} of {robot.name!r} has no range")
+    return (span / 100, lower) if _is_gripper(name) else (span / 200, lower + span / 2)
 
 
 def _is_gripper(joint: str) -> bool:
     return "gripper" in joint or "finger" in joint
-
-
-def _by_kind(track: Track, *, normalised_grippers: bool) -> Iterator[tuple[Track, bool]]:
-    """Split a track into angles and, if these are normalised, grippers; whether it is angles."""
-    for is_angle in (True, False):
-        kept = [
-            place
-            for place, joint in enumerate(track.joints)
-            if (normalised_grippers and _is_gripper(joint)) is not is_angle
-        ]
-        if kept or (is_angle and not track.joints):
-            yield _columns(track, kept) if 0 < len(kept) < len(track.joints) else track, is_angle
 
 
 def _columns(track: Track, kept: Sequence[int]) -> Track:
