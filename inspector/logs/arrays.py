@@ -129,11 +129,8 @@ def log_of(
         raise LogError(path, _nothing(episode, arrays))
     time, arrays = _time(arrays, options)
     arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
-    states = {what: name for name, what in reversed(roles.items()) if what in (QPOS, QVEL, FORCE)}
-    suggested, remarks = [*_of_mujoco(arrays, states)], list[str]()
-    place = _source("position", options, suggested, roles)
-    position = _values(arrays, place)
-    velocity = _values(arrays, _source("velocity", options, suggested, roles))
+    suggested, remarks = [*_of_mujoco(arrays, roles)], list[str]()
+    place, position, velocity = _measured(arrays, roles, suggested, options)
     samples = len(arrays[motion[0]])
     stated = ("env_args", rate) if rate else _stated(numbers or {})
     stamps = Stamps(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES)
@@ -144,16 +141,15 @@ def log_of(
     elif stamps.unit == SAMPLES and stated[1] and not options.rate:
         stamps = counted_stamps(path, stamps, options, None, None, stated)
     suggested += _base_of_isaac(arrays, roles, stamps, remarks)
-    suggested += _targets(arrays, roles, options, position, place.source, controller, remarks)
+    suggested += _targets(arrays, roles, options, position, place, controller, remarks)
     if RELATIVE_TO in roles and not any(STATES.fullmatch(name) for name in roles):
         remarks.append(RELATIVE)
-    arms = {match["arm"] for name in roles if (match := ARMS.fullmatch(name))}
     fields = tuple(
         Field(
             name,
             _numbers(each.reshape(samples, -1)),
             stamps,
-            joints=_joints(joints or {}, name, roles, each.size // samples, suggested, arms),
+            joints=_joints(joints or {}, name, roles, each.size // samples, suggested),
             signal=roles[name] if roles[name] in SIGNALS and _is_array(name, each) else "",
             source=path.name,
             rank=0 if STATES.fullmatch(name) else 1,
@@ -161,14 +157,13 @@ def log_of(
         for name, each in arrays.items()
         if name in roles and len(each) == samples and each.ndim <= 2 and name != time
     )
-    taken = _taken(fields, suggested, options)
-    read = {time, *(each.name for each in fields), *copies}
+    read = {time, *copies, *(each.name for each in fields)}
     return Log(
         path,
         fields,
         episode,
         not_read=(*(name for name in arrays if name not in read), *not_read),
-        remarks=(*((f"taken: {taken}",) if taken else ()), *remarks),
+        remarks=(*_taken(fields, suggested, options), *remarks),
         suggested=tuple(suggested),
         time=time,
     )
@@ -198,26 +193,22 @@ def gathered(log: Log, options: ReadOptions) -> Log:
         for name, columns in groups.items()
     }
     roles, remarks = {name: meaning(name) for name in arrays}, list[str]()
-    state = {name: name for name in (QPOS, QVEL, FORCE) if name in arrays}
-    suggested = [*_of_mujoco(arrays, state)]
-    place = _source("position", options, suggested, roles)
-    position = _values(arrays, place)
-    suggested += _targets(arrays, roles, options, position, place.source, "", remarks)
+    suggested = [*_of_mujoco(arrays, roles)]
+    place, position, velocity = _measured(arrays, roles, suggested, options)
+    suggested += _targets(arrays, roles, options, position, place, "", remarks)
     columns = {id(each) for members in groups.values() for each in members.values()}
     stamps, source = log.fields[0].stamps, log.path.name
     if stamps.unit == SAMPLES:
-        velocity = _values(arrays, _source("velocity", options, suggested, roles))
         stamps = counted_stamps(log.path, stamps, options, position, velocity)
     fields = (
         *(replace(each, stamps=stamps) for each in log.fields if id(each) not in columns),
         *(Field(name, each, stamps, source=source) for name, each in arrays.items()),
     )
-    taken = _taken((), suggested, options)
     return replace(
         log,
         fields=fields,
         suggested=tuple(suggested),
-        remarks=(*log.remarks, f"taken: {taken}", *remarks),
+        remarks=(*log.remarks, *_taken((), suggested, options), *remarks),
     )
 
 
@@ -348,11 +339,12 @@ def _stated(numbers: Mapping[str, float]) -> tuple[str, float | None]:
     return "", None
 
 
-def _of_mujoco(arrays: Arrays, names: Mapping[str, str]) -> Iterator[Entry]:
+def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
     """Mapping of MuJoCo's state: a floating base, if there is one, then the robot's joints.
 
     Objects that float, and what follows them, are left out.
     """
+    names = {what: name for name, what in reversed([*roles.items()]) if what in (QPOS, QVEL, FORCE)}
     flat = {what: arrays[name].reshape(len(arrays[name]), -1) for what, name in names.items()}
     if QPOS not in flat:
         if QVEL in flat:
@@ -456,21 +448,25 @@ def _targets(
         )
 
 
-def _source(
-    signal: str, options: ReadOptions, suggested: Sequence[Entry], roles: Mapping[str, str]
-) -> Entry:
-    """Where a signal of all joints is: by the mapping, the format, or the name of an array."""
-    mapped = [e for e in (*options.entries, *suggested) if e.signal == signal and not e.joint]
-    named = sorted((n for n in roles if roles[n] == signal), key=lambda n: not STATES.fullmatch(n))
-    return (*mapped, *(Entry(signal, "", name) for name in named), Entry(signal, "", ""))[0]
+def _measured(
+    arrays: Arrays, roles: Mapping[str, str], suggested: Sequence[Entry], options: ReadOptions
+) -> tuple[str, Real | None, Real | None]:
+    """Where the positions are, and positions and velocities: by the mapping, the format, or names.
 
-
-def _values(arrays: Arrays, entry: Entry) -> Real | None:
-    """Numbers of an entry; None if there is no such array."""
-    name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
-    if name not in arrays:
-        return None
-    return _numbers(arrays[name].reshape(len(arrays[name]), -1)[:, part])
+    Either is None if there is no such array.
+    """
+    found: dict[str, Real | None] = {}
+    place = ""
+    for signal in ("velocity", "position"):
+        mapped = [e for e in (*options.entries, *suggested) if e.signal == signal and not e.joint]
+        named = sorted(
+            (n for n in roles if roles[n] == signal), key=lambda n: not STATES.fullmatch(n)
+        )
+        entry = (*mapped, *(Entry(signal, "", name) for name in named), Entry(signal, "", ""))[0]
+        name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
+        each, place = arrays.get(name), entry.source
+        found[signal] = None if each is None else _numbers(each.reshape(len(each), -1)[:, part])
+    return place, found["position"], found["velocity"]
 
 
 def _numbers(values: NDArray[Any]) -> Real:
@@ -483,9 +479,9 @@ def _joints(
     roles: Mapping[str, str],
     width: int,
     suggested: Sequence[Entry],
-    arms: set[str],
 ) -> tuple[str, ...]:
     """Names of an array's columns, if the file has them; empty for those without."""
+    arms = {match["arm"] for each in roles if (match := ARMS.fullmatch(each))}
     if len(arms) > 1 and (match := ARMS.fullmatch(name)):
         return tuple(f"{match['arm']}_joint_{number}" for number in range(width))
     parts = [entry for entry in suggested if entry.part()[0] == name]
@@ -499,21 +495,18 @@ def _joints(
     return (*("",) * first, *names, *("",) * (width - stop))
 
 
-def _taken(fields: Sequence[Field], suggested: Sequence[Entry], options: ReadOptions) -> str:
-    """What is taken as what, for a person."""
+def _taken(
+    fields: Sequence[Field], suggested: Sequence[Entry], options: ReadOptions
+) -> Iterator[str]:
+    """Say what is taken as what, if anything is that the options do not map."""
     targets = {entry.signal for entry in options.entries}
-    best = {
-        signal: min(each.rank for each in fields if each.signal == signal)
-        for signal in {each.signal for each in fields}
-    }
-    known = [
-        (each.signal, each.name)
-        for each in fields
-        if each.signal and each.rank == best[each.signal]
-    ]
+    named = [each for each in fields if each.signal]
+    best = {each.signal: each.rank for each in sorted(named, key=lambda each: -each.rank)}
+    known = [(each.signal, each.name) for each in named if each.rank == best[each.signal]]
     known += [(each.signal, f"{each.source}{_why(each)}") for each in suggested]
     order = sorted(known, key=lambda each: SIGNALS.index(each[0]))
-    return ", ".join(f"{signal} = {name}" for signal, name in order if signal not in targets)
+    if taken := [f"{signal} = {name}" for signal, name in order if signal not in targets]:
+        yield f"taken: {', '.join(taken)}"
 
 
 def _why(entry: Entry) -> str:
