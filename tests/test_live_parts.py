@@ -93,6 +93,13 @@ def test_after_the_clock_jumped_times_go_on_from_there(jump, size):
     assert lost <= 1
 
 
+def test_times_increase_even_where_stamps_grow_by_less_than_a_sum_can_hold():
+    stamps = np.concatenate((np.arange(9.0), [-5e9, 1e-300, 2e-300, 1e-200, 1e-100, 1e-60, 1e-14]))
+    taken = Clock(1.0, Warnings(lambda line: None)).take(stamps, ended=True)
+    assert len(taken.time) >= 9
+    assert (np.diff(taken.time) > 0).all()
+
+
 def test_a_clock_that_stands_still_is_left_out_and_does_not_wait():
     kept, _, _, counts, _ = taken([0.0, 0.001, 0.002, 0.003, 0.004] + 995 * [0.004])
     assert kept.sum() == 5

@@ -71,7 +71,7 @@ def main() -> None:
     _imported()
     found: list[Result] = []
     with tempfile.TemporaryDirectory(dir=_fast_folder()) as scratch:
-        for name in options.only or READERS:
+        for name in options.only or [each for each in READERS if READERS[each].command]:
             for result in results(name, options.count, options.seed, Path(scratch), options.keep):
                 found.append(result)
                 if result.outcome != "handled":

@@ -4,14 +4,16 @@
 """
 
 import json
+import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from functools import cache
 from io import BytesIO
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -28,8 +30,20 @@ from inspector.errors import InspectorError
 from inspector.labelfiles import read_labels
 from inspector.library import load_library
 from inspector.live import input as feeding
+from inspector.live.samples import Clock, Warnings
+from inspector.logs.clocks import ordered, stamps_of
+from inspector.logs.log import Track
 from inspector.logs.mapping import ReadOptions, parse_mapping
+from inspector.logs.names import (
+    Naming,
+    array_signal,
+    column_signal,
+    pattern_for,
+    says_twice,
+    time_column,
+)
 from inspector.logs.read import listing, read_logs
+from inspector.logs.ros.messages import STATE, STATES, Decoder, Topic
 from inspector.reference.judging import Expected
 from inspector.reference.levels import levels
 from inspector.reference.store import Reference, of_runs, save
@@ -37,8 +51,9 @@ from noiseclassifier import noisytest
 from noiseclassifier.scenarios import ScenarioError
 from noiseclassifier.scenarios.dataset import Folder, Task
 from noiseclassifier.scenarios.simulation import SHORTEST
-from noisemodel import meshes, runfile
+from noisemodel import meshes, mjcf, runfile
 from noisemodel.surface import triangles
+from noisemodel.types import Array
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -63,6 +78,27 @@ URDF = f"""<robot name="r"><link name="l0"/>
 <axis xyz="0 1 0"/>{LIMIT}</joint></robot>
 """
 CYLINDER = '<cylinder radius="0.05" length="1.0"/>'
+ATTRIBUTES = """<mujoco model="r"><compiler angle="radian" boundmass="0.1"/>
+<option timestep="0.001"/><size nkey="2" nuser_body="1" nuser_geom="1"/>
+<default><geom rgba="1 0 0 1"/></default><asset><hfield name="h"
+ nrow="3" ncol="3" size="1 1 1 1" elevation="0 1 0 1 0 1 0 1 0"/>
+<texture name="t" type="2d" builtin="flat" width="8" height="8"/><material name="m" texture="t"/>
+<mesh name="n" builtin="sphere" params="1"/><mesh name="v" maxhullvert="8" scale="1 1 1"
+ refpos="0 0 0" refquat="1 0 0 0" vertex="0 0 0 1 0 0 0 1 0 0 0 1"
+ face="0 2 1 0 1 3 0 3 2 1 2 3"/></asset>
+<worldbody><geom type="hfield" hfield="h"/><body name="l1" mocap="false" user="1">
+<joint name="a" axis="0 1 0" range="-9 9" ref="0.1" stiffness="1"/>
+<geom type="mesh" mesh="v" user="1"/><geom type="mesh" mesh="n"/><geom type="box" mesh="v"/>
+<replicate count="3" offset="0 0 0.1" euler="0 0 0.1"><geom size="0.1"/></replicate>
+<body name="l2" pos="0 0 1"><joint name="b" axis="0 1 0" range="-9 9"/>
+<geom type="capsule" size="0.05 0.4"/></body></body>
+<body name="f"><flexcomp name="x" type="grid"
+ count="3 3 1" spacing="0.1 0.1 0.1" radius="0.01" mass="1"/></body>
+</worldbody>
+<actuator><motor joint="a" lengthrange="0 1" gear="1"/></actuator>
+<keyframe><key time="0"/></keyframe></mujoco>
+"""
+"""An MJCF with attributes that multiply: counts, grids, replicas, keys and meshes of numbers."""
 MJCF = """<mujoco model="r"><compiler angle="radian"/><default><geom rgba="1 0 0 1"/></default>
 <worldbody><body name="l1"><joint name="a" axis="0 1 0" range="-9 9"/>
 <geom type="box" size="0.05 0.05 0.5" pos="0 0 0.5"/>
@@ -132,8 +168,42 @@ def _run_file(folder: Path) -> Path:
 COLUMNS = "time,a.position,b.position,a.velocity,b.velocity"
 
 
-def _rows(separator: str = ",", names: str = COLUMNS) -> str:
-    rows = np.column_stack((TIME, POSITION, VELOCITY))
+def _jumping(step: float = 100.0) -> Array:
+    """Stamps of a clock that is set ahead, back, and to zero."""
+    return TIME + np.repeat([0.0, step, -1.0, 1e9, -1.0], 40)
+
+
+NAMES = (
+    *(
+        "timestamp",
+        "time [s]",
+        "q1",
+        "q_d[2]",
+        "dq1 [deg/s]",
+        "Joint1",
+        "FR_0_target",
+        "FR_0_actual",
+    ),
+    *(
+        "left_shoulder_pitch",
+        "PositionCmptd1",
+        "Target Pos",
+        "robot0_joint_pos",
+        "/state/error/q[0]",
+    ),
+    *(
+        "elbow.velocity_desired",
+        "Angular Velocity [dps]",
+        "actual_TCP_pose_5",
+        "rrrrrrrr",
+        "l_arm_joint_1",
+    ),
+)
+"""Names of columns as logs have them."""
+
+
+def _rows(separator: str = ",", names: str = COLUMNS, *, jump: float = 0.0) -> str:
+    rows = np.column_stack((_jumping(jump) if jump else TIME, POSITION, VELOCITY))
     lines = (separator.join(repr(float(each)) for each in row) for row in rows)
     return "\n".join([names.replace(",", separator), *lines]) + "\n"
 
@@ -329,8 +399,89 @@ def _read_rows(path: Path) -> None:
     head, _, rest = path.read_bytes().partition(b"\n")
     reader, is_header = feeding.reader_of(head, ())
     for chunk, number, _ in feeding.chunks(BytesIO(rest if is_header else head + b"\n" + rest)):
-        for _ in reader.read(chunk, number, lambda kind, line, count=1: None):
-            pass
+        times = [
+            rows["time"]
+            for rows in reader.read(chunk, number, lambda kind, line, count=1: None)
+            if "time" in rows
+        ]
+        _check_clock(iter(times))
+
+
+def _check_clock(batches: Iterator[Array]) -> None:
+    """Give stamps to the clock of `inspector live`: the times that it takes always increase."""
+    clock, waiting, last = Clock(100.0, Warnings(lambda line: None)), np.empty(0), -np.inf
+    for batch in chain(batches, [None]):
+        stamps = waiting if batch is None else np.concatenate((waiting, batch))
+        taken = clock.take(stamps, ended=batch is None)
+        waiting = stamps[len(taken.kept) :]
+        if len(waiting) != taken.waiting or not (np.diff(taken.time, prepend=last) > 0).all():
+            raise AssertionError("times do not increase, or samples are lost")
+        last = taken.time[-1] if len(taken.time) else last
+
+
+def _read_stamps(path: Path) -> None:
+    """Stamps as they are, 8 bytes each, of a log and of a live stream."""
+    stamps = np.frombuffer(path.read_bytes()[: path.stat().st_size // 8 * 8])
+    _check_clock(iter(np.array_split(stamps, 1 + len(stamps) // 7)))
+    track = Track("position", ("a",), ("x",), stamps_of(path, "x", stamps, None), stamps[:, None])
+    ordered(path, [track])
+
+
+def _read_names(path: Path) -> None:
+    """Names of columns, one a line."""
+    names = path.read_text(errors="replace").splitlines()[:20]
+    naming = Naming.of(names, ("elbow",))
+    for name in names:
+        column_signal(name, naming), array_signal(name), says_twice(name)
+    time_column(names), pattern_for(names)
+
+
+def _read_definition(path: Path) -> None:
+    """The definition of a controller's state in a bag, and then a message of it."""
+    text = path.read_text(errors="replace")
+    for ros1, data in enumerate(_states()):
+        decode = Decoder(path, Topic("/state", STATE, text), ros1=bool(ros1))
+        decode(data)
+
+
+@cache
+def _states() -> tuple[bytes, bytes]:
+    """A controller's state in ROS 2 and ROS 1."""
+    from samplelogs import Talk
+
+    found = []
+    for ros1 in (False, True):
+        talk = Talk(ros1=ros1)
+        stages = {name: talk.point([1.0], [2.0]) for name in ("desired", "actual", "error")}
+        kind = "control_msgs/JointTrajectoryControllerState"
+        message = talk.make(kind, header=talk.header(10**9), joint_names=["a"], **stages)
+        found.append(bytes(talk.raw(message)))
+    return found[0], found[1]
+
+
+def compile_in_fork() -> None:
+    """From now on, compile each MJCF in a fork of this process: starting another takes a second."""
+
+    def run(command: list[str], *, cwd: str, **_: object) -> subprocess.CompletedProcess[bytes]:
+        if not (child := os.fork()):
+            status = 70
+            try:
+                os.chdir(cwd)
+                names = json.loads(command[2].partition("compile_here(")[2][:-1])
+                # What this process has already counts against the limit of memory.
+                mjcf.MEMORY += int(Path("/proc/self/statm").read_text().split()[0]) * 4096
+                mjcf.SECONDS = 2
+                with Path("said").open("w") as sys.stdout:
+                    mjcf.compile_here(names)
+                status = 0
+            except SystemExit as end:
+                status = int(end.code or 0)
+            finally:
+                os._exit(status)
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        return subprocess.CompletedProcess(command, status, (Path(cwd) / "said").read_bytes(), b"")
+
+    mjcf.subprocess.run = run
 
 
 def _read_resume(path: Path) -> None:
@@ -504,6 +655,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         "ROS 1, lz4": Reader("bytes", _bag(ros1=True, compression="lz4"), _read_log),
         "URDF": _robot("robot.urdf", URDF.replace("<MESH/>", CYLINDER)),
         "MJCF": _robot("robot.xml", MJCF),
+        "MJCF, attributes": _robot("robot.xml", ATTRIBUTES),
         "STL": _robot("mesh.stl", _stl(), "bytes", mesh=True),
         "STL, text": _robot("mesh.stl", _text_stl(), mesh=True),
         "OBJ": _robot("mesh.obj", _obj(), mesh=True),
@@ -512,6 +664,14 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         "live rows, JSON": Reader(
             "text", _written("rows", _json_rows()), _read_rows, LIVE, stdin=True
         ),
+        "live rows, jumping clock": Reader(
+            "text", _written("rows", _rows(jump=100.0)), _read_rows, LIVE, stdin=True
+        ),
+        "timestamps": Reader(
+            "bytes", _written("stamps", np.sort(_jumping()).tobytes()), _read_stamps, ()
+        ),
+        "names": Reader("text", _written("names", "\n".join(NAMES)), _read_names, ()),
+        "ROS definition": Reader("text", _written("state.msg", STATES[3]), _read_definition, ()),
         "NoisyTest log": Reader(
             "text",
             lambda folder: _noisytest(folder).with_suffix(".log"),

@@ -27,24 +27,27 @@ import atheris
 
 with atheris.instrument_imports(include=["inspector", "noiseclassifier", "noisemodel"]):
     from benchmarks.fuzz.damage import damaged
-    from benchmarks.fuzz.readers import EXPECTED, READERS
+    from benchmarks.fuzz.readers import EXPECTED, READERS, compile_in_fork
 
 GROUPS = {
     "labels": tuple(name for name in READERS if name.startswith(("labels", "NoisyTest", "simul"))),
     "settings": ("mapping", "reference.toml", "resume state", "tune state", "dataset.json"),
-    "rows": ("live rows, CSV", "live rows, JSON"),
+    "rows": ("live rows, CSV", "live rows, JSON", "live rows, jumping clock"),
     "tables": ("CSV", "CSV, semicolons", "Parquet", "HDF5", "LeRobot info", "LeRobot data"),
     "arrays": ("run", "run, in pieces", "npz of arrays", "MuJoCo's npz", "npy"),
     "models": ("model, small",),
-    "bags": tuple(name for name in READERS if name.startswith(("MCAP", "ROS"))),
-    "robots": ("URDF", "MJCF", "STL", "STL, text", "OBJ", "DAE"),
+    "bags": tuple(
+        name for name in READERS if name.startswith(("MCAP", "ROS ")) and READERS[name].command
+    ),
+    "parts": ("timestamps", "names", "ROS definition"),
+    "robots": ("URDF", "MJCF", "MJCF, attributes", "STL", "STL, text", "OBJ", "DAE"),
 }
 """Readers that are fuzzed together; each input goes to one of them."""
 
 SEEDS = 30  # damaged files of each reader to begin with
 
 SHORT, LONGEST = 1000, 20_000
-"""Bytes that a whole text is cut to, and that an input has at most: short ones are read faster."""
+"""Bytes that a long text is cut to, and that an input has at most: short ones are read faster."""
 
 
 def main() -> None:
@@ -74,6 +77,7 @@ def fuzz(names: tuple[str, ...], folder: Path, options: argparse.Namespace) -> N
     found = options.found
     corpus, paths = folder / "corpus", []
     corpus.mkdir()
+    compile_in_fork()
     if found:
         found.mkdir(parents=True, exist_ok=True)
     for place, name in enumerate(names):
@@ -83,7 +87,7 @@ def fuzz(names: tuple[str, ...], folder: Path, options: argparse.Namespace) -> N
         whole = paths[-1].read_bytes()
         READERS[name].read(paths[-1])
         if READERS[name].kind == "text":
-            whole = whole[:SHORT].rpartition(b"\n")[0] if len(whole) > SHORT else whole
+            whole = whole[:SHORT].rpartition(b"\n")[0] if len(whole) > 3 * SHORT else whole
         (corpus / f"{place}").write_bytes(bytes((place,)) + whole)
         for number in range(SEEDS):
             data = damaged(whole, READERS[name].kind, Random(f"{name} {number}"))

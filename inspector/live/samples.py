@@ -267,7 +267,8 @@ class Clock:
         return True
 
     def _follows(self, before: Array | float, after: Array | float) -> Mask:
-        steps = self._rate * (np.asarray(after) - np.asarray(before))
+        # Of times, not of stamps: tiny steps vanish in the sum, and times have to increase.
+        steps = self._rate * ((after + self._shift) - (before + self._shift))
         return np.asarray((steps > 0.0) & (steps <= JUMP_STEPS))
 
     def _run(self, stamps: Array) -> int:
@@ -300,7 +301,7 @@ class Clock:
     def _jump(self, stamp: float) -> None:
         """Go on at a timestamp that lies elsewhere."""
         ahead = stamp - self._last
-        if not 0.0 < ahead <= LONGEST:
+        if not JUMP_STEPS < ahead * self._rate <= LONGEST * self._rate:
             now = self._last + self._shift
             line = f"the clock jumps by {ahead:+.6g} s at {now:.3f} s: times go on from there"
             self._warnings.note("clock jumps", line)
