@@ -32,8 +32,8 @@ import numpy as np
 
 import noiseclassifier as nc
 from inspector.train import PARTS, classified, of_run, train
-from noiseclassifier.evaluation.assessment import measure, number, percent
-from noiseclassifier.evaluation.matching import Predictions, predict
+from noiseclassifier.evaluation.assessment import measure, number, percent, predict
+from noiseclassifier.evaluation.matching import Predictions
 from noiseclassifier.scenarios.robots import limbs
 from noisemodel import Run
 from noisemodel.parallel import DIED, in_order
@@ -250,10 +250,10 @@ def printed(title: str) -> str:
 def row(name: str, score: Score) -> str:
     """Row of our measures."""
     frames = score.frames.frames
-    errors = (frames.false_negative_errors, frames.false_positive_errors)
+    errors = (frames["false_negative_errors"], frames["false_positive_errors"])
     shares = (
-        *(frames.failure_detection_rate, frames.subset_accuracy),
-        *(frames.failure_recall, frames.balanced_accuracy),
+        *(frames["failure_detection_rate"], frames["subset_accuracy"]),
+        *(frames["failure_recall"], frames["balanced_accuracy"]),
     )
     return _row(
         name,
@@ -272,7 +272,7 @@ def _table(title: str, found: Sequence[tuple[str, Score]]) -> str:
     lines = [f"### {title}", "", _row(*head), "|---" * len(head) + "|", printed(title)]
     lines += [row(name, score) for name, score in found]
     for _, (frames, alarms) in found[:1]:
-        counts = frames.frames.evaluation.confusion.sum(axis=1).tolist()
+        counts = frames.evaluation.confusion.sum(axis=1).tolist()
         each_class = ", ".join(f"{n} {c}" for c, n in zip(nc.CLASSES, counts, strict=False))
         lines += [
             "",

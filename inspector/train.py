@@ -27,7 +27,7 @@ from noisemodel.files import also_reading, refuse_existing, replacing
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from noiseclassifier.evaluation.intervals import Estimate
+    from noiseclassifier.evaluation.measures import Estimate
 
 
 SIMULATORS = {"mujoco", "pinocchio", "drake", "pybullet", "dm-control"}
@@ -435,7 +435,7 @@ def draw(assessment: Assessment, path: Path, *, title: str, overwrite: bool = Fa
 
 def _confusion(axes: "Axes", assessment: Assessment) -> None:
     """Draw the confusion matrix, each row in the colour of its class, shaded by share."""
-    evaluation = assessment.frames.evaluation
+    evaluation = assessment.evaluation
     names, counts = evaluation.classes, evaluation.confusion
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     inks = np.array([_ink(color) for color in of_classes(names).values()])
@@ -452,13 +452,13 @@ def _confusion(axes: "Axes", assessment: Assessment) -> None:
 
 def _intervals(axes: "Axes", assessment: Assessment) -> None:
     frames, found = assessment.frames, assessment.protocol.pooled
-    colors = of_classes(frames.evaluation.classes)
+    colors = of_classes(assessment.evaluation.classes)
     rows: list[tuple[str, Estimate, Color]] = [
-        (f"recall of {name}", each, colors[name]) for name, each in frames.recall.items()
+        (f"recall of {name}", each, colors[name]) for name, each in frames["recall"].items()
     ]
     rows += [
-        ("balanced accuracy", frames.balanced_accuracy, (0, 0, 0)),
-        ("failure recall", frames.failure_recall, (0, 0, 0)),
+        ("balanced accuracy", frames["balanced_accuracy"], (0, 0, 0)),
+        ("failure recall", frames["failure_recall"], (0, 0, 0)),
         ("faults found", found["recall_injected"], (0, 0, 0)),
         ("faults found, detectable", found["recall_felt"], (0, 0, 0)),
         ("found with the right class", found["class_recall"], (0, 0, 0)),
@@ -486,7 +486,7 @@ def _reliability(axes: "Axes", assessment: Assessment) -> None:
         axes.text(0.5, 0.5, "the scores are not probabilities", ha="center", va="center")
         return
     axes.plot([0.0, 1.0], [0.0, 1.0], "--", color=GREY, lw=1)
-    table = assessment.reliability.table()
+    table = assessment.reliability
     width = table["high"] - table["low"]
     axes.bar(table["low"], table["right"], width, align="edge", color=_ink(BLUE), alpha=0.35)
     axes.plot(table["confidence"], table["right"], "o", color=_ink(BLUE))

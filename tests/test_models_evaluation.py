@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.confusion import Evaluation
+from noiseclassifier.evaluation.measures import Evaluation
 
 TRUTH = np.array(["ok"] * 6 + ["impact"] * 2 + ["oscillations"] * 2)
 CLASSES = ("ok", "impact", "oscillations")

@@ -3,11 +3,19 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
-from noiseclassifier.evaluation.intervals import Resampling, garwood
+from noiseclassifier.evaluation.measures import Resampling, garwood
 
 
 def each_its_own(runs):
     return Resampling.of([f"run{number}" for number in range(runs)])
+
+
+def share_of(resampling, part, whole):
+    return resampling.mean_share(part, whole, [np.ones(len(part), bool)])
+
+
+def rate_of(resampling, events, time):
+    return resampling.mean_rate(events, time, [np.ones(len(events), bool)])
 
 
 def test_bounds_of_rare_events_are_those_of_the_tables():
@@ -22,11 +30,11 @@ def test_clustered_events_have_wider_intervals_than_single_ones():
     alone[:20] = 1
     crowd[:2] = 10
     resampling = each_its_own(50)
-    assert resampling.rate(crowd, hours).value == pytest.approx(4.0)
+    assert rate_of(resampling, crowd, hours).value == pytest.approx(4.0)
     exact = np.array(garwood(20)) / 5.0
-    assert resampling.rate(alone, hours).low == pytest.approx(exact[0])
-    assert resampling.rate(crowd, hours).high > 1.3 * exact[1]
-    assert resampling.rate(crowd, hours).low == 0.0 < exact[0]
+    assert rate_of(resampling, alone, hours).low == pytest.approx(exact[0])
+    assert rate_of(resampling, crowd, hours).high > 1.3 * exact[1]
+    assert rate_of(resampling, crowd, hours).low == 0.0 < exact[0]
     mean = resampling.mean_rate(crowd, hours, [np.arange(50) < 25, np.arange(50) >= 25])
     assert (mean.low, mean.value) == (0.0, pytest.approx(20 / 2.5 / 2))
     assert mean.high > 1.3 * exact[1]
@@ -34,10 +42,10 @@ def test_clustered_events_have_wider_intervals_than_single_ones():
 
 def test_runs_without_a_mistake_have_the_bound_of_their_number():
     for runs in (5, 20, 500):
-        perfect = each_its_own(runs).share(np.full(runs, 7.0), np.full(runs, 7.0))
+        perfect = share_of(each_its_own(runs), np.full(runs, 7.0), np.full(runs, 7.0))
         assert perfect.value == perfect.high == 1.0
         assert perfect.low == pytest.approx(0.025 ** (1 / runs))
-        nothing = each_its_own(runs).share(np.zeros(runs), np.full(runs, 7.0))
+        nothing = share_of(each_its_own(runs), np.zeros(runs), np.full(runs, 7.0))
         assert (nothing.low, nothing.high) == (0.0, pytest.approx(1.0 - 0.025 ** (1 / runs)))
 
 
@@ -45,7 +53,7 @@ def test_intervals_shrink_with_the_root_of_the_number_of_groups():
     widths = []
     for runs in (20, 80, 320):
         part = np.where(np.arange(runs) % 4 == 0, 2.0, 9.0)
-        share = each_its_own(runs).share(part, np.full(runs, 10.0))
+        share = share_of(each_its_own(runs), part, np.full(runs, 10.0))
         widths.append(share.high - share.low)
     assert widths[0] / widths[1] == pytest.approx(2.0, rel=0.15)
     assert widths[1] / widths[2] == pytest.approx(2.0, rel=0.15)
@@ -57,7 +65,7 @@ def test_intervals_hold_what_is_true_in_95_of_100_cases_and_those_by_frames_do_n
     for _ in range(200):
         own = random.beta(8, 2, 40)  # groups differ; their mean is 0.8
         right = random.binomial(50, own).astype(float)
-        share = each_its_own(40).share(right, np.full(40, 50.0))
+        share = share_of(each_its_own(40), right, np.full(40, 50.0))
         held += share.low <= 0.8 <= share.high
         half = 1.96 * np.sqrt(share.value * (1 - share.value) / 2000)
         naive += abs(share.value - 0.8) <= half
@@ -66,19 +74,19 @@ def test_intervals_hold_what_is_true_in_95_of_100_cases_and_those_by_frames_do_n
 
 
 def test_fewer_than_five_groups_have_no_interval():
-    share = Resampling.of(["a", "b", "c", "d", "d", "d"]).share(np.ones(6), np.ones(6))
+    share = share_of(Resampling.of(["a", "b", "c", "d", "d", "d"]), np.ones(6), np.ones(6))
     assert share.value == 1.0
     assert isnan(share.low)
     assert isnan(share.high)
     assert (share.runs, share.groups) == (6, 4)
-    rate = Resampling.of(["a"]).rate(np.ones(1), np.ones(1))  # counting alone bounds a rate
+    rate = rate_of(Resampling.of(["a"]), np.ones(1), np.ones(1))  # counting alone bounds a rate
     assert (rate.low, rate.high) == pytest.approx(garwood(1))
 
 
 def test_only_runs_in_the_sample_of_a_measure_count():
     whole = np.array([0.0, 4.0, 4.0, 4.0, 4.0, 4.0, 0.0])
-    assert each_its_own(7).share(whole / 2, whole).runs == 5
-    nothing = each_its_own(7).share(np.zeros(7), np.zeros(7))
+    assert share_of(each_its_own(7), whole / 2, whole).runs == 5
+    nothing = share_of(each_its_own(7), np.zeros(7), np.zeros(7))
     assert isnan(nothing.value)
     assert nothing.as_dict() == {"value": None, "low": None, "high": None, "runs": 0, "groups": 0}
 
@@ -90,21 +98,17 @@ def test_the_rate_of_one_robot_has_the_bounds_of_its_count():
     assert (found.low, found.high) == pytest.approx(np.divide(garwood(3), 4.0))
 
 
-def test_the_mean_of_one_set_or_of_two_that_are_the_same_is_the_share_of_the_set():
+def test_the_mean_of_two_sets_that_are_the_same_is_the_share_of_the_set():
     random = np.random.default_rng(3)
     whole = random.uniform(1.0, 9.0, 40)
     whole[[1, 2]] = 0.0  # these count nowhere
     part = whole * random.uniform(0.0, 1.0, 40)
     own = np.arange(40) % 3 > 0
-    alone = each_its_own(40).share(part * own, whole * own)
-    for sets in ([own], [own, own]):
-        mean = each_its_own(40).mean_share(part, whole, sets)
-        assert (mean.runs, mean.groups) == (alone.runs, alone.groups) == (24, 24)
-        assert (mean.value, mean.low, mean.high) == pytest.approx(
-            (alone.value, alone.low, alone.high)
-        )
-        rate = each_its_own(40).mean_rate(part, whole, sets)
-        assert rate.value == pytest.approx(alone.value)
+    alone, both = (each_its_own(40).mean_share(part, whole, sets) for sets in ([own], [own, own]))
+    assert (both.runs, both.groups) == (alone.runs, alone.groups) == (24, 24)
+    assert (both.value, both.low, both.high) == pytest.approx((alone.value, alone.low, alone.high))
+    rate = each_its_own(40).mean_rate(part, whole, [own, own])
+    assert rate.value == pytest.approx(alone.value)
 
 
 def test_a_quantile_has_the_runs_that_hold_its_values():
@@ -125,9 +129,9 @@ def test_a_quantile_has_the_runs_that_hold_its_values():
 def test_sets_are_the_same_each_time_and_in_any_order_of_the_runs():
     names = [f"g{number // 3}" for number in range(60)]
     part, whole = np.arange(60.0) % 7, np.full(60, 7.0)
-    first = Resampling.of(names).share(part, whole)
-    assert Resampling.of(names).share(part, whole) == first
-    back = Resampling.of(names[::-1]).share(part[::-1], whole)
+    first = share_of(Resampling.of(names), part, whole)
+    assert share_of(Resampling.of(names), part, whole) == first
+    back = share_of(Resampling.of(names[::-1]), part[::-1], whole)
     assert (back.low, back.high) == pytest.approx((first.low, first.high))
 
 
@@ -138,4 +142,4 @@ def test_the_bounds_of_a_mean_allow_for_its_least_certain_part():
     assert mean.low == pytest.approx((0.025 ** (1 / 40) + 0.025 ** (1 / 6)) / 2)
     assert mean.groups == 6
     assert isnan(resampling.bounded(1.0, np.ones(2000), [both[0], np.arange(40) < 4]).low)
-    assert isnan(resampling.plain(nan, np.full(2000, nan), both[0]).low)
+    assert isnan(resampling.unbounded(nan, np.full(2000, nan), both[0]).low)

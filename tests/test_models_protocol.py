@@ -11,7 +11,6 @@ from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, p
 from noiseclassifier import match
 from noiseclassifier.evaluation import measures
 from noiseclassifier.evaluation.assessment import protocol_lines as lines_of
-from noiseclassifier.evaluation.intervals import Resampling, fay_feuer, garwood
 from noiseclassifier.evaluation.matching import (
     SHIFTS,
     Outcome,
@@ -24,7 +23,15 @@ from noiseclassifier.evaluation.matching import (
     run_score,
     truth_of,
 )
-from noiseclassifier.evaluation.measures import MOST, Protocol, auc, harmonic_mean
+from noiseclassifier.evaluation.measures import (
+    MOST,
+    Protocol,
+    Resampling,
+    auc,
+    fay_feuer,
+    garwood,
+    harmonic_mean,
+)
 from noiseclassifier.labels import Event, Labels
 from noiseclassifier.recording import Fault
 

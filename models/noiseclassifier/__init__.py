@@ -12,7 +12,6 @@ only to train.
 """
 
 from noiseclassifier.classifier import Classifier, Stream
-from noiseclassifier.confusion import Evaluation
 from noiseclassifier.dataset import Dataset, Examples
 from noiseclassifier.errors import (
     AnnotationError,
@@ -29,6 +28,7 @@ from noiseclassifier.errors import (
 )
 from noiseclassifier.evaluation.assessment import Assessment, assess, evaluate
 from noiseclassifier.evaluation.matching import Unanswered, match
+from noiseclassifier.evaluation.measures import Evaluation
 from noiseclassifier.features import features, frame
 from noiseclassifier.general import Frames, General, Model, frames_of, load, nearest
 from noiseclassifier.labels import UNKNOWN, Event, Labels

@@ -8,10 +8,10 @@ from typing import Any, Self
 import numpy as np
 
 from noiseclassifier import modelfile
-from noiseclassifier.confusion import Evaluation
 from noiseclassifier.dataset import CHUNK, Dataset, Examples, features_in_chunks
 from noiseclassifier.errors import DatasetError, FileError, MissingSignalError, RateError
 from noiseclassifier.estimators import ESTIMATORS, Estimator
+from noiseclassifier.evaluation.measures import Evaluation
 from noiseclassifier.features import FrameFeatures, Frames, frames_of, standard
 from noiseclassifier.labels import UNKNOWN, Labels
 from noiseclassifier.profile import NOMINAL, Profile

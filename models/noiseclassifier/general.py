@@ -15,11 +15,11 @@ import numpy as np
 
 from noiseclassifier import modelfile
 from noiseclassifier.classifier import Classifier, targets_of
-from noiseclassifier.confusion import Evaluation
 from noiseclassifier.errors import MissingSignalError, RateError
 from noiseclassifier.estimators.decision import unthinned
 from noiseclassifier.estimators.trees import Detector, Trees
 from noiseclassifier.evaluation.matching import OK, UNCLEAR, truth_of, within
+from noiseclassifier.evaluation.measures import Evaluation
 from noiseclassifier.features import frame_features, standard
 from noiseclassifier.labels import UNKNOWN
 from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, RELATIVE, TOLERANCE, LogBands

@@ -108,9 +108,12 @@ class Labels:
             suspect = suspect & ~unknown
         if self.above_threshold is None:
             return suspect
-        evidence = self.above_threshold | (suspect & unknown)
-        apart = self.start[1:] > self.stop[:-1]
-        return confirmed(suspect, evidence, apart)
+        return confirmed(suspect, self.above_threshold | (suspect & unknown), self.apart)
+
+    @property
+    def apart(self) -> Mask:
+        """Whether a frame and the next neither overlap nor touch, shape (frames - 1,)."""
+        return np.asarray(self.start[1:] > self.stop[:-1])
 
     @cached_property
     def stretches(self) -> tuple[Index, ...]:
@@ -233,8 +236,6 @@ def interval(start: float, stop: float) -> str:
 def confirmed(suspect: Mask, evidence: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:
     """Keep the frames of those stretches that hold enough frames of evidence.
 
-    A frame without a neighbour on one side counts twice: the neighbour would hold the failure too.
-
     Args:
         suspect: Whether a frame is not `ok` by itself, shape (frames,).
         evidence: Whether it is evidence of a finding, shape (frames,).
@@ -243,10 +244,20 @@ def confirmed(suspect: Mask, evidence: Mask, apart: Mask, *, least: int = CONFIR
     Returns:
         The frames that are kept, shape (frames,).
     """
-    first = np.append(True, apart)[: len(suspect)]
-    last = np.append(apart, True)[: len(suspect)]
-    stretch = np.cumsum(suspect & (first | ~np.append(False, suspect)[: len(suspect)]))
-    count = np.where(first | last, 2, 1)[suspect & evidence]
-    enough = np.bincount(stretch[suspect & evidence], count, minlength=len(suspect) + 1) >= least
+    begins, weight = sides(suspect, apart)
+    stretch = np.cumsum(begins)
+    own = suspect & evidence
+    enough = np.bincount(stretch[own], weight[own], minlength=len(suspect) + 1) >= least
     kept: Mask = suspect & enough[stretch]
     return kept
+
+
+def sides(suspect: Mask, apart: Mask) -> tuple[Mask, Index]:
+    """Whether a stretch of suspect frames begins with a frame, and how often the frame counts.
+
+    A frame without a neighbour on one side counts twice: the neighbour would hold the failure too.
+    """
+    first = np.append(True, apart)[: len(suspect)]
+    last = np.append(apart, True)[: len(suspect)]
+    begins: Mask = suspect & (first | ~np.append(False, suspect)[: len(suspect)])
+    return begins, np.where(first | last, 2, 1)

@@ -22,11 +22,11 @@ from typing import Any, Literal, NamedTuple, Self, TypeAlias, get_args
 
 import numpy as np
 
-from noiseclassifier.confusion import Evaluation
 from noiseclassifier.dataset import Examples
 from noiseclassifier.errors import DatasetError, ProfileError
 from noiseclassifier.estimators import ESTIMATORS, svm
 from noiseclassifier.estimators.decision import TINY
+from noiseclassifier.evaluation.measures import Evaluation
 from noiseclassifier.features import standard
 from noiseclassifier.labels import UNKNOWN
 from noiseclassifier.profile import Kernel, Multiclass, Profile
@@ -302,7 +302,7 @@ class Validation:
                 found.false_alarm_rate,
                 found.subset_accuracy,
             )
-            measures.append(Measures(*(round(value, DIGITS) for value in values)))
+            measures.append(Measures(*(round(float(value), DIGITS) for value in values)))
         return measures
 
 

@@ -1,30 +1,35 @@
-"""The assessment of a model on recordings: all measures, as JSON, as an Arrow table and as text."""
+"""The assessment of a model on recordings: all measures, as JSON and as text."""
 
-import typing
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from math import isnan
 from typing import Any
 
 import numpy as np
 
 from noiseclassifier.classifier import Classifier
-from noiseclassifier.confusion import Evaluation
 from noiseclassifier.dataset import Dataset
 from noiseclassifier.errors import DatasetError, SignalError
-from noiseclassifier.evaluation.intervals import LEAST_GROUPS, Estimate, Resampling
-from noiseclassifier.evaluation.matching import FALSE, Localise, Predictions, Unanswered, predict
+from noiseclassifier.evaluation.matching import FALSE, UNCLEAR, Predictions, Unanswered, within
 from noiseclassifier.evaluation.measures import (
+    LEAST_GROUPS,
     RATES,
     WORST,
-    FrameScore,
+    Estimate,
+    Evaluation,
     Part,
     Protocol,
-    Reliability,
+    Resampling,
+    calibration,
+    frame_estimates,
+    plain,
 )
-from noiseclassifier.labels import interval
-from noiseclassifier.recording import Recording, check_apart, seen
+from noiseclassifier.general import Model
+from noiseclassifier.labels import Event, Labels, interval
+from noiseclassifier.recording import Recording, check_apart, group_of, seen
 from noiseclassifier.signals import named
+from noiseclassifier.types import Array
 
 FORMAT = "noise-evaluation/3"
 ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"
@@ -64,15 +69,8 @@ COLUMNS = (
 )
 
 
-class Model(typing.Protocol):
-    """What is assessed: a model of one rate, or of any."""
-
-    @property
-    def runs(self) -> Mapping[str, str]:
-        """SHA-256 of each training recording, by name."""
-
-    def at(self, rate: float, signals: Collection[str], /) -> Classifier:
-        """The model for a sample rate, in [Hz], and for signals by name."""
+Localise = Callable[[Recording, Labels], tuple[tuple[Event, ...], tuple[Event, ...]]]
+"""Gives the events of labels by their frames, and the same from onset to end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +85,9 @@ class Assessment:
         copies: Recordings that were left out, and the equal one of each, by name.
         seen: Recordings that the model was trained on, and what of them, by name.
         protocol: Measures of the findings as they are reported, robots weighed alike.
-        frames: Measures of the frames that are cut from blocks.
-        reliability: Confidence and truth; None if the scores are no probabilities.
+        evaluation: All frames that are cut from blocks.
+        frames: Its measures with intervals, by name, and those of each class by class.
+        reliability: Confidence beside truth in bins; None if the scores are no probabilities.
         calibration_error: Expected calibration error; None likewise.
     """
 
@@ -99,18 +98,22 @@ class Assessment:
     copies: dict[str, str]
     seen: dict[str, str]
     protocol: Protocol
-    frames: FrameScore
-    reliability: Reliability | None
+    evaluation: Evaluation
+    frames: dict[str, Any]
+    reliability: dict[str, Array] | None
     calibration_error: Estimate | None
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
-        evaluation, bins = self.frames.evaluation, self.reliability
-        table = {} if bins is None else bins.table()
-        columns = {
-            name: [None if np.isnan(value) else float(value) for value in column]
-            for name, column in table.items()
+        frames = {
+            name: (
+                {label: one.as_dict() for label, one in each.items()}
+                if isinstance(each, dict)
+                else each.as_dict()
+            )
+            for name, each in self.frames.items()
         }
+        bins = {name: plain(each.tolist()) for name, each in (self.reliability or {}).items()}
         return {
             "format": FORMAT,
             "runs": self.runs,
@@ -120,11 +123,11 @@ class Assessment:
             "copies": self.copies,
             "seen": self.seen,
             "protocol": self.protocol.as_dict(),
-            "classes": list(evaluation.classes),
-            "confusion": evaluation.confusion.tolist(),
-            "frames": self.frames.as_dict(),
+            "classes": list(self.evaluation.classes),
+            "confusion": self.evaluation.confusion.tolist(),
+            "frames": {"frames": int(self.evaluation.frames), **frames},
             "calibration_error": self.calibration_error and self.calibration_error.as_dict(),
-            "reliability": columns or None,
+            "reliability": bins or None,
         }
 
     def __str__(self) -> str:
@@ -179,8 +182,6 @@ def assess(
         try:
             bound = model.at(recording.rate, named(recording.signal))
             found = predict(bound, recording, localise)
-            # Frames that are cut out of blocks have no reference.
-            found = found.with_frames() if bound.profile.reference else found
             reason = "" if len(found.labels) else NO_FRAME
         except SignalError as error:
             reason = str(error)
@@ -191,6 +192,44 @@ def assess(
     return measure(
         tuple(predictions.values()), tuple(unanswered.values()), copies=copies, known=known
     )
+
+
+def predict(
+    classifier: Classifier, recording: Recording, localise: Localise | None = None
+) -> Predictions:
+    """Predictions of a model on a recording, on its annotated blocks and from end to end.
+
+    A recording whose blocks all lie in gaps has no frame of a block.
+
+    Args:
+        localise: Estimates onset and end of the findings; else they last as their frames do.
+    """
+    truth = predicted = np.array([], dtype=str)
+    if not classifier.profile.reference:
+        with suppress(DatasetError):  # no frame without a gap
+            # Frames that are cut from blocks, as the paper does for validation.
+            dataset = Dataset.of([recording], classifier.profile, training=False)
+            truth, predicted = dataset.labels, classifier.predict(dataset.frames)
+    labels = classifier.classify(
+        recording.signal, recording.rate, start=recording.start, valid=recording.valid
+    )
+    found = Predictions(
+        recording.name,
+        group_of(recording.name),
+        1.0 / recording.rate,
+        within(recording),
+        truth,
+        predicted,
+        labels,
+        recording.events,
+        recording.facts,
+        localise(recording, labels) if localise and len(labels) else None,
+    )
+    if not classifier.profile.reference:
+        return found
+    # Frames that are cut out of blocks have no reference: those of the whole recording count.
+    known = found.whole_truth != UNCLEAR
+    return replace(found, truth=found.whole_truth[known], predicted=labels.label[known])
 
 
 def measure(
@@ -216,10 +255,11 @@ def measure(
         raise DatasetError(f"no annotated frame in {len(predictions)} recordings; annotate blocks")
     groups = [one.group for one in predictions]
     resampling = Resampling.of(groups)
-    frames, bins = FrameScore.of(predictions, resampling), Reliability.of(predictions)
+    evaluation, frames = frame_estimates(predictions, resampling)
+    reliability, error = calibration(predictions, resampling) or (None, None)
     owned = {
         label: [sum(block.label == label for block in one.blocks) for one in predictions]
-        for label in frames.evaluation.classes
+        for label in evaluation.classes
     }
     return Assessment(
         runs=len(predictions),
@@ -229,9 +269,10 @@ def measure(
         copies=dict(copies or {}),
         seen=dict(known or {}),
         protocol=Protocol.of(predictions, resampling, unanswered),
+        evaluation=evaluation,
         frames=frames,
-        reliability=bins,
-        calibration_error=None if bins is None else bins.error(resampling),
+        reliability=reliability,
+        calibration_error=error,
     )
 
 
@@ -334,15 +375,13 @@ def _not_answered(protocol: Protocol) -> list[str]:
     """Reasons why runs have no verdict, each with its runs and robots."""
     reasons: dict[str, list[str]] = {}
     for each in protocol.unanswered:
-        reasons.setdefault(each.reason, []).append(each.origin.robot)
+        reasons.setdefault(each.reason, []).append(each.origin["robot"])
     lines = []
     for reason, robots in reasons.items():
         names = sorted(set(robots))
         rest = f" and {len(names) - WORST} more" if len(names) > WORST else ""
-        names = names[:WORST]
-        lines.append(
-            f"not answered: {_many(len(robots), 'run')} ({reason}) of {', '.join(names)}{rest}"
-        )
+        few = ", ".join(names[:WORST])
+        lines.append(f"not answered: {_many(len(robots), 'run')} ({reason}) of {few}{rest}")
     return lines
 
 
@@ -421,50 +460,45 @@ def _errors(protocol: Protocol) -> list[str]:
 
 
 def _frames(assessment: Assessment) -> list[str]:
-    frames = assessment.frames
-    counts = frames.evaluation.confusion.sum(axis=1).tolist()
+    frames, evaluation = assessment.frames, assessment.evaluation
     lines = [
         "Frames that are cut from annotated blocks, as the paper does",
         _row("", ["recall", "precision"], ["frames", "blocks", "runs"]),
     ]
-    for label, count in zip(frames.evaluation.classes, counts, strict=True):
-        figures = [percent(frames.recall[label]), percent(frames.precision[label])]
+    for label, count in zip(evaluation.classes, evaluation.confusion.sum(axis=1), strict=True):
+        figures = [percent(frames[name][label]) for name in ("recall", "precision")]
         behind = [count, assessment.blocks[label], assessment.runs_with[label]]
         lines.append(_row(label, figures, behind))
     error = assessment.calibration_error
-    calibration = (
-        f"{percent(error)} in ten bins" if error else "- (the scores are no probabilities)"
-    )
+    calibrated = f"{percent(error)} in ten bins" if error else "- (the scores are no probabilities)"
     return [
         *lines,
-        _row("Balanced accuracy", [percent(frames.balanced_accuracy)]),
-        _row("Failure recall", [percent(frames.failure_recall)]),
-        _row("False alarm rate", [percent(frames.false_alarm_rate)]),
-        _row("Calibration error", [calibration]),
+        _row("Balanced accuracy", [percent(frames["balanced_accuracy"])]),
+        _row("Failure recall", [percent(frames["failure_recall"])]),
+        _row("False alarm rate", [percent(frames["false_alarm_rate"])]),
+        _row("Calibration error", [calibrated]),
     ]
 
 
 def _paper(assessment: Assessment) -> list[str]:
-    frames = assessment.frames
-    evaluation = frames.evaluation
+    frames, evaluation = assessment.frames, assessment.evaluation
     ok = evaluation.confusion[[name == "ok" for name in evaluation.classes]].sum()
-    lines = [
-        "As the paper measures, in shares of ALL frames",
-        _row("", ["false negative errors", "false positive errors"]),
-    ]
-    for label, negative in frames.false_negative_errors.items():
-        figures = [percent(negative), percent(frames.false_positive_errors[label])]
-        lines.append(_row(label, figures))
+    errors = ("false_negative_errors", "false_positive_errors")
     nothing = f"(calling all frames ok: {ok / evaluation.frames:.1%})"
     return [
-        *lines,
-        _row("Failure detection rate", [percent(frames.failure_detection_rate), nothing]),
-        _row("Subset accuracy", [percent(frames.subset_accuracy)]),
+        "As the paper measures, in shares of ALL frames",
+        _row("", [name.replace("_", " ") for name in errors]),
+        *(
+            _row(label, [percent(frames[name][label]) for name in errors])
+            for label in evaluation.classes
+        ),
+        _row("Failure detection rate", [percent(frames["failure_detection_rate"]), nothing]),
+        _row("Subset accuracy", [percent(frames["subset_accuracy"])]),
     ]
 
 
 def _confusion(assessment: Assessment) -> list[str]:
-    evaluation = assessment.frames.evaluation
+    evaluation = assessment.evaluation
     width = max(len(name) for name in evaluation.classes) + 2
     head = "Frames of row predicted".ljust(CLASS)
     return [

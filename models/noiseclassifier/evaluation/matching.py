@@ -1,4 +1,4 @@
-"""Findings and faults matched in time: spans, the matcher, predictions, and the outcome of a run.
+"""Findings and faults matched in time: spans, the matcher, and the outcome of a run.
 
 A finding and a fault *meet* if they overlap, or are no more than a collar of 0.2 s apart. A fault
 is *found* if a finding of any class meets it. Findings and faults are also matched *one to one*, as
@@ -23,18 +23,15 @@ Spans are arrays of shape (spans, 2), start and stop of each, in [s].
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf
+from math import inf, nan
 from typing import Protocol
 
 import numpy as np
 
-from noiseclassifier.classifier import Classifier
-from noiseclassifier.dataset import Dataset
-from noiseclassifier.errors import DatasetError
-from noiseclassifier.labels import CONFIRM, UNKNOWN, Event, Labels
-from noiseclassifier.recording import Block, Fault, Recording, group_of, robot_of
+from noiseclassifier.labels import CONFIRM, UNKNOWN, Event, Labels, sides
+from noiseclassifier.recording import Block, Fault, Recording, robot_of
 from noiseclassifier.types import Array, Index, Mask, Words
 
 OK, UNCLEAR = "ok", ""
@@ -50,11 +47,8 @@ HOUR = 3600.0
 MET, FALSE, UNLABELLED = "met", "false", "unlabelled"
 """Kinds of findings: on a fault or failure, in `ok` time, and in unlabelled time."""
 
-Localise = Callable[[Recording, Labels], tuple[tuple[Event, ...], tuple[Event, ...]]]
-"""Gives the events of labels by their frames, and the same from onset to end."""
 
-
-class Lasting(Protocol):
+class Span(Protocol):
     """What has a start and a stop in [s]: a block, an event, a finding, a fault."""
 
     @property
@@ -69,7 +63,7 @@ class Lasting(Protocol):
 # --- spans
 
 
-def spans_of(items: Iterable[Lasting]) -> Array:
+def spans_of(items: Iterable[Span]) -> Array:
     """Spans of blocks, events or findings, as they come."""
     pairs = [(item.start, item.stop) for item in items]
     return np.array(pairs, dtype=np.float64).reshape(-1, 2)
@@ -112,8 +106,8 @@ def duration(spans: Array) -> float:
 
 
 def match(
-    found: Sequence[Lasting],
-    wanted: Sequence[Lasting],
+    found: Sequence[Span],
+    wanted: Sequence[Span],
     *,
     collar: float = COLLAR,
     same: Callable[[int, int], bool] | None = None,
@@ -133,8 +127,9 @@ def match(
     if same is not None:
         for row, column in np.argwhere(met):
             met[row, column] = same(int(row), int(column))
-    partner = _partners(met[None])[0]
-    return [(row, int(column)) for row, column in enumerate(partner) if column >= 0]
+    return [
+        (row, fault) for row, fault in enumerate(_partners(met[None])[0].tolist()) if fault >= 0
+    ]
 
 
 def meet(spans: Array, wanted: Array, collar: float = COLLAR) -> Mask:
@@ -203,30 +198,16 @@ def truth_of(start: Array, stop: Array, blocks: Iterable[Block], *, step: float)
     return np.where(in_ok, OK, failure)
 
 
-# --- predictions
+# --- what is matched
 
 
-@dataclass(frozen=True)
-class Origin:
-    """Where a recording comes from: its robot, domain and scenario."""
-
-    name: str
-    facts: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def robot(self) -> str:
-        """Its robot."""
-        return self.facts.get("robot") or robot_of(self.name) or UNNAMED
-
-    @property
-    def domain(self) -> str:
-        """Its domain: simulator, drives, sensing and control together."""
-        return self.facts.get("domain") or UNNAMED
-
-    @property
-    def scenario(self) -> str:
-        """Its scenario: the name of what was made to happen."""
-        return self.facts.get("scenario") or UNNAMED
+def origin_of(name: str, facts: Mapping[str, str]) -> dict[str, str]:
+    """Robot, domain (simulator, drives, sensing and control) and scenario of a recording."""
+    return {
+        "robot": facts.get("robot") or robot_of(name) or UNNAMED,
+        "domain": facts.get("domain") or UNNAMED,
+        "scenario": facts.get("scenario") or UNNAMED,
+    }
 
 
 @dataclass(frozen=True)
@@ -241,15 +222,13 @@ class Unanswered:
     """Why there is no verdict, in a few words."""
 
     @cached_property
-    def origin(self) -> Origin:
+    def origin(self) -> dict[str, str]:
         """Where it comes from."""
-        return Origin(self.name, self.facts)
+        return origin_of(self.name, self.facts)
 
     def as_dict(self) -> dict[str, str]:
         """All of it for JSON."""
-        origin = self.origin
-        own = {"robot": origin.robot, "domain": origin.domain, "scenario": origin.scenario}
-        return {"run": self.name, **own, "reason": self.reason}
+        return {"run": self.name, **self.origin, "reason": self.reason}
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +237,7 @@ class Predictions:
 
     Attributes:
         name: Of the recording.
-        group: Of the recording, as `splitting.group_of` names it.
+        group: Of the recording, as `recording.group_of` names it.
         step: Time from one sample to the next, in [s].
         blocks: Annotations, in order; each ends with the recording at the latest.
         truth: Class of each frame that is cut from a block, shape (frames,).
@@ -281,9 +260,9 @@ class Predictions:
     located: tuple[tuple[Event, ...], tuple[Event, ...]] | None = None
 
     @cached_property
-    def origin(self) -> Origin:
-        """Where it comes from."""
-        return Origin(self.name, self.facts)
+    def origin(self) -> dict[str, str]:
+        """Where the recording comes from."""
+        return origin_of(self.name, self.facts)
 
     @cached_property
     def spans(self) -> tuple[Event, ...]:
@@ -299,45 +278,6 @@ class Predictions:
     def whole_truth(self) -> Words:
         """True class of each frame of the whole recording, `UNCLEAR` where not annotated."""
         return truth_of(self.labels.start, self.labels.stop, self.blocks, step=self.step)
-
-    def with_frames(self) -> "Predictions":
-        """The same, with the frames of the whole recording whose class is known, not of blocks."""
-        known = self.whole_truth != UNCLEAR
-        return replace(self, truth=self.whole_truth[known], predicted=self.labels.label[known])
-
-
-def predict(
-    classifier: Classifier, recording: Recording, localise: Localise | None = None
-) -> Predictions:
-    """Predictions of a model on a recording, on its annotated blocks and from end to end.
-
-    A recording whose blocks all lie in gaps has no frame of a block. For a baseline, which names no
-    failure, each failure is an anomaly.
-
-    Args:
-        localise: Estimates onset and end of the findings; else they last as their frames do.
-    """
-    try:
-        # Frames that are cut from blocks, as the paper does for validation.
-        dataset = Dataset.of([recording], classifier.profile, training=False)
-        truth, predicted = dataset.labels, classifier.predict(dataset.frames)
-    except DatasetError:  # no frame without a gap
-        truth = predicted = np.array([], dtype=str)
-    labels = classifier.classify(
-        recording.signal, recording.rate, start=recording.start, valid=recording.valid
-    )
-    return Predictions(
-        recording.name,
-        group_of(recording.name),
-        1.0 / recording.rate,
-        within(recording),
-        truth,
-        predicted,
-        labels,
-        recording.events,
-        recording.facts,
-        localise(recording, labels) if localise and len(labels) else None,
-    )
 
 
 def within(recording: Recording) -> tuple[Block, ...]:
@@ -430,17 +370,14 @@ def confirmed_at(labels: Labels) -> Index:
     A live listener knows of a stretch once it has enough frames of evidence, as `labels`
     counts them. What is given for frames that are not flagged has no meaning.
     """
-    flagged, frames = labels.flagged, np.arange(len(labels))
-    if labels.above_threshold is None:
+    frames = np.arange(len(labels))
+    if labels.above_threshold is None or not len(frames):
         return frames
-    evidence = flagged & (labels.above_threshold | (labels.label == UNKNOWN))
-    apart = labels.start[1:] > labels.stop[:-1]
-    first, last = np.append(True, apart)[: len(frames)], np.append(apart, True)[: len(frames)]
-    begins = flagged & (first | ~np.append(False, flagged)[: len(frames)])
-    total = np.cumsum(np.where(first | last, 2, 1) * evidence)
-    own = frames[np.maximum.accumulate(np.where(begins, frames, 0))] if len(frames) else frames
-    before = np.append(0, total)[own]
-    place: Index = np.searchsorted(total, before + CONFIRM)
+    begins, weight = sides(labels.flagged, labels.apart)
+    evidence = labels.flagged & (labels.above_threshold | (labels.label == UNKNOWN))
+    total = np.cumsum(weight * evidence)
+    own = np.maximum.accumulate(np.where(begins, frames, 0))
+    place: Index = np.searchsorted(total, np.append(0, total)[own] + CONFIRM)
     return np.minimum(place, len(frames) - 1)
 
 
@@ -451,22 +388,18 @@ def run_score(labels: Labels) -> float:
     from frames to findings.
     """
     if not len(labels):
-        return float("nan")
+        return nan
     scores = failure_score(labels.scores, labels.classes)
     if labels.above_threshold is None:
         return float(scores.max())
-    apart = labels.start[1:] > labels.stop[:-1]
+    apart = labels.apart
     alone = np.append(True, apart) | np.append(apart, True)
     pairs = np.minimum(scores[1:], scores[:-1])[~apart]
     return float(np.concatenate((scores[alone], pairs)).max())
 
 
 def failure_score(scores: Array, classes: Sequence[str]) -> Array:
-    """Score of any failure: 1 - P(ok), or the largest score of a failure less that of `ok`.
-
-    Args:
-        scores: Of all classes, shape (frames, classes).
-    """
+    """Score of any failure: 1 - P(ok), or the largest score of a failure less that of `ok`."""
     ok = list(classes).index(OK)
     if are_probabilities(scores):
         return 1.0 - scores[:, ok]

@@ -1,42 +1,61 @@
-"""Measures of a model on recordings: its findings as they are reported, and its frames.
+"""Measures of a model: its frames, its findings as they are reported, and intervals of both.
 
-All figures of the protocol are of one operating point: the findings as they are reported. Nothing
-is chosen on the runs that are measured. `matching` defines the terms; `docs/metrics.md` has all
-measures, each with its source. A measure of a model is the unweighted mean over robots, so that
-neither the robot with most runs nor that with most time decides. Medians of delays are averaged
-likewise.
+**Frames.** `Evaluation` has the paper's measures, and recall and precision. A frame's *confidence*
+is the probability of the class that the model predicts. The expected calibration error is the mean
+distance of confidence and share of right predictions in ten bins of confidence, weighted by the
+bin's frames (Naeini et al., 2015). It is defined for probabilities alone, not for votes and
+margins.
 
-Runs are ranked as task 2 of the DCASE challenge does: by AUC, and by partial AUC up to a false
-positive rate of 0.1, standardised as McClish does (Analyzing a portion of the ROC curve, Medical
-Decision Making 9, 1989); the harmonic mean of both over all domains is its official score (Dohi et
-al., DCASE 2022).
+**Findings.** All figures of the protocol are of one operating point: the findings as they are
+reported. Nothing is chosen on the runs that are measured. `matching` defines the terms;
+`docs/metrics.md` has all measures, each with its source. A measure of a model is the unweighted
+mean over robots, so that neither the robot with most runs nor that with most time decides. Medians
+of delays are averaged likewise. Runs are ranked as task 2 of the DCASE challenge does: by AUC, and
+by partial AUC up to a false positive rate of 0.1, standardised as McClish does (Analyzing a portion
+of the ROC curve, Medical Decision Making 9, 1989); the harmonic mean of both over all domains is
+its official score (Dohi et al., DCASE 2022).
 
-A frame's *confidence* is the probability of the class that the model predicts. The expected
-calibration error is the mean distance of confidence and share of right predictions in ten bins of
-confidence, weighted by the bin's frames (Naeini et al., 2015). It is defined for probabilities
-alone, not for votes and margins.
+**Intervals.** Frames of a recording and recordings of a group (`recording.group_of`) resemble each
+other, so that only groups are drawn: of 2000 sets of as many groups, drawn with replacement, the
+bounds hold the middle 95 % (percentile bootstrap). With few errors the sets hardly differ, and
+bounds that follow from counting take over:
+
+- *shares*: n recordings without an error are consistent with a share of 0.025^(1/n), so that no
+  interval ends closer to 1, nor closer to 0 than 1 - 0.025^(1/n) (Clopper and Pearson, 1934);
+- *events in a time*: the exact bounds of Garwood (1936), if they are wider; for 0 events the upper
+  one is 3.7 over the time, and 3.0 with 95 % on this one side (the "rule of three").
+
+The mean of rates has the bounds of Fay and Feuer (Confidence intervals for directly standardized
+rates, Statistics in Medicine 16, 1997), if they are wider. With fewer than five groups, shares have
+no interval.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from math import isnan, nan
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from noiseclassifier.confusion import Evaluation, ratio
-from noiseclassifier.evaluation.intervals import Estimate, Resampling
+from noiseclassifier.errors import DatasetError
 from noiseclassifier.evaluation.matching import (
     FALSE,
     OK,
     UNCLEAR,
     UNLABELLED,
-    Origin,
     Outcome,
     Predictions,
     Unanswered,
     are_probabilities,
 )
-from noiseclassifier.types import Array, Index, Mask
+from noiseclassifier.types import Array, Index, Mask, Words
+
+RESAMPLES = 2000
+SEED = 0
+TAIL = 0.025
+"""Probability beyond each bound."""
+LEAST_GROUPS = 5
 
 RATES = {
     "false_alarms_per_hour": ("false_alarms", "ok_hours"),
@@ -62,11 +81,7 @@ MATCHES = frozenset(("found", "found_felt", "onset_close", "matched_by_class", "
 BY_CHANCE = tuple(name for name, (part, _) in SHARES.items() if part in MATCHES)
 DELAYS = {"delay": 0.5, "late_delay": 0.9}
 """Quantiles of the delays, by name."""
-KEYS: dict[str, Callable[[Origin], str]] = {
-    "robot": lambda origin: origin.robot,
-    "domain": lambda origin: origin.domain,
-    "scenario": lambda origin: origin.scenario,
-}
+KEYS = ("robot", "domain", "scenario")
 """What runs can be grouped by."""
 WORST = 5
 """How many of the worst are listed."""
@@ -74,159 +89,406 @@ MOST = 0.1
 """False positive rate up to which the partial AUC counts."""
 BINS = 10
 """Bins of confidence."""
+BY_CLASS = ("recall", "precision", "false_negative_errors", "false_positive_errors")
+"""Measures of frames that each class has."""
+OF_ALL = (
+    "balanced_accuracy",
+    "failure_recall",
+    "false_alarm_rate",
+    "failure_detection_rate",
+    "subset_accuracy",
+)
+"""Measures of frames of all classes."""
 
 
-# --- frames of annotated blocks
+def ratio(part: Array | np.float64 | float, whole: Array | np.float64 | float) -> Array:
+    """Quotient, NaN where the denominator is 0."""
+    part, whole = np.broadcast_arrays(np.asarray(part, float), np.asarray(whole, float))
+    share: Array = np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
+    return share[()]
+
+
+def plain(value: Any) -> Any:
+    """Numbers for JSON, None where undefined; of a mapping or a list, each of its values."""
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [plain(each) for each in value]
+    return None if isinstance(value, float) and isnan(value) else value
+
+
+# --- frames
 
 
 @dataclass(frozen=True, eq=False)
-class FrameScore:
-    """How a model does by frames that are cut from annotated blocks.
+class Evaluation:
+    """Confusion matrix of frames, or several, and measures of it: shares from 0 to 1.
 
     Attributes:
-        evaluation: All frames together.
-        recall: Of each class.
-        precision: Of each class.
-        balanced_accuracy: Mean recall of the classes that occur.
-        failure_recall: Failure frames that are not predicted as `ok`, of the failure frames.
-        false_alarm_rate: `ok` frames that are not predicted as `ok`, of the `ok` frames.
-        false_negative_errors: Of each class, as the paper counts them, of ALL frames.
-        false_positive_errors: Of each class, as the paper counts them, of ALL frames.
-        failure_detection_rate: The paper's: 1 less the false positive errors of `ok`.
-        subset_accuracy: Frames with the right prediction, of all frames.
+        classes: Names of the classes.
+        confusion: Frames by true (row) and predicted class (column), shape (..., classes, classes).
     """
 
-    evaluation: Evaluation
-    recall: dict[str, Estimate]
-    precision: dict[str, Estimate]
-    balanced_accuracy: Estimate
-    failure_recall: Estimate
-    false_alarm_rate: Estimate
-    false_negative_errors: dict[str, Estimate]
-    false_positive_errors: dict[str, Estimate]
-    failure_detection_rate: Estimate
-    subset_accuracy: Estimate
+    classes: tuple[str, ...]
+    confusion: NDArray[Any]
 
     @classmethod
-    def of(cls, predictions: Sequence[Predictions], resampling: Resampling) -> "FrameScore":
-        """Measures of the frames of recordings, one frame or more."""
-        evaluation = Evaluation.of(
-            np.concatenate([one.truth for one in predictions]),
-            np.concatenate([one.predicted for one in predictions]),
-            predictions[0].labels.classes,
-        )
-        names = evaluation.classes
-        counts = np.zeros((len(predictions), len(names), len(names)))
-        for number, one in enumerate(predictions):
-            if len(one.truth):
-                counts[number] = Evaluation.of(one.truth, one.predicted, names).confusion
-        truth, predicted = np.indices((len(names), len(names)))
-        right, all_frames = truth == predicted, np.ones(truth.shape, dtype=bool)
-        ok, predicted_ok = truth == names.index(OK), predicted == names.index(OK)
+    def of(cls, truth: Words, predicted: Words, classes: Sequence[str]) -> Self:
+        """Confusion matrix of predictions.
 
-        def share(part: Mask, whole: Mask) -> Estimate:
-            return resampling.share(counts[:, part].sum(axis=1), counts[:, whole].sum(axis=1))
+        Args:
+            truth: True class of each frame, shape (frames,).
+            predicted: Predicted class of each frame, shape (frames,).
+            classes: Names of the classes, in their order; others that occur come after them.
 
-        def each(of: Index, part: Mask, whole: Mask | None = None) -> dict[str, Estimate]:
-            return {
-                name: share(part & (of == number), of == number if whole is None else whole)
-                for number, name in enumerate(names)
-            }
+        Raises:
+            DatasetError: If there are no frames, or the lengths differ.
+        """
+        if len(truth) != len(predicted) or not len(truth):
+            raise DatasetError(
+                f"{len(truth)} labels and {len(predicted)} predictions, expected as many,"
+                " one or more"
+            )
+        there = {str(each) for each in (*truth, *predicted)}
+        names = (*classes, *sorted(there - set(classes)))
+        from sklearn.metrics import confusion_matrix
 
-        hits, frames = np.diagonal(counts, axis1=1, axis2=2), counts.sum(axis=2)
-        there = np.flatnonzero(frames.sum(axis=0))
-        # A set without a frame of some class gives no recall of it.
-        drawn = ratio(resampling.weights @ hits, resampling.weights @ frames)[:, there]
-        return cls(
-            evaluation,
-            recall=each(truth, right),
-            precision=each(predicted, right),
-            balanced_accuracy=resampling.bounded(
-                evaluation.balanced_accuracy,
-                drawn.mean(axis=1),
-                [frames[:, number] > 0 for number in there],
-            ),
-            failure_recall=share(~ok & ~predicted_ok, ~ok),
-            false_alarm_rate=share(ok & ~predicted_ok, ok),
-            false_negative_errors=each(truth, ~right, all_frames),
-            false_positive_errors=each(predicted, ~right, all_frames),
-            failure_detection_rate=share(~(predicted_ok & ~right), all_frames),
-            subset_accuracy=share(right, all_frames),
-        )
+        return cls(names, confusion_matrix(truth, predicted, labels=list(names)))
+
+    @property
+    def frames(self) -> Any:
+        """How many frames were compared, shape (...)."""
+        return self.confusion.sum(axis=(-2, -1))
+
+    @property
+    def recall(self) -> Array:
+        """Frames of a class that were predicted as it, of its frames, shape (..., classes)."""
+        return ratio(self._right, self.confusion.sum(axis=-1))
+
+    @property
+    def precision(self) -> Array:
+        """Frames of a class, of those that were predicted as it, shape (..., classes)."""
+        return ratio(self._right, self.confusion.sum(axis=-2))
+
+    @property
+    def false_negative_errors(self) -> Array:
+        """Frames of a class predicted as another, of ALL frames, shape (..., classes)."""
+        return ratio(self.confusion.sum(axis=-1) - self._right, self.frames[..., None])
+
+    @property
+    def false_positive_errors(self) -> Array:
+        """Frames of others predicted as the class, of ALL frames, shape (..., classes)."""
+        return ratio(self.confusion.sum(axis=-2) - self._right, self.frames[..., None])
+
+    @property
+    def failure_detection_rate(self) -> Array:
+        """The paper's: 1 less the false positive errors of `ok`."""
+        mistaken = self.confusion[..., self._ok].sum(axis=(-2, -1))
+        right = self._right[..., self._ok].sum(axis=-1)
+        return ratio(self.frames - mistaken + right, self.frames)
+
+    @property
+    def subset_accuracy(self) -> Array:
+        """Frames with the right prediction, of all frames."""
+        return ratio(self._right.sum(axis=-1), self.frames)
+
+    @property
+    def balanced_accuracy(self) -> Array:
+        """Mean recall of the classes that occur."""
+        return np.asarray(np.nanmean(self.recall, axis=-1))[()]
+
+    @property
+    def failure_recall(self) -> Array:
+        """Failure frames that were not predicted as `ok`, of the failure frames."""
+        failures = self.confusion[..., ~self._ok, :]
+        return ratio(failures[..., ~self._ok].sum(axis=(-2, -1)), failures.sum(axis=(-2, -1)))
+
+    @property
+    def false_alarm_rate(self) -> Array:
+        """`ok` frames that were not predicted as `ok`, of the `ok` frames."""
+        ok = self.confusion[..., self._ok, :]
+        return ratio(ok[..., ~self._ok].sum(axis=(-2, -1)), ok.sum(axis=(-2, -1)))
 
     def as_dict(self) -> dict[str, Any]:
-        """Give all measures as JSON can hold them."""
-        found: dict[str, Any] = {"frames": self.evaluation.frames}
-        for name, value in vars(self).items():
-            if isinstance(value, Estimate):
-                found[name] = value.as_dict()
-            elif isinstance(value, dict):
-                found[name] = {label: each.as_dict() for label, each in value.items()}
-        return found
+        """All measures for JSON, None where undefined."""
+        by_class = {
+            name: dict(zip(self.classes, getattr(self, name).tolist(), strict=True))
+            for name in BY_CLASS
+        }
+        return {
+            "frames": int(self.frames),
+            "classes": list(self.classes),
+            "confusion": self.confusion.tolist(),
+            **plain(by_class),
+            **plain({name: float(getattr(self, name)) for name in OF_ALL}),
+        }
+
+    def __str__(self) -> str:
+        ok = self.confusion[self._ok].sum() / self.frames
+        width = max(26, *(len(name) + 2 for name in self.classes))
+
+        def line(title: str, cells: Sequence[object]) -> str:
+            return title.ljust(width) + "".join(str(cell).rjust(19) for cell in cells)
+
+        def shares(name: str) -> str:
+            values = np.atleast_1d(getattr(self, name)).tolist()
+            title = name.replace("_", " ").capitalize()
+            return line(title, ["-" if isnan(value) else f"{value:.1%}" for value in values])
+
+        rows = zip(self.classes, self.confusion.tolist(), strict=True)
+        return "\n".join(
+            [
+                line(f"{self.frames} frames", self.classes),
+                "",
+                "As the paper measures",
+                *map(shares, (*BY_CLASS[2:], *OF_ALL[3:])),
+                "",
+                "Of the frames in question",
+                *map(shares, (*BY_CLASS[:2], *OF_ALL[:3])),
+                "",
+                "Frames of (row) predicted (column)",
+                *(line(name, row) for name, row in rows),
+                "",
+                f"The paper divides by all frames: predicting ok for all of them would detect"
+                f" {ok:.1%} of failures by its measure, and none by failure recall.",
+            ]
+        )
+
+    @property
+    def _right(self) -> NDArray[Any]:
+        return np.diagonal(self.confusion, axis1=-2, axis2=-1)
+
+    @property
+    def _ok(self) -> Mask:
+        return np.array([name == OK for name in self.classes])
 
 
-# --- calibration
+# --- intervals
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A measure, its bounds, and the size of its sample; NaN where undefined."""
+
+    value: float
+    """The measure."""
+    low: float
+    """Lower bound with 95 %."""
+    high: float
+    """Upper bound with 95 %."""
+    runs: int
+    """Recordings in the sample."""
+    groups: int
+    """Groups of recordings that share their motion, in the sample."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """All fields for JSON, None where undefined."""
+        return dict(plain(vars(self)))
 
 
 @dataclass(frozen=True, eq=False)
-class Reliability:
-    """Sums over the frames of each recording and bin of confidence.
+class Resampling:
+    """Sets of groups, drawn once for all measures.
 
     Attributes:
-        frames: How many, shape (runs, bins).
-        confidence: Sum of their confidences, shape (runs, bins).
-        right: How many predictions are right, shape (runs, bins).
+        group: Group of each recording, as a number, shape (runs,).
+        weights: How often each set has each recording, shape (resamples, runs).
     """
 
-    frames: Array
-    confidence: Array
-    right: Array
+    group: Index
+    weights: Array
 
     @classmethod
-    def of(cls, predictions: Sequence[Predictions]) -> "Reliability | None":
-        """Sums over all frames with a true class; None if the scores are no probabilities."""
-        if not all(are_probabilities(one.labels.scores) for one in predictions):
-            return None
-        sums = np.zeros((3, len(predictions), BINS))
-        for number, one in enumerate(predictions):
-            labels = one.labels
-            column = {name: place for place, name in enumerate(labels.classes)}
-            # A label that is no class, say "unknown", has no probability: it does not count.
-            place = np.array([column.get(str(name), -1) for name in labels.debounced], np.intp)
-            kept = np.flatnonzero((one.whole_truth != UNCLEAR) & (place >= 0))
-            confidence = labels.scores[kept, place[kept]]
-            cell = np.minimum((confidence * BINS).astype(np.intp), BINS - 1)
-            right = labels.debounced[kept] == one.whole_truth[kept]
-            for total, weights in zip(sums[:, number], (None, confidence, right), strict=True):
-                total += np.bincount(cell, weights, minlength=BINS)
-        return cls(*sums)
+    def of(cls, groups: Sequence[str]) -> Self:
+        """Draw the sets."""
+        names, group = np.unique(np.asarray(groups, dtype=str), return_inverse=True)
+        random = np.random.default_rng(SEED)
+        drawn = random.multinomial(len(names), np.full(len(names), 1 / len(names)), RESAMPLES)
+        return cls(group, drawn[:, group].astype(np.float64))
 
-    def table(self) -> dict[str, Array]:
-        """Table of the bins, over all recordings.
+    def mean_share(self, part: Array, whole: Array, of: Sequence[Mask]) -> Estimate:
+        """Estimate the unweighted mean of the shares of several sets of recordings."""
+        behind = [own & (whole > 0) for own in of if (whole * own).sum() > 0]
+        if not behind:
+            return Estimate(nan, nan, nan, 0, 0)
+        value, drawn = self._mean(part, whole, behind)
+        return self.bounded(value, drawn, behind)
 
-        Returns:
-            By name: ``low`` and ``high`` edge, ``frames``, mean ``confidence`` and share
-            ``right``, each of shape (bins,), NaN in empty bins.
+    def mean_rate(self, events: Array, time: Array, of: Sequence[Mask]) -> Estimate:
+        """Estimate the unweighted mean of the rates of several sets of recordings."""
+        behind = [own & (time > 0) for own in of if (time * own).sum() > 0]
+        if not behind:
+            return Estimate(nan, nan, nan, 0, 0)
+        value, drawn = self._mean(events, time, behind)
+        weights = np.array([1.0 / (len(behind) * time[own].sum()) for own in behind])
+        low, high = fay_feuer(np.array([events[own].sum() for own in behind]), weights)
+        runs, groups = self._behind(np.any(behind, axis=0))
+        if groups >= LEAST_GROUPS:
+            middle = _middle(drawn)
+            low, high = min(low, middle[0]), max(high, middle[1])
+        return Estimate(value, low, high, runs, groups)
+
+    def _mean(self, part: Array, whole: Array, of: Sequence[Mask]) -> tuple[float, Array]:
+        """Mean ratio of sets of recordings, and that of each resample, shape (resamples,)."""
+        value = np.mean([part[own].sum() / whole[own].sum() for own in of])
+        shares = [ratio(self.weights @ (part * own), self.weights @ (whole * own)) for own in of]
+        each = np.array(shares)
+        known = ~np.isnan(each)
+        return float(value), ratio(np.where(known, each, 0.0).sum(axis=0), known.sum(axis=0))
+
+    def bounded(self, value: float, drawn: Array, behind: Sequence[Mask]) -> Estimate:
+        """Bounds of a mean of shares of runs.
+
+        Args:
+            drawn: The mean of each set of groups, shape (resamples,).
+            behind: For each share, the runs that it is of, shape (runs,).
         """
-        edges, count = np.linspace(0.0, 1.0, BINS + 1), self.frames.sum(axis=0)
-        return {
-            "low": edges[:-1],
-            "high": edges[1:],
-            "frames": count,
-            "confidence": ratio(self.confidence.sum(axis=0), count),
-            "right": ratio(self.right.sum(axis=0), count),
-        }
+        runs = int(np.any(behind, axis=0).sum())
+        groups = min(self._behind(mask)[1] for mask in behind)
+        if groups < LEAST_GROUPS:
+            return Estimate(value, nan, nan, runs, groups)
+        # The mean of the shares' own bounds lies further out than the bound of their mean.
+        room = float(np.mean([TAIL ** (1.0 / mask.sum()) for mask in behind]))
+        low, high = _middle(drawn)
+        return Estimate(value, min(low, room), max(high, 1.0 - room), runs, groups)
 
-    def error(self, resampling: Resampling) -> Estimate:
-        """Estimate the expected calibration error."""
+    def unbounded(self, value: float, drawn: Array, behind: Mask) -> Estimate:
+        """Bounds of any other measure of some runs, by the sets of groups alone."""
+        runs, groups = self._behind(behind)
+        low, high = _middle(drawn) if groups >= LEAST_GROUPS else (nan, nan)
+        return Estimate(value, low, high, runs, groups)
+
+    def quantile(self, values: Array, owner: Index, share: float) -> Estimate:
+        """Estimate a quantile of values, shape (values,), that belong to recordings."""
+        ascending = np.argsort(values, kind="stable")
+        values, owner = values[ascending], owner[ascending]
+        behind = np.bincount(owner, minlength=self.weights.shape[1]) > 0
 
         def of_sets(weights: Array) -> Array:
-            # sum_b n_b / n |right_b / n_b - confidence_b / n_b|
-            apart = np.abs(weights @ (self.right - self.confidence)).sum(axis=1)
-            return ratio(apart, (weights @ self.frames).sum(axis=1))
+            total = np.cumsum(weights[:, owner], axis=1)
+            if not len(values):
+                return np.full(len(weights), np.nan)
+            place = (total < share * total[:, -1:]).sum(axis=1)
+            return np.where(total[:, -1] > 0, values[np.minimum(place, len(values) - 1)], np.nan)
 
-        value = float(of_sets(np.ones((1, len(self.frames))))[0])
-        return resampling.plain(value, of_sets(resampling.weights), self.frames.sum(axis=1) > 0)
+        once = np.ones((1, len(behind)))
+        return self.unbounded(float(of_sets(once)[0]), of_sets(self.weights), behind)
+
+    def _behind(self, mask: Mask) -> tuple[int, int]:
+        return int(mask.sum()), len(np.unique(self.group[mask]))
+
+
+def garwood(events: float) -> tuple[float, float]:
+    """Exact bounds of the mean of a Poisson distribution."""
+    from scipy.special import gammaincinv
+
+    # F. Garwood, Fiducial limits for the Poisson distribution, Biometrika 28 (1936)
+    low = float(gammaincinv(events, TAIL)) if events else 0.0
+    return low, float(gammaincinv(events + 1.0, 1.0 - TAIL))
+
+
+def fay_feuer(events: Array, weights: Array) -> tuple[float, float]:
+    """Bounds of a weighted sum of the means of Poisson distributions."""
+    from scipy.special import gammaincinv
+
+    total, variance, most = weights @ events, weights**2 @ events, weights.max()
+    low = variance / total * gammaincinv(total**2 / variance, TAIL) if total else 0.0
+    total, variance = total + most, variance + most**2
+    high = variance / total * gammaincinv(total**2 / variance, 1.0 - TAIL)
+    return float(low), float(high)
+
+
+def _middle(drawn: Array) -> tuple[float, float]:
+    known = drawn[~np.isnan(drawn)]
+    if not len(known):
+        return nan, nan
+    low, high = np.quantile(known, (TAIL, 1.0 - TAIL)).tolist()
+    return low, high
+
+
+def frame_estimates(
+    predictions: Sequence[Predictions], resampling: Resampling
+) -> tuple[Evaluation, dict[str, Any]]:
+    """Evaluation of the frames of recordings, one frame or more, and its measures with intervals.
+
+    Returns:
+        The evaluation of all frames, and by its names the estimates of its measures, by class for
+        those that each class has.
+    """
+    evaluation = Evaluation.of(
+        np.concatenate([one.truth for one in predictions]),
+        np.concatenate([one.predicted for one in predictions]),
+        predictions[0].labels.classes,
+    )
+    names = evaluation.classes
+    counts = np.zeros((len(predictions), len(names), len(names)))
+    for number, one in enumerate(predictions):
+        if len(one.truth):
+            counts[number] = Evaluation.of(one.truth, one.predicted, names).confusion
+    of_runs = Evaluation(names, counts)
+    of_sets = Evaluation(names, np.tensordot(resampling.weights, counts, 1))
+
+    def estimated(name: str, *place: int) -> Estimate:
+        value, drawn, known = (
+            getattr(each, name)[(..., *place)] for each in (evaluation, of_sets, of_runs)
+        )
+        return resampling.bounded(float(value), drawn, [~np.isnan(known)])
+
+    found: dict[str, Any] = {name: estimated(name) for name in OF_ALL[1:]}
+    for name in BY_CLASS:
+        found[name] = {label: estimated(name, number) for number, label in enumerate(names)}
+    frames = counts.sum(axis=2)
+    there = np.flatnonzero(frames.sum(axis=0))
+    found["balanced_accuracy"] = resampling.bounded(
+        float(evaluation.balanced_accuracy),
+        of_sets.recall[:, there].mean(axis=1),  # a set without a frame of some class has none
+        [frames[:, number] > 0 for number in there],
+    )
+    return evaluation, found
+
+
+def calibration(
+    predictions: Sequence[Predictions], resampling: Resampling
+) -> tuple[dict[str, Array], Estimate] | None:
+    """Confidence beside truth in bins, and the expected calibration error.
+
+    Returns:
+        By name: ``low`` and ``high`` edge of the bins, ``frames``, mean ``confidence`` and share
+        ``right``, each of shape (bins,), NaN in empty bins; and the error. None if the scores are
+        no probabilities.
+    """
+    if not all(are_probabilities(one.labels.scores) for one in predictions):
+        return None
+    sums = np.zeros((3, len(predictions), BINS))
+    for number, one in enumerate(predictions):
+        labels = one.labels
+        column = {name: place for place, name in enumerate(labels.classes)}
+        # A label that is no class, say "unknown", has no probability: it does not count.
+        place = np.array([column.get(str(name), -1) for name in labels.debounced], np.intp)
+        kept = np.flatnonzero((one.whole_truth != UNCLEAR) & (place >= 0))
+        confidence = labels.scores[kept, place[kept]]
+        cell = np.minimum((confidence * BINS).astype(np.intp), BINS - 1)
+        right = labels.debounced[kept] == one.whole_truth[kept]
+        for total, weights in zip(sums[:, number], (None, confidence, right), strict=True):
+            total += np.bincount(cell, weights, minlength=BINS)
+    frames, confidence, right = sums
+
+    def of_sets(weights: Array) -> Array:
+        # sum_b n_b / n |right_b / n_b - confidence_b / n_b|
+        apart = np.abs(weights @ (right - confidence)).sum(axis=1)
+        return ratio(apart, (weights @ frames).sum(axis=1))
+
+    value = float(of_sets(np.ones((1, len(frames))))[0])
+    error = resampling.unbounded(value, of_sets(resampling.weights), frames.sum(axis=1) > 0)
+    edges, count = np.linspace(0.0, 1.0, BINS + 1), frames.sum(axis=0)
+    table = {
+        "low": edges[:-1],
+        "high": edges[1:],
+        "frames": count,
+        "confidence": ratio(confidence.sum(axis=0), count),
+        "right": ratio(right.sum(axis=0), count),
+    }
+    return table, error
 
 
 # --- the protocol
@@ -253,8 +515,8 @@ class Part:
         return {
             "unanswered": self.unanswered,
             "counts": self.counts,
-            "measures": _plain(self.measures),
-            "by_chance": _plain(self.by_chance),
+            "measures": plain(self.measures),
+            "by_chance": plain(self.by_chance),
         }
 
 
@@ -310,8 +572,8 @@ class Protocol:
         origins = [outcome.run.origin for outcome in outcomes]
 
         def parts(*keys: str) -> dict[Any, Part]:
-            def key(origin: Origin) -> Any:
-                names = tuple(KEYS[name](origin) for name in keys)
+            def key(origin: dict[str, str]) -> Any:
+                names = tuple(origin[name] for name in keys)
                 return names if len(names) > 1 else names[0]
 
             mine, others = [key(each) for each in origins], [key(u.origin) for u in unanswered]
@@ -323,7 +585,7 @@ class Protocol:
             }
 
         by = {key: parts(key) for key in KEYS}
-        robots = np.array([origin.robot for origin in origins])
+        robots = np.array([origin["robot"] for origin in origins])
         sets = [robots == robot for robot in np.unique(robots)]
         every = np.ones(len(outcomes), dtype=bool)
         alike, pooled = (_estimates(counts, resampling, chosen) for chosen in (sets, [every]))
@@ -333,7 +595,7 @@ class Protocol:
             value = _mean([each.measures[name] for each in by["robot"].values()])
             alike[name] = Estimate(value, np.nan, np.nan, pooled[name].runs, pooled[name].groups)
         of_robots = by["robot"].values()
-        domains = sorted({origin.domain for origin in origins})
+        domains = sorted({origin["domain"] for origin in origins})
         return cls(
             outcomes,
             tuple(unanswered),
@@ -345,7 +607,7 @@ class Protocol:
             parts("robot", "domain"),
             parts("robot", "scenario"),
             {
-                name: _ranked([o for o in outcomes if o.run.origin.domain == name])
+                name: _ranked([o for o in outcomes if o.run.origin["domain"] == name])
                 for name in domains
             },
         )
@@ -411,11 +673,11 @@ class Protocol:
         return {
             "robots_alike": {name: each.as_dict() for name, each in self.alike.items()},
             "pooled": {name: each.as_dict() for name, each in self.pooled.items()},
-            "by_chance": _plain(self.by_chance),
+            "by_chance": plain(self.by_chance),
             "counts": self.counts,
             "not_answered": self.not_answered,
-            **_plain(ranking),
-            "ranking_by_domain": {name: _plain(vars(each)) for name, each in self.ranked.items()},
+            **plain(ranking),
+            "ranking_by_domain": {name: plain(vars(each)) for name, each in self.ranked.items()},
             **{
                 f"by_{key}": {name: part.as_dict() for name, part in parts.items()}
                 for key, parts in self.by.items()
@@ -452,11 +714,6 @@ def harmonic_mean(values: Sequence[float]) -> float:
     if not len(known):
         return float("nan")
     return float(len(known) / (1.0 / known).sum()) if known.all() else 0.0
-
-
-def _plain(values: Mapping[str, Any]) -> dict[str, float | None]:
-    """Numbers for JSON, None where undefined."""
-    return {name: None if np.isnan(value) else value for name, value in values.items()}
 
 
 def _totals(counts: dict[str, Array], own: Mask) -> dict[str, float]:
