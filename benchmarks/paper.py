@@ -32,8 +32,8 @@ import numpy as np
 
 import noiseclassifier as nc
 from inspector.train import PARTS, classified, of_run, train
-from noiseclassifier.evaluation.assessment import measure, number, percent, predict
-from noiseclassifier.evaluation.matching import Predictions
+from noiseclassifier.assessment import measure, number, percent, predict
+from noiseclassifier.matching import Predictions
 from noiseclassifier.scenarios.robots import limbs
 from noisemodel import Run
 from noisemodel.parallel import DIED, in_order

@@ -27,7 +27,7 @@ from noisemodel.files import also_reading, refuse_existing, replacing
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from noiseclassifier.evaluation.measures import Estimate
+    from noiseclassifier.measures import Estimate
 
 
 SIMULATORS = {"mujoco", "pinocchio", "drake", "pybullet", "dm-control"}

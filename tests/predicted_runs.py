@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from noiseclassifier.evaluation.matching import Predictions
 from noiseclassifier.labels import Labels
+from noiseclassifier.matching import Predictions
 from noiseclassifier.recording import Block, group_of
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")

@@ -9,7 +9,7 @@ from commandline import call
 from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
 
 from inspector import train
-from noiseclassifier.evaluation.assessment import measure
+from noiseclassifier.assessment import measure
 from noiseclassifier.recording import group_of
 
 

@@ -16,15 +16,15 @@ from predicted_runs import (
 )
 
 import noiseclassifier as nc
-from noiseclassifier.evaluation.assessment import measure, table
-from noiseclassifier.evaluation.matching import Unanswered, are_probabilities, failure_score
-from noiseclassifier.evaluation.measures import (
+from noiseclassifier.assessment import measure, table
+from noiseclassifier.labels import Event
+from noiseclassifier.matching import Unanswered, are_probabilities, failure_score
+from noiseclassifier.measures import (
     BY_CLASS,
     OF_ALL,
     Resampling,
     calibration,
 )
-from noiseclassifier.labels import Event
 from noiseclassifier.recording import Fault
 
 RATE = 1000.0

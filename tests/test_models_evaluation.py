@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.evaluation.measures import Evaluation
+from noiseclassifier.measures import Evaluation
 
 TRUTH = np.array(["ok"] * 6 + ["impact"] * 2 + ["oscillations"] * 2)
 CLASSES = ("ok", "impact", "oscillations")

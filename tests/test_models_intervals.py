@@ -3,7 +3,7 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
-from noiseclassifier.evaluation.measures import Resampling, garwood
+from noiseclassifier.measures import Resampling, garwood
 
 
 def each_its_own(runs):

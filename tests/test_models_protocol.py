@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, predicted
 
-from noiseclassifier import match
-from noiseclassifier.evaluation import measures
-from noiseclassifier.evaluation.assessment import protocol_lines as lines_of
-from noiseclassifier.evaluation.matching import (
+from noiseclassifier import match, measures
+from noiseclassifier.assessment import protocol_lines as lines_of
+from noiseclassifier.labels import Event, Labels
+from noiseclassifier.matching import (
     SHIFTS,
     Outcome,
     Unanswered,
@@ -23,7 +23,7 @@ from noiseclassifier.evaluation.matching import (
     run_score,
     truth_of,
 )
-from noiseclassifier.evaluation.measures import (
+from noiseclassifier.measures import (
     MOST,
     Protocol,
     Resampling,
@@ -32,7 +32,6 @@ from noiseclassifier.evaluation.measures import (
     garwood,
     harmonic_mean,
 )
-from noiseclassifier.labels import Event, Labels
 from noiseclassifier.recording import Fault
 
 COUNT = len(frames())

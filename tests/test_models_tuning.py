@@ -226,7 +226,7 @@ def some_points(profile, count=6):
 
 def names(validation, point=0):
     """Names of what a point calls the frames."""
-    return np.array((*validation.classes, "unknown"))[validation.decisions[point].chosen]
+    return np.array((*validation.classes, "unknown"))[validation.chosen[point]]
 
 
 def assert_equal_to_training(points, sets):
@@ -253,11 +253,11 @@ def test_points_of_other_estimators_predict_what_a_classifier_predicts(estimator
 
 def test_too_many_frames_for_a_kernel_matrix_change_no_decision(monkeypatch):
     points, trial = some_points(PROFILES["paper"]), sets().trial
-    kept = validate(points, trial).decisions
+    kept = validate(points, trial)
     monkeypatch.setattr(tuning, "LARGEST", 0)
-    for with_matrix, without in zip(kept, validate(points, trial).decisions, strict=True):
-        assert np.array_equal(with_matrix.chosen, without.chosen)
-        np.testing.assert_allclose(with_matrix.margins, without.margins, atol=1e-6)
+    without = validate(points, trial)
+    assert np.array_equal(kept.chosen, without.chosen)
+    np.testing.assert_allclose(kept.margins, without.margins, atol=1e-6)
 
 
 def test_folds_predict_what_a_classifier_of_the_other_recordings_predicts():
@@ -351,4 +351,4 @@ def test_the_papers_own_point_is_golden(stand_in, golden):
     arrays, _ = golden
     validation = validate([nc.Profile.noisytest()], stand_in.trial)
     assert validation.classes == nc.CLASSES
-    assert np.array_equal(validation.decisions[0].chosen, arrays["rbf_validation_pred"])
+    assert np.array_equal(validation.chosen[0], arrays["rbf_validation_pred"])

@@ -43,7 +43,7 @@ def evaluate(
 ) -> None:
     """Evaluate a model on annotated runs that it was not trained on."""
     from inspector import assets, train
-    from noiseclassifier.evaluation.assessment import table
+    from noiseclassifier.assessment import table
     from noisemodel.files import refuse_existing, replacing
 
     for path in filter(None, (output, picture)):

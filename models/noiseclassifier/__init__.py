@@ -11,6 +11,7 @@ This package needs no robot: its input is a signal and its rate. It needs NumPy,
 only to train.
 """
 
+from noiseclassifier.assessment import Assessment, assess, evaluate
 from noiseclassifier.classifier import Classifier, Stream
 from noiseclassifier.dataset import Dataset, Examples
 from noiseclassifier.errors import (
@@ -26,13 +27,12 @@ from noiseclassifier.errors import (
     RecordingError,
     SignalError,
 )
-from noiseclassifier.evaluation.assessment import Assessment, assess, evaluate
-from noiseclassifier.evaluation.matching import Unanswered, match
-from noiseclassifier.evaluation.measures import Evaluation
 from noiseclassifier.features import features, frame
 from noiseclassifier.general import Frames, General, Model, frames_of, load, nearest
 from noiseclassifier.labels import UNKNOWN, Event, Labels
 from noiseclassifier.lasting import Lasting, merged
+from noiseclassifier.matching import Unanswered, match
+from noiseclassifier.measures import Evaluation
 from noiseclassifier.noisytest import nominal_rate, read_log
 from noiseclassifier.profile import (
     ANY,

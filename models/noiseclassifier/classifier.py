@@ -11,9 +11,9 @@ from noiseclassifier import modelfile
 from noiseclassifier.dataset import CHUNK, Dataset, Examples, features_in_chunks
 from noiseclassifier.errors import DatasetError, FileError, MissingSignalError, RateError
 from noiseclassifier.estimators import ESTIMATORS, Estimator
-from noiseclassifier.evaluation.measures import Evaluation
 from noiseclassifier.features import FrameFeatures, Frames, frames_of, standard
 from noiseclassifier.labels import UNKNOWN, Labels
+from noiseclassifier.measures import Evaluation
 from noiseclassifier.profile import NOMINAL, Profile
 from noiseclassifier.reference import Rest
 from noiseclassifier.signals import Signals, feeds, stacked

@@ -16,12 +16,11 @@ import numpy as np
 from noiseclassifier import modelfile
 from noiseclassifier.classifier import Classifier, targets_of
 from noiseclassifier.errors import MissingSignalError, RateError
-from noiseclassifier.estimators.decision import unthinned
 from noiseclassifier.estimators.trees import Detector, Trees
-from noiseclassifier.evaluation.matching import OK, UNCLEAR, truth_of, within
-from noiseclassifier.evaluation.measures import Evaluation
 from noiseclassifier.features import frame_features, standard
 from noiseclassifier.labels import UNKNOWN
+from noiseclassifier.matching import OK, UNCLEAR, truth_of, within
+from noiseclassifier.measures import Evaluation
 from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, RELATIVE, TOLERANCE, LogBands
 from noiseclassifier.recording import Recording, group_of
 from noiseclassifier.signals import EFFORT, NOISE, feeds, named
@@ -111,10 +110,12 @@ class General:
         scaled = (features - mean) / scale
         trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising)
         relative = np.array([name.startswith(RELATIVE) for name in recipe.columns])
+        shift = np.zeros(1 + len(classes))
+        shift[1] = np.log(thin)  # of the odds of `ok`
         trees = replace(
             trees,
             known=np.where(relative | unknown, UNBOUNDED, trees.known),
-            calibration=unthinned(trees.calibration, thin),
+            calibration=trees.calibration + shift,
         )
         model = cls(recipe, classes, trees, mean, scale, dict(frames.hashes))
         metrics = {"training": model.evaluate(frames).as_dict()}

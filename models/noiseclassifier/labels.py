@@ -32,9 +32,6 @@ UNKNOWN = "unknown"
 CONFIRM = 2
 """Frames of evidence in a stretch that make it a finding."""
 
-_ARRAYS = ("start", "stop", "label", "scores", "above_threshold", "novel")
-"""Fields of `Labels` with an entry for each frame."""
-
 
 @dataclass(frozen=True)
 class Event:
@@ -183,20 +180,20 @@ class Labels:
     @staticmethod
     def concatenated(parts: Sequence["Labels"]) -> "Labels":
         """Join labels of one model that follow each other, one or more."""
-        first = parts[0]
-        arrays: dict[str, Any] = {
-            name: np.concatenate([getattr(part, name) for part in parts])
-            for name in _ARRAYS
-            if getattr(first, name) is not None
+        each = [part._arrays() for part in parts]
+        joined: dict[str, Any] = {
+            name: np.concatenate([arrays[name] for arrays in each]) for name in each[0]
         }
-        return replace(first, **arrays)
+        return replace(parts[0], **joined)
 
     def part(self, frames: slice) -> "Labels":
         """Take the labels of some frames."""
-        arrays: dict[str, Any] = {
-            name: getattr(self, name)[frames] for name in _ARRAYS if getattr(self, name) is not None
-        }
-        return replace(self, **arrays)
+        return replace(self, **{name: array[frames] for name, array in self._arrays().items()})
+
+    def _arrays(self) -> dict[str, Any]:
+        """Fields with an entry for each frame."""
+        names = ("start", "stop", "label", "scores", "above_threshold", "novel")
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
     def to_arrow(self) -> "pyarrow.Table":
         """Give a table with a row for each frame.

@@ -313,6 +313,7 @@ def _check_arrays(
         raise FileError(path, f"is adapted to good runs: {ACCEPT}")
     if not (arrays["scale"] > 0).all():
         raise FileError(path, "array 'scale' holds values that are not above 0")
-    for name, most in estimator.highest(profile, features=count).items():
+    indices = Trees.highest(profile, features=count) if issubclass(estimator, Trees) else {}
+    for name, most in indices.items():
         if arrays[name].min() < 0 or arrays[name].max() > most:
             raise FileError(path, f"array {name!r} holds values beyond 0 to {most}")

@@ -104,53 +104,45 @@ class Recording:
 
 
 def _check_signal(recording: Recording) -> None:
-    for name, signal in named(recording.signal).items():
-        many = by_joint(name)
-        if signal.ndim != 1 + many or signal.shape[-1:] != (recording.samples,) or not signal.size:
+    name, count, valid = recording.name, recording.samples, recording.valid
+    for kind, signal in named(recording.signal).items():
+        many = by_joint(kind)
+        if signal.ndim != 1 + many or signal.shape[-1:] != (count,) or not signal.size:
             expected = "(joints, samples)" if many else "(samples,)"
             raise RecordingError(
-                recording.name,
-                f"a signal of shape {signal.shape}, expected {expected}, one or more",
+                name, f"a signal of shape {signal.shape}, expected {expected}, one or more"
             )
         if not np.isfinite(signal).all():
             place = tuple(np.argwhere(~np.isfinite(signal))[0].tolist())
-            what = f"sample {place[-1]}" if name == NOISE else f"sample {place[-1]} of {name}"
-            raise RecordingError(recording.name, f"{what} is not finite ({signal[place]})")
-    valid = recording.valid
-    if valid is not None and valid.shape != (recording.samples,):
-        raise RecordingError(
-            recording.name,
-            f"valid has shape {valid.shape}, the signal {(recording.samples,)}",
-        )
+            what = f"sample {place[-1]}" + f" of {kind}" * (kind != NOISE)
+            raise RecordingError(name, f"{what} is not finite ({signal[place]})")
+    if valid is not None and valid.shape != (count,):
+        raise RecordingError(name, f"valid has shape {valid.shape}, the signal {(count,)}")
     if not (isfinite(recording.rate) and recording.rate > 0 and isfinite(recording.start)):
         raise RecordingError(
-            recording.name,
+            name,
             f"rate {recording.rate} Hz and start {recording.start} s, expected finite numbers,"
             " the rate above 0",
         )
 
 
 def _check_blocks(recording: Recording) -> None:
-    step = 1.0 / recording.rate
+    name, step = recording.name, 1.0 / recording.rate
     # Annotations are written with few digits: one sample more or less is no contradiction.
     begin = recording.start - step
     end = recording.start + (recording.samples + 1) * step
     for block in recording.blocks:
         if not block.start < block.stop:
-            raise RecordingError(
-                recording.name, f"{_words(block)} stops before it starts, or lasts no time"
-            )
+            raise RecordingError(name, f"{_words(block)} stops before it starts, or lasts no time")
         if block.start < begin or block.start >= end or end < block.stop < inf:
             raise RecordingError(
-                recording.name,
+                name,
                 f"{_words(block)} is outside of the recording, which lasts from"
                 f" {recording.start:g} s to {end - step:g} s",
             )
     for early, late in combinations(sorted(recording.blocks), 2):
         if late.start < early.stop - step and late.label != early.label:
-            raise RecordingError(
-                recording.name, f"{_words(early)} and {_words(late)} overlap and contradict"
-            )
+            raise RecordingError(name, f"{_words(early)} and {_words(late)} overlap and contradict")
 
 
 def _words(block: Block) -> str:

@@ -47,11 +47,11 @@ from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from noiseclassifier.dataset import CHUNK
+from noiseclassifier.dataset import features_in_chunks
 from noiseclassifier.errors import ProfileError, SignalError
 from noiseclassifier.estimators import ESTIMATORS
 from noiseclassifier.estimators.decision import Probable
-from noiseclassifier.features import feature_count, features, standard
+from noiseclassifier.features import feature_count, standard
 from noiseclassifier.profile import GENERAL, SCALAR, LogBands, Profile
 from noiseclassifier.types import Array
 
@@ -77,6 +77,29 @@ class _Framed(BaseEstimator):  # type: ignore[misc]
         self.rate = rate
         self.settings = settings
 
+    def _profile(self, width: int) -> Profile:
+        """The profile for rows of so many numbers."""
+        recipe = _recipe(self.profile)
+        found = recipe.at(self.rate) if isinstance(recipe, LogBands) else recipe
+        found = Profile.of({**found.as_dict(), **(self.settings or {})})
+        length, rest = divmod(width, len(found.signals))
+        if rest or length < LEAST_SAMPLES:
+            raise SignalError(
+                f"rows of {width} numbers, expected frames of {LEAST_SAMPLES} samples or more of"
+                f" {', '.join(found.signals)}"
+            )
+        if not isinstance(recipe, LogBands):
+            return found
+        if length < found.window:
+            bins = np.linspace(0.0, self.rate / 2, length // 2 + 2)
+            found = replace(found, window=length, edges=tuple(bins.tolist()), quick_window=0)
+        return replace(found, length=length)
+
+    def _features(self, X: ArrayLike) -> Array:
+        """Features of rows of frames that fit what was fitted."""
+        check_is_fitted(self)
+        return _features(validate_data(self, X, dtype=np.float64, reset=False), self.profile_)
+
 
 class NoiseFeatures(ClassNamePrefixFeaturesOutMixin, TransformerMixin, _Framed):  # type: ignore[misc]
     """Log-band energies of frames, pooled over time, as a transformer.
@@ -101,14 +124,13 @@ class NoiseFeatures(ClassNamePrefixFeaturesOutMixin, TransformerMixin, _Framed):
                 shape (frames, signals * length).
         """
         frames = validate_data(self, X, dtype=np.float64, ensure_min_features=LEAST_SAMPLES)
-        self.profile_ = _profile(self.profile, self.rate, self.settings, frames.shape[1])
+        self.profile_ = self._profile(frames.shape[1])
         self._n_features_out = feature_count(self.profile_)
         return self
 
     def transform(self, X: ArrayLike) -> Array:
         """Features of frames, not standardised, shape (frames, features)."""
-        check_is_fitted(self)
-        return _features(validate_data(self, X, dtype=np.float64, reset=False), self.profile_)
+        return self._features(X)
 
 
 def _has_probabilities(classifier: "NoiseClassifier") -> bool:
@@ -161,7 +183,7 @@ class NoiseClassifier(ClassifierMixin, _Framed):  # type: ignore[misc]
         names = np.full(len(frames), "") if groups is None else np.asarray(groups).astype(str)
         if names.shape != (len(frames),):
             raise ValueError(f"groups of shape {names.shape}, expected {(len(frames),)}")
-        self.profile_ = _profile(self.profile, self.rate, self.settings, frames.shape[1])
+        self.profile_ = self._profile(frames.shape[1])
         plain = _features(frames, self.profile_)
         self.mean_, self.scale_ = standard(plain, self.profile_)
         scaled = (plain - self.mean_) / self.scale_
@@ -189,15 +211,10 @@ class NoiseClassifier(ClassifierMixin, _Framed):  # type: ignore[misc]
         return np.exp(self._scores(X))
 
     def _scores(self, X: ArrayLike) -> Array:
-        check_is_fitted(self)
-        frames = validate_data(self, X, dtype=np.float64, reset=False)
-        plain = _features(frames, self.profile_)
+        plain = self._features(X)
         decisions = self.estimator_.decision((plain - self.mean_) / self.scale_)
-        scores: Array = (
-            decisions[:, :-1]
-            if isinstance(self.estimator_, Probable)
-            else self.estimator_.score(decisions)
-        )
+        probable = isinstance(self.estimator_, Probable)
+        scores: Array = decisions[:, :-1] if probable else self.estimator_.score(decisions)
         return scores
 
 
@@ -209,31 +226,7 @@ def _recipe(profile: Recipe) -> LogBands | Profile:
     return RECIPES[profile]
 
 
-def _profile(
-    profile: Recipe, rate: float, settings: Mapping[str, Any] | None, width: int
-) -> Profile:
-    """The profile for rows of so many numbers."""
-    recipe = _recipe(profile)
-    found = recipe.at(rate) if isinstance(recipe, LogBands) else recipe
-    found = Profile.of({**found.as_dict(), **(settings or {})})
-    length, rest = divmod(width, len(found.signals))
-    if rest or length < LEAST_SAMPLES:
-        raise SignalError(
-            f"rows of {width} numbers, expected frames of {LEAST_SAMPLES} samples or more of"
-            f" {', '.join(found.signals)}"
-        )
-    if not isinstance(recipe, LogBands):
-        return found
-    if length < found.window:
-        bins = np.linspace(0.0, rate / 2, length // 2 + 2)
-        found = replace(found, window=length, edges=tuple(bins.tolist()), quick_window=0)
-    return replace(found, length=length)
-
-
 def _features(frames: Array, profile: Profile) -> Array:
-    """Features of rows of frames, some at a time, which bounds the memory that they take."""
     signals = len(profile.signals)
     rows = frames.reshape(len(frames), signals, -1) if signals > 1 else frames
-    return np.concatenate(
-        [features(rows[first : first + CHUNK], profile) for first in range(0, len(rows), CHUNK)]
-    )
+    return features_in_chunks(rows, profile)

@@ -8,17 +8,13 @@ What a point predicts is what `Classifier.train` with its profile would predict.
 in settings of the estimator alone share their features; support vector machines that differ in C
 and gamma share the distances between frames, and those that differ in C alone the kernel matrix, so
 that a point costs little more than libsvm's own work.
-
-The balanced log-loss is finer than counts of frames: two points hardly ever have the same. It is
-computed from decision values, with one number fitted for all frames, so that it does not depend on
-the width of the margins.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import chain, groupby, product
-from math import floor, isfinite, isnan, log, prod
-from typing import Any, Literal, NamedTuple, Self, TypeAlias, get_args
+from math import floor, isfinite, log, prod
+from typing import Any, Literal, Self, TypeAlias
 
 import numpy as np
 
@@ -26,9 +22,9 @@ from noiseclassifier.dataset import Examples
 from noiseclassifier.errors import DatasetError, ProfileError
 from noiseclassifier.estimators import ESTIMATORS, svm
 from noiseclassifier.estimators.decision import TINY
-from noiseclassifier.evaluation.measures import Evaluation
 from noiseclassifier.features import standard
 from noiseclassifier.labels import UNKNOWN
+from noiseclassifier.measures import Evaluation, plain
 from noiseclassifier.profile import Kernel, Multiclass, Profile
 from noiseclassifier.recording import Recording
 from noiseclassifier.types import Array, Index, Words
@@ -36,7 +32,6 @@ from noiseclassifier.types import Array, Index, Words
 Value: TypeAlias = int | float | str
 Point: TypeAlias = Mapping[str, Value]
 Criterion: TypeAlias = Literal["balanced-accuracy", "log-loss", "subset-accuracy"]
-CRITERIA: tuple[Criterion, ...] = get_args(Criterion)
 
 FEATURE_SETTINGS = ("window", "stride", "bands", "floor", "least_deviation")
 """Settings of the features that can be tuned."""
@@ -50,7 +45,6 @@ ESTIMATOR_SETTINGS = tuple(dict.fromkeys(chain.from_iterable(OWN.values())))
 """Settings of the estimators; points that differ in these alone share their features."""
 SETTINGS = FEATURE_SETTINGS + ESTIMATOR_SETTINGS
 """Settings that can be tuned: all that come after framing; the last varies fastest."""
-OTHER_NAMES = {"C": "regularization"}
 MOST = 1_000_000
 """Points that a grid may have."""
 LARGEST = 5000
@@ -59,8 +53,8 @@ DIGITS = 9
 """Decimals of a measure: equal measures stay equal whatever the order of summation."""
 WIDEST = 6.0
 """The slope of the log-loss is fitted within 2^-6 to 2^6 per unit of the margin."""
-CLOSE = 1e-5
-"""Tolerance of its exponent; the loss, which is flat there, has an error of 1e-9 then."""
+CLOSE = 1e-6
+"""Tolerance of its exponent; the loss, which is flat there, has an error of 1e-12 then."""
 
 
 # --- the grid
@@ -81,9 +75,8 @@ class Grid:
                 state = "a value twice" if values else "no value"
                 raise ProfileError(f"grid has {state} for {name}, expected one or more, each once")
         if not self.axes or len(self) > MOST:
-            raise ProfileError(
-                f"grid of {len(self) * bool(self.axes)} points, expected 1 to {MOST}"
-            )
+            count = len(self) * bool(self.axes)
+            raise ProfileError(f"grid of {count} points, expected 1 to {MOST}")
         ordered = {name: self.axes[name] for name in SETTINGS if name in self.axes}
         object.__setattr__(self, "axes", ordered)
 
@@ -125,7 +118,7 @@ class Grid:
             name, equals, values = text.partition("=")
             if not equals:
                 raise ProfileError(f"grid {text!r}, expected paper or NAME=VALUES, say C=0.1,1,10")
-            name = OTHER_NAMES.get(name, name)
+            name = "regularization" if name == "C" else name
             axes[name] = _values(name, values)
         return cls(axes)
 
@@ -138,10 +131,11 @@ class Grid:
         """Profile of each point; all other settings are those of ``base``."""
         estimator = base.estimator if base.estimator in OWN else "support vector machines"
         for name in self.axes:
-            foreign = name in ESTIMATOR_SETTINGS and name not in OWN[estimator]
-            idle: str = estimator if foreign else ""
-            if name == "gamma" and base.kernel == "linear":
-                idle = idle or "the linear kernel"
+            idle: str = ""
+            if name in ESTIMATOR_SETTINGS and name not in OWN[estimator]:
+                idle = estimator
+            elif name == "gamma" and base.kernel == "linear":
+                idle = "the linear kernel"
             if idle:
                 raise ProfileError(f"{name} does nothing with {idle}; leave it out of the grid")
         for stride in self.axes.get("stride", ()):
@@ -158,17 +152,17 @@ class Grid:
 
 def _values(name: str, text: str) -> tuple[Value, ...]:
     """Read the values of a setting: words, a list of numbers, or a range of them."""
-    kinds = {field.name: field.type for field in fields(Profile)}
-    if kinds.get(name) not in (int, float):
+    kind = {field.name: field.type for field in fields(Profile)}.get(name)
+    if kind not in (int, float):
         return tuple(filter(None, text.split(",")))
     parts = text.split(":")
     if len(parts) == 1:
-        numbers: Sequence[float] = [_number(name, each) for each in text.split(",") if each.strip()]
+        numbers = [_number(name, each) for each in text.split(",") if each.strip()]
     elif len(parts) == 3:
         numbers = _range(name, *parts)
     else:
         raise ProfileError(f"{name} is {text!r}, expected first:last:step or values with commas")
-    if kinds[name] is float:
+    if kind is float:
         return tuple(numbers)
     if odd := next((each for each in numbers if each != int(each)), None):
         raise ProfileError(f"{name} is {odd:g}, expected whole samples")
@@ -176,8 +170,7 @@ def _values(name: str, text: str) -> tuple[Value, ...]:
 
 
 def _range(name: str, first: str, last: str, step: str) -> list[float]:
-    start, stop = _number(name, first), _number(name, last)
-    by = _number(name, step.removeprefix("x"))
+    start, stop, by = (_number(name, each) for each in (first, last, step.removeprefix("x")))
     times = step.startswith("x")
     if not (by > 1 and start > 0 if times else by > 0):
         raise ProfileError(
@@ -239,15 +232,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of a point; all but the loss are shares from 0 to 1, NaN where undefined.
-
-    Attributes:
-        balanced_accuracy: Mean recall of the classes.
-        log_loss: Balanced log-loss, in nats.
-        failure_recall: Failure frames that were predicted as any failure, of the failure frames.
-        false_alarm_rate: `ok` frames that were predicted as a failure, of the `ok` frames.
-        subset_accuracy: Frames with the right prediction, of all: the paper's criterion.
-    """
+    """Measures of a point, as `Evaluation` has them; the balanced log-loss is in nats."""
 
     balanced_accuracy: float
     log_loss: float
@@ -257,16 +242,7 @@ class Measures:
 
     def as_dict(self) -> dict[str, float | None]:
         """All measures for JSON, None where undefined."""
-        return {name: None if isnan(value) else value for name, value in asdict(self).items()}
-
-
-class Decisions(NamedTuple):
-    """Decisions of one point on frames."""
-
-    chosen: Index
-    """Class of each, as an index, shape (frames,); of one that is unknown, beyond the classes."""
-    margins: Array
-    """Margins of the classes, or logarithms of their probabilities, shape (frames, classes)."""
+        return dict(plain(asdict(self)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,27 +253,31 @@ class Validation:
         classes: Names of the classes.
         truth: Class of each frame, as an index, shape (frames,).
         runs: Name of the recording that each is from, shape (frames,).
-        decisions: Of each point.
+        chosen: Class of each, as an index, shape (points, frames); of one that is unknown, beyond
+            the classes.
+        margins: Margins of the classes, or logarithms of their probabilities, shape (points,
+            frames, classes).
         training_frames: Number of training frames in all.
     """
 
     classes: tuple[str, ...]
     truth: Index
     runs: Words
-    decisions: Sequence[Decisions]
+    chosen: Index
+    margins: Array
     training_frames: int
 
     def measures(self) -> list[Measures]:
         """Measures of each point."""
         names = (*self.classes, UNKNOWN)
         measures = []
-        for each in self.decisions:
+        for chosen, margins in zip(self.chosen, self.margins, strict=True):
             cells = np.zeros((len(names), len(names)), dtype=np.int64)
-            np.add.at(cells, (self.truth, each.chosen), 1)
+            np.add.at(cells, (self.truth, chosen), 1)
             found = Evaluation(names, cells)
             values = (
                 found.balanced_accuracy,
-                balanced_log_loss(each.margins, self.truth),
+                balanced_log_loss(margins, self.truth),
                 found.failure_recall,
                 found.false_alarm_rate,
                 found.subset_accuracy,
@@ -332,6 +312,10 @@ def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
         raise DatasetError(f"all frames are {', '.join(there)}; tuning takes two classes")
     classes = tuple(name for name in profiles[0].classes if name in there)
     groups = known.groups
+    targets, truth = (
+        np.array([classes.index(label) for label in each.labels.tolist()])
+        for each in (known, fresh)
+    )
     chosen = np.empty((len(profiles), len(fresh)), dtype=np.intp)
     margins = np.empty((*chosen.shape, len(classes)))
     for learn, check in trial.splits:
@@ -347,33 +331,17 @@ def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
             )
         near, far = known.features[learnt], fresh.features[checked]
         mean, scale = standard(near, profiles[0])
-        targets = _indices(known.labels[learnt], classes)
         near, far = (near - mean) / scale, (far - mean) / scale
-        for point, each in enumerate(decide(near, targets, groups[learnt], far, profiles)):
+        decided = _decide(near, targets[learnt], groups[learnt], far, profiles)
+        for point, each in enumerate(decided):
             chosen[point, checked], margins[point, checked] = each
-    decisions = [Decisions(*each) for each in zip(chosen, margins, strict=True)]
-    return Validation(classes, _indices(fresh.labels, classes), fresh.runs, decisions, len(known))
+    return Validation(classes, truth, fresh.runs, chosen, margins, len(known))
 
 
-def _indices(labels: Words, classes: Sequence[str]) -> Index:
-    return np.array([classes.index(label) for label in labels.tolist()])
-
-
-# --- decisions, on shared kernel matrices
-
-
-def decide(
+def _decide(
     known: Array, targets: Index, groups: Words, fresh: Array, profiles: Sequence[Profile]
-) -> Iterator[Decisions]:
-    """Train the estimator of each point, and decide on test frames.
-
-    Args:
-        known: Training features, shape (frames, features).
-        targets: Class of each, as an index from 0 without a gap, shape (frames,).
-        groups: Runs of a group share their motion, shape (frames,).
-        fresh: Test features, shape (frames, features).
-        profiles: Points that share their features; it pays if those of one gamma follow each other.
-    """
+) -> Iterator[tuple[Index, Array]]:
+    """Train the estimator of each point, and give its choices and margins of test frames."""
     classes = int(targets.max()) + 1
     if profiles[0].estimator != "svm" or len(known) > LARGEST:
         for profile in profiles:
@@ -383,7 +351,7 @@ def decide(
                 margins = class_margins(found, classes=classes, multiclass=profile.multiclass)
             else:
                 margins = np.log(estimator.score(found) + TINY)
-            yield Decisions(estimator.choose(found), margins)
+            yield estimator.choose(found), margins
         return
     from sklearn import config_context
 
@@ -401,7 +369,7 @@ def decide(
                 found = _decisions(train, test, targets, profile)
             multiclass = profile.multiclass
             chosen = svm.choose(found, classes=classes, multiclass=multiclass)
-            yield Decisions(chosen, class_margins(found, classes=classes, multiclass=multiclass))
+            yield chosen, class_margins(found, classes=classes, multiclass=multiclass)
 
 
 def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> Array:
@@ -439,37 +407,24 @@ def balanced_log_loss(margins: Array, truth: Index) -> float:
     """Mean log-loss of the classes, at the slope of the least loss.
 
     With margins s, p_k = exp(a s_k) / sum_j exp(a s_j) is the probability of class k, and the loss
-    is the mean over classes of the mean over the class's frames of -log p_truth. The slope a > 0
-    has the least loss (Platt's scaling without a bias, one for all classes); it changes no
-    decision.
+    is the mean over classes of the mean over the class's frames of -log p_truth. It is finer than
+    counts of frames: two points hardly ever have the same. The slope a > 0 has the least loss
+    (Platt's scaling without a bias, one for all classes), so that the loss does not depend on the
+    width of the margins; it changes no decision.
 
     Args:
         margins: Margins of the classes, shape (frames, classes).
         truth: Class of each frame, as an index, shape (frames,).
     """
-    from scipy.optimize import brentq
+    from scipy.optimize import minimize_scalar
 
     counts = np.bincount(truth)
     weight = 1.0 / (counts[truth] * np.count_nonzero(counts))
-    own = margins[np.arange(len(truth)), truth]
+    above = margins - margins[np.arange(len(truth)), truth][:, None]
 
-    def rise(power: float) -> float:
-        return float(weight @ (_softmax(margins, 2.0**power)[1] - own))
+    def loss(power: float) -> float:
+        return float(weight @ np.logaddexp.reduce(2.0**power * above, axis=1))
 
-    # The loss is convex in a: where its derivative changes sign it is least.
-    if rise(-WIDEST) >= 0.0:
-        power = -WIDEST
-    elif rise(WIDEST) <= 0.0:
-        power = WIDEST
-    else:
-        power = brentq(rise, -WIDEST, WIDEST, xtol=CLOSE)
-    slope = 2.0**power
-    return float(weight @ (_softmax(margins, slope)[0] - slope * own))
-
-
-def _softmax(margins: Array, slope: float) -> tuple[Array, Array]:
-    """Log sum exp(a s), and the mean of s by its weights, each of shape (frames,)."""
-    highest = margins.max(axis=1)
-    share = np.exp(slope * (margins - highest[:, None]))
-    total = share.sum(axis=1)
-    return slope * highest + np.log(total), (share * margins).sum(axis=1) / total
+    # The loss is convex in a, and has one minimum.
+    best = minimize_scalar(loss, bounds=(-WIDEST, WIDEST), options={"xatol": CLOSE})
+    return min(float(best.fun), loss(-WIDEST), loss(WIDEST))

@@ -28,10 +28,7 @@ def calibrated(logits: Array, calibration: Array) -> Array:
 
 
 def calibrate(logits: Array, targets: Index) -> Array:
-    """Calibration of the least log-loss.
-
-    A class without frames is not shifted.
-    """
+    """Calibration of the least log-loss; a class without frames is not shifted."""
     from scipy.optimize import minimize
 
     there, truth = np.unique(targets, return_inverse=True)
@@ -54,13 +51,6 @@ def calibrate(logits: Array, targets: Index) -> Array:
 def of_seen_classes(targets: Index, train: Index, test: Index) -> Index:
     """Indices of the test frames whose class is in the training set."""
     return test[np.isin(targets[test], targets[train])]
-
-
-def unthinned(calibration: Array, thin: int) -> Array:
-    """Calibration for all frames, of one for every ``thin``-th `ok` frame and all failures."""
-    shift = np.zeros(len(calibration))
-    shift[1] = np.log(thin)
-    return calibration + shift
 
 
 def identity(classes: int) -> Array:

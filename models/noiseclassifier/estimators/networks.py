@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,10 +64,6 @@ class Networks(Probable):
         """Train networks, each from another start and on other groups, and calibrate them.
 
         Each network leaves out a part of the groups; its logits there calibrate the average.
-
-        Rare classes have larger weights, by the square root of how much rarer they are: with
-        balanced weights, networks would raise alarms for the rarest class. Calibration restores
-        the frequencies.
         """
         classes = int(targets.max()) + 1
         networks, logits, truth = [], [], []
@@ -82,10 +78,10 @@ class Networks(Probable):
         if len(labels):
             calibration = calibrate(np.concatenate(logits), labels)
         return Networks(
-            hidden=np.concatenate([network.hidden for network in networks]),
-            hidden_bias=np.concatenate([network.hidden_bias for network in networks]),
-            output=np.concatenate([network.output for network in networks]),
-            output_bias=np.concatenate([network.output_bias for network in networks]),
+            **{
+                name: np.concatenate([getattr(network, name) for network in networks])
+                for name in ("hidden", "hidden_bias", "output", "output_bias")
+            },
             known=np.quantile(features, (TAIL, 1.0 - TAIL), axis=0),
             calibration=calibration,
             frequency=np.bincount(targets, minlength=classes) / len(targets),
@@ -108,11 +104,6 @@ class Networks(Probable):
             "known": (2, features),
         }
 
-    @staticmethod
-    def highest(profile: Profile, *, features: int) -> dict[str, int]:
-        """No array holds indices."""
-        return {}
-
     @property
     def maximum(self) -> Array:
         """Highest value of each feature in nearly all training frames, shape (features,)."""
@@ -131,7 +122,8 @@ class Networks(Probable):
         hidden += bias
         np.maximum(hidden, 0.0, out=hidden)
         logits = (hidden @ output).reshape(len(features), *self.output_bias.shape)
-        each = np.exp(_log_softmax(logits + self.output_bias))
+        logits = logits + self.output_bias  # in double precision from here on
+        each = np.exp(logits - np.logaddexp.reduce(logits, -1, keepdims=True))
         average: Array = np.log(np.add.reduce(each, 1) / each.shape[1] + TINY)
         return average
 
@@ -152,11 +144,6 @@ class Networks(Probable):
         return weights, bias, output
 
 
-def _log_softmax(values: Array) -> Array:
-    softmax: Array = values - np.logaddexp.reduce(values, -1, keepdims=True)
-    return softmax
-
-
 def _parts(targets: Index, groups: Words, networks: int) -> list[tuple[Index, Index]]:
     """Training and test frames of each network, as indices."""
     everything = np.arange(len(targets)), np.arange(0)
@@ -168,10 +155,26 @@ def _parts(targets: Index, groups: Words, networks: int) -> list[tuple[Index, In
 
 def _fit(seed: int, features: Array, targets: Index, profile: Profile, classes: int) -> Networks:
     """Train one network, without calibration."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.neural_network import MLPClassifier
+
     counts = np.bincount(targets, minlength=classes)
-    weights = np.sqrt(counts.max() / counts[targets])
     there = np.flatnonzero(counts)
-    network = _train(seed, features, targets, weights, profile)
+    # By the root of how rare a class is: with balanced weights, networks would raise alarms for the
+    # rarest one. Calibration restores the frequencies.
+    weights = np.sqrt(counts.max() / counts[targets])
+    network = MLPClassifier(
+        (profile.units,),
+        alpha=profile.decay,
+        batch_size=min(BATCH, len(features)),
+        learning_rate_init=RATE,
+        max_iter=profile.epochs,
+        n_iter_no_change=profile.epochs + 1,
+        random_state=seed,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # so many epochs and no more
+        network.fit(features, targets, weights)
     # scikit-learn has no output for a class that it does not see, and of two for the second alone.
     learnt = there if len(there) > 2 else there[1:]
     output = np.zeros((1, profile.units, classes))
@@ -187,21 +190,3 @@ def _fit(seed: int, features: Array, targets: Index, profile: Profile, classes: 
         frequency=counts / len(targets),
         alarm=profile.alarm,
     )
-
-
-def _train(seed: int, features: Array, targets: Index, weights: Array, profile: Profile) -> Any:
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.neural_network import MLPClassifier
-
-    network = MLPClassifier(
-        (profile.units,),
-        alpha=profile.decay,
-        batch_size=min(BATCH, len(features)),
-        learning_rate_init=RATE,
-        max_iter=profile.epochs,
-        n_iter_no_change=profile.epochs + 1,
-        random_state=seed,
-    )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # so many epochs and no more
-        return network.fit(features, targets, weights)

@@ -70,11 +70,6 @@ class SupportVectorMachines:
             "intercept": (svms,),
         }
 
-    @staticmethod
-    def highest(profile: Profile, *, features: int) -> dict[str, int]:
-        """No array holds indices."""
-        return {}
-
     @property
     def width(self) -> int:
         """Decision values of one frame."""
@@ -166,12 +161,16 @@ def _sides(classes: int) -> tuple[Array, Array]:
 
 def fit(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
     """Train support vector machines."""
-    fit_all = _one_vs_one if profile.multiclass == "one-vs-one" else _one_vs_rest
-    return fit_all(features, targets, profile)
+    one_vs_one = profile.multiclass == "one-vs-one"
+    found = (_one_vs_one if one_vs_one else _one_vs_rest)(features, targets, profile)
+    return SupportVectorMachines(*found, profile.kernel, profile.gamma, profile.multiclass)
 
 
-def _one_vs_one(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
-    """Train an SVM for each pair of classes, C times N / (classes N_c) for each class."""
+def _one_vs_one(features: Array, targets: Index, profile: Profile) -> tuple[Array, Array, Array]:
+    """Vectors, coefficients and intercepts of an SVM for each pair of classes.
+
+    C is times N / (classes N_c) for each class.
+    """
     fitted = svc(profile, profile.regularization, dict(enumerate(balance(targets))))
     fitted.fit(features, targets)
     pairs = list(combinations(range(len(fitted.classes_)), 2))
@@ -185,18 +184,11 @@ def _one_vs_one(features: Array, targets: Index, profile: Profile) -> SupportVec
             coefficients[svm, columns] = fitted.dual_coef_[row, columns]
     # With two classes, scikit-learn turns the sign so that positive means the second.
     sign = -1.0 if len(pairs) == 1 else 1.0
-    return SupportVectorMachines(
-        fitted.support_vectors_,
-        sign * coefficients,
-        sign * fitted.intercept_,
-        profile.kernel,
-        profile.gamma,
-        profile.multiclass,
-    )
+    return fitted.support_vectors_, sign * coefficients, sign * fitted.intercept_
 
 
-def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
-    """Train an SVM for each class, with C_cls = C N / (classes N_cls) (paper, Sec. III-B)."""
+def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> tuple[Array, Array, Array]:
+    """The same of an SVM for each class, with C_cls = C N / (classes N_cls) (paper, Sec. III-B)."""
     weights = balance(targets)
     coefficients, intercept = np.zeros((len(weights), len(targets))), np.zeros(len(weights))
     for svm, weight in enumerate(weights):
@@ -205,14 +197,7 @@ def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> SupportVe
         coefficients[svm, fitted.support_] = fitted.dual_coef_[0]
         intercept[svm] = fitted.intercept_[0]
     used = np.flatnonzero(coefficients.any(axis=0))
-    return SupportVectorMachines(
-        features[used],
-        coefficients[:, used],
-        intercept,
-        profile.kernel,
-        profile.gamma,
-        profile.multiclass,
-    )
+    return features[used], coefficients[:, used], intercept
 
 
 def balance(targets: Index) -> Array:

@@ -118,7 +118,7 @@ class Trees(Probable):
     ) -> "Trees":
         """Train trees on some of the frames, without calibration."""
         classes = int(targets.max()) + 1
-        splits, leaf, prior = cls._learnt(features, targets, train, classes, profile, rising)
+        splits, leaf, prior = cls._learnt(features, targets, train, profile, rising)
         feature, threshold, missing, *left = splits.reshape(5, -1, profile.leaves - 1)
         return cls(
             feature=feature,
@@ -135,15 +135,10 @@ class Trees(Probable):
 
     @staticmethod
     def _learnt(
-        features: Array,
-        targets: Index,
-        train: Index,
-        classes: int,
-        profile: Profile,
-        _: Index | None,
+        features: Array, targets: Index, train: Index, profile: Profile, _: Index | None
     ) -> tuple[Array, Array, Array]:
         """Splits, leaves and prior, as `_boosted` gives them."""
-        return _boosted(features, targets, train, classes, profile, profile.rounds)
+        return _boosted(features, targets, train, int(targets.max()) + 1, profile, profile.rounds)
 
     def at(self, there: Index) -> "Trees":
         """Trees of frames that lack some of the features."""
@@ -179,7 +174,7 @@ class Trees(Probable):
 
     @staticmethod
     def highest(profile: Profile, *, features: int) -> dict[str, int]:
-        """Highest index of a feature, and of a leaf or the end of the leaves."""
+        """Highest value of each array that holds indices; the lowest is 0."""
         return {"feature": features - 1, "left": profile.leaves, "missing": 1}
 
     @property
@@ -203,31 +198,27 @@ class Trees(Probable):
             right |= np.isnan(values) & missing
         ruled_out = np.bitwise_or.reduce(right * left, 1)
         place = first + _FIRST.take(np.invert(ruled_out, out=ruled_out))
-        sums: Array = np.add.reduceat(leaf.take(place), self._begins, 1)
+        sums: Array = np.add.reduceat(leaf.take(place), self._by_class[1], 1)
         sums += self.prior
         return sums
 
     @cached_property
-    def _by_class(self) -> Index:
-        """Trees that have leaves, and one of each class, class by class."""
+    def _by_class(self) -> tuple[Index, Index]:
+        """Trees that have leaves, and one of each class, class by class; where each class begins.
+
+        The shapes are (trees,) and (classes,).
+        """
         classes = len(self.prior)
         kept: Mask = np.any(self.leaf != 0.0, axis=1)
         kept[:classes] = True
         number = np.flatnonzero(kept)
         order: Index = number[np.argsort(number % classes, kind="stable")]
-        return order
-
-    @cached_property
-    def _begins(self) -> Index:
-        """Where the trees of each class begin, shape (classes,)."""
-        classes = len(self.prior)
-        begins: Index = np.searchsorted(self._by_class % classes, np.arange(classes))
-        return begins
+        return order, np.searchsorted(order % classes, np.arange(classes))
 
     @cached_property
     def _side_by_side(self) -> tuple[Index, Array, Mask, NDArray[np.uint16], Array, Index]:
         """All first splits of the trees that count side by side, and then all second ones."""
-        own = self._by_class
+        own, _ = self._by_class
         start, stop = self.left[:, own].astype(np.int64)
         bits = ((1 << stop) - (1 << start)).astype(np.uint16)
         trees, leaves = self.leaf[own].shape
@@ -252,13 +243,9 @@ class Detector(Trees):
 
     @staticmethod
     def _learnt(
-        features: Array,
-        targets: Index,
-        train: Index,
-        classes: int,
-        profile: Profile,
-        rising: Index | None,
+        features: Array, targets: Index, train: Index, profile: Profile, rising: Index | None
     ) -> tuple[Array, Array, Array]:
+        classes = int(targets.max()) + 1
         failing = train[targets[train] > 0]
         named = max(1, profile.rounds // NAMING)
         splits, leaf, prior = _boosted(features, targets, failing, classes, profile, named)

@@ -11,8 +11,10 @@ import numpy as np
 from noiseclassifier.classifier import Classifier
 from noiseclassifier.dataset import Dataset
 from noiseclassifier.errors import DatasetError, SignalError
-from noiseclassifier.evaluation.matching import FALSE, UNCLEAR, Predictions, Unanswered, within
-from noiseclassifier.evaluation.measures import (
+from noiseclassifier.general import Model
+from noiseclassifier.labels import Event, Labels, interval
+from noiseclassifier.matching import FALSE, UNCLEAR, Predictions, Unanswered, within
+from noiseclassifier.measures import (
     LEAST_GROUPS,
     RATES,
     WORST,
@@ -25,8 +27,6 @@ from noiseclassifier.evaluation.measures import (
     frame_estimates,
     plain,
 )
-from noiseclassifier.general import Model
-from noiseclassifier.labels import Event, Labels, interval
 from noiseclassifier.recording import Recording, check_apart, group_of, seen
 from noiseclassifier.signals import named
 from noiseclassifier.types import Array

@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noiseclassifier.errors import DatasetError
-from noiseclassifier.evaluation.matching import (
+from noiseclassifier.matching import (
     FALSE,
     OK,
     UNCLEAR,
