@@ -148,19 +148,20 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
     named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
     known = {time, rest, *wanted, *named}
     not_read = tuple(name for place, name in enumerate(header) if name and place not in known)
-    table = _table(path, stream, layout, wanted, (time, rest), tuple(named), progress)
-    if len(table.rows) < 2:
-        raise LogError(path, f"{counted(len(table.rows), 'sample')}; a run needs at least 2")
-    values = np.frombuffer(table.numbers).reshape(len(table.rows), len(wanted))
+    rows, values, cells, names_of_joints = _table(
+        path, stream, layout, wanted, (time, rest), tuple(named), progress
+    )
+    if len(rows) < 2:
+        raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
     if time is None:
-        count = np.arange(len(table.rows), dtype=np.float64)
-        stamps = Stamps(Decimal(0), count, table.rows, SAMPLES)
+        count = np.arange(len(rows), dtype=np.float64)
+        stamps = Stamps(Decimal(0), count, rows, SAMPLES)
     else:
-        stamps = _stamps(path, header[time], table.stamps, table.rows, options.rate)
-    _check_sparse(path, [header[place] for place in wanted], values, table.rows)
-    if len(table.joints) > 1:
+        stamps = _stamps(path, header[time], cells, rows, options.rate)
+    _check_sparse(path, [header[place] for place in wanted], values, rows)
+    if len(names_of_joints) > 1:
         raise LogError(path, f"the joints' names change ({header[min(named)]}); split the log")
-    joints = dict(zip(named.values(), next(iter(table.joints), ()), strict=True))
+    joints = dict(zip(named.values(), next(iter(names_of_joints), ()), strict=True))
     columns = {header[place]: values[:, at : at + 1] for at, place in enumerate(wanted)}
     fields, converted = _fields(path, columns, stamps, joints, options)
     log = Log(
@@ -216,16 +217,6 @@ def _wanted(
     return wanted
 
 
-@dataclass
-class _Table:
-    """What is read of the rows."""
-
-    rows: "array[int]"
-    numbers: "array[float]"
-    stamps: list[str]
-    joints: set[tuple[str, ...]]
-
-
 def _table(
     path: Path,
     stream: TextIO,
@@ -234,9 +225,9 @@ def _table(
     time: tuple[int | None, int | None],
     named: tuple[int, ...],
     progress: Progress,
-) -> _Table:
-    """Numbers, stamps and names of joints of all rows."""
-    table = _Table(array("q"), array("d"), [], set())
+) -> tuple["array[int]", Array, list[str], set[tuple[str, ...]]]:
+    """Line numbers, numbers, stamps and the sets of joints' names of all rows."""
+    rows, table, stamps, joints = array("q"), array("d"), list[str](), set[tuple[str, ...]]()
     pick = itemgetter(*wanted, wanted[0])
     names = [layout.header[place] for place in wanted]
     for _ in range(layout.skip):
@@ -248,25 +239,24 @@ def _table(
         if len(text) >= PIECE and rest is None and not named:
             found = numbers_in(text.encode(), len(layout.header), layout.delimiter, wanted, at)
         if found is not None:
-            table.numbers.frombytes(found[0].tobytes())
-            table.rows.extend(range(first + 1, first + 1 + lines))
-            table.stamps += found[1]
+            table.frombytes(found[0].tobytes())
+            rows.extend(range(first + 1, first + 1 + lines))
+            stamps += found[1]
         else:
             for row, cells in progress(_rows(path, text, first, layout), 0):
                 picked = pick(cells)[:-1]
                 try:
-                    numbers = list(map(float, picked))
+                    table.extend(list(map(float, picked)))
                 except ValueError:
-                    numbers = _numbers(path, row, names, picked)
-                table.numbers.extend(numbers)
-                table.rows.append(row)
+                    table.extend(_numbers(path, row, names, picked))
+                rows.append(row)
                 if at is not None:
                     part = "" if rest is None else f".{cells[rest].strip():0>9}"
-                    table.stamps.append(cells[at].strip() + part)
+                    stamps.append(cells[at].strip() + part)
                 if named:
-                    table.joints.add(tuple(cells[place] for place in named))
+                    joints.add(tuple(cells[place] for place in named))
         first += lines
-    return table
+    return rows, np.frombuffer(table).reshape(len(rows), len(wanted)), stamps, joints
 
 
 def _piece(path: Path, stream: TextIO) -> str:

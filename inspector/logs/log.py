@@ -7,7 +7,7 @@ from decimal import Decimal
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -273,11 +273,8 @@ class Log:
     in_degrees: tuple[str, ...] = ()
 
 
-class Progress(Protocol):
-    """Wraps what is read, to show how much is done."""
-
-    def __call__(self, items: Iterable[Any], total: int) -> Iterable[Any]:
-        """Pass items on; ``total`` of them are expected, 0 if unknown."""
+Progress: TypeAlias = Callable[[Iterable[Any], int], Iterable[Any]]
+"""Wraps what is read, to show how much is done; of so many items, 0 if that is not known."""
 
 
 def without_progress(items: Iterable[Any], total: int) -> Iterable[Any]:

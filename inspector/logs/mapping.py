@@ -498,15 +498,31 @@ def _choices(
     )
     mapped = set()
     for entry in (*options.entries, *suggested):
-        if found := _part_of(log, entry):
-            mapped.add(id(found[0]))
-            yield from _by_mapping(log, *found, entry, options, joints)
+        found = _part_of(log, entry)
+        if found is None:
+            continue
+        mapped.add(id(found[0]))
+        width = found[1].stop - found[1].start
+        if entry.joint and entry.signal in JOINT_SIGNALS and width != 1:
+            raise LogError(
+                log.path,
+                f"{entry.source!r} has {width} columns, {entry.target} is one; name it as"
+                f" {found[0].name}[0]",
+            )
+        if entry.signal != "time":
+            explicit = entry in options.entries
+            yield from _columns(
+                log, *found, entry.signal, entry.joint, options, joints, explicit=explicit
+            )
     known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
     named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
     numbered = {number_of(joint): joint for joint in reversed(named)}
     for each in log.fields:
         if id(each) not in mapped and each.name != options.time:
-            yield from _by_name(log, each, naming, numbered, options, joints)
+            signal, joint = _meaning(log, each, naming, numbered, joints)
+            if signal:
+                whole = slice(0, each.values.shape[1])
+                yield from _columns(log, each, whole, signal, joint, options, joints)
 
 
 def _part_of(log: Log, entry: Entry) -> tuple[Field, slice] | None:
@@ -524,78 +540,56 @@ def _part_of(log: Log, entry: Entry) -> tuple[Field, slice] | None:
     return by_name[name], slice(start, stop)
 
 
-def _by_name(
+def _meaning(
     log: Log,
     field: Field,
     naming: Naming,
     numbered: Mapping[int | None, str],
-    options: ReadOptions,
     joints: Sequence[str],
-) -> Iterator[_Choice]:
-    """Choices by the format or by the field's name."""
-    whole = slice(0, field.values.shape[1])
+) -> tuple[str, str]:
+    """Signal of a field by the format or by its name, and the joint if it is a column of one."""
     known = column_signal(field.name, naming) if _is_column(field) else None
     signal = field.signal or array_signal(field.name) or ""
     if known is None and _is_column(field) and signal in JOINT_SIGNALS and naming.only != "":
         known = None if naming.only is None else (signal, naming.only)
         signal = ""
-    if known:
-        signal, joint = known
-        number = number_of(joint)
-        if number is not None and joints and joint not in joints:
-            joint = _numbered(log, field, number, naming.first, joints)
-        elif isinstance(joint, int):
-            joint = numbered.get(joint, f"joint_{joint}")
-        yield _Choice(field, whole, signal, joint)
-    elif signal in BASE_SIGNALS:
-        yield _base(log, field, signal, "", whole, explicit=False)
-    elif signal:
-        yield from _array(log, field, signal, whole, options, joints, explicit=False)
+    if known is None:
+        return signal, ""
+    signal, joint = known
+    number, first = number_of(joint), naming.first
+    if number is not None and joints and joint not in joints:
+        if not first <= number < first + len(joints):
+            raise LogError(
+                log.path,
+                f"column {field.name!r} has number {number}, the robot's joints are {first} to"
+                f" {len(joints) - 1 + first} ({', '.join(joints)}); map it with --map",
+            )
+        return signal, joints[number - first]
+    if isinstance(joint, int):
+        return signal, numbered.get(joint, f"joint_{joint}")
+    return signal, joint
 
 
-def _by_mapping(
-    log: Log, field: Field, part: slice, entry: Entry, options: ReadOptions, joints: Sequence[str]
-) -> Iterator[_Choice]:
-    explicit, width = entry in options.entries, part.stop - part.start
-    if entry.signal == "time":
-        return
-    if entry.signal in BASE_SIGNALS:
-        yield _base(log, field, entry.signal, entry.joint, part, explicit=explicit)
-    elif not entry.joint:
-        yield from _array(log, field, entry.signal, part, options, joints, explicit=explicit)
-    elif width != 1:
-        raise LogError(
-            log.path,
-            f"{entry.source!r} has {width} columns, {entry.target} is one; name it as"
-            f" {field.name}[0]",
-        )
-    else:
-        yield _Choice(field, part, entry.signal, entry.joint, explicit)
-
-
-def _base(
-    log: Log, field: Field, signal: str, convention: str, part: slice, *, explicit: bool
-) -> _Choice:
-    width = part.stop - part.start
-    if width != WIDTHS[signal]:
-        raise LogError(
-            log.path, f"{field.name!r} has {width} columns, a {signal} has {WIDTHS[signal]}"
-        )
-    return _Choice(field, part, signal, convention, explicit)
-
-
-def _array(
+def _columns(
     log: Log,
     field: Field,
-    signal: str,
     part: slice,
+    signal: str,
+    joint: str,
     options: ReadOptions,
     joints: Sequence[str],
     *,
-    explicit: bool,
+    explicit: bool = False,
 ) -> Iterator[_Choice]:
-    """Choices of the columns of an array, one by one."""
+    """Columns of a field: of one joint, of the base with its convention, or one for each joint."""
     width = part.stop - part.start
+    if signal in BASE_SIGNALS and width != WIDTHS[signal]:
+        raise LogError(
+            log.path, f"{field.name!r} has {width} columns, a {signal} has {WIDTHS[signal]}"
+        )
+    if signal in BASE_SIGNALS or joint:
+        yield _Choice(field, part, signal, joint, explicit)
+        return
     names: Sequence[str] = field.joints[part]
     if not names or len(options.joints) == width:
         names = joints
@@ -608,15 +602,5 @@ def _array(
                 f" (--map {signal}={field.name}[0:{len(names)}]) or name all (--joints)",
             )
     names = names or [f"joint_{number}" for number in range(width)]
-    for column, joint in zip(range(part.start, part.stop), names[:width], strict=True):
-        yield _Choice(field, slice(column, column + 1), signal, joint, explicit)
-
-
-def _numbered(log: Log, field: Field, number: int, first: int, joints: Sequence[str]) -> str:
-    if not first <= number < first + len(joints):
-        raise LogError(
-            log.path,
-            f"column {field.name!r} has number {number}, the robot's joints are {first} to"
-            f" {len(joints) - 1 + first} ({', '.join(joints)}); map it with --map",
-        )
-    return joints[number - first]
+    for column, name in zip(range(part.start, part.stop), names[:width], strict=True):
+        yield _Choice(field, slice(column, column + 1), signal, name, explicit)
