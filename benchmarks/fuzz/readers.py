@@ -43,7 +43,7 @@ from inspector.logs.names import (
     time_column,
 )
 from inspector.logs.read import listing, read_logs
-from inspector.logs.ros.messages import STATE, STATES, Decoder, Topic
+from inspector.logs.ros.messages import STATE, STATES, Topic, decoder
 from inspector.reference.judging import Expected
 from inspector.reference.levels import levels
 from inspector.reference.store import Reference, of_runs, save
@@ -440,7 +440,7 @@ def _read_definition(path: Path) -> None:
     """The definition of a controller's state in a bag, and then a message of it."""
     text = path.read_text(errors="replace")
     for ros1, data in enumerate(_states()):
-        decode = Decoder(path, Topic("/state", STATE, text), ros1=bool(ros1))
+        decode = decoder(path, Topic("/state", STATE, text), ros1=bool(ros1))
         decode(data)
 
 

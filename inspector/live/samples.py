@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -184,19 +183,6 @@ DROPPED = (BACKWARDS, TIMELESS, OUTLYING, "malformed rows")
 """Kinds of warnings of samples that are left out."""
 
 
-class Taken(NamedTuple):
-    """Which samples a clock takes."""
-
-    kept: Mask
-    """False where a sample is left out, shape (decided,)."""
-    lost: Array
-    """Samples that are missing before each of those that are kept, shape (kept,)."""
-    time: Array
-    """When those are that are kept, always increasing, shape (kept,), in [s]."""
-    waiting: int
-    """Samples at the end about which only those that follow can decide."""
-
-
 class Clock:
     """Decides by its timestamp what becomes of each sample.
 
@@ -216,15 +202,20 @@ class Clock:
         self._before: float | None = None  # its time
         self._checked = False
 
-    def take(self, stamps: Array, *, ended: bool = False) -> Taken:
+    def take(self, stamps: Array, *, ended: bool = False) -> tuple[Mask, Array, Array, int]:
         """Decide about samples, those that waited before first.
 
         Args:
             stamps: Timestamps, shape (samples,), in [s], or in the unit that the rate tells.
             ended: Whether none will follow, so that none has to wait.
+
+        Returns:
+            Which samples are kept, shape (decided,); how many are missing before each of those,
+            shape (kept,); their times, always increasing, shape (kept,), in [s]; and how many
+            samples at the end wait, since only those that follow can decide about them.
         """
         if not self._unit and not self._begin(stamps, ended=ended):
-            return Taken(np.zeros(0, dtype=bool), np.empty(0), np.empty(0), len(stamps))
+            return np.zeros(0, dtype=bool), np.empty(0), np.empty(0), len(stamps)
         known = stamps * self._unit
         kept, time = np.zeros(len(known), dtype=bool), np.empty(len(known))
         place, waiting = 0, 0
@@ -247,7 +238,7 @@ class Clock:
                     break
         decided = len(known) - waiting
         kept, time = kept[:decided], time[:decided][kept[:decided]]
-        return Taken(kept, self._lost(time), time, waiting)
+        return kept, self._lost(time), time, waiting
 
     def _begin(self, stamps: Array, *, ended: bool) -> bool:
         """Take the unit of timestamps from the first ones, if there are enough."""

@@ -8,7 +8,6 @@ import struct
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Self, TypeAlias
 
@@ -98,51 +97,49 @@ def _fields_in(definition: str) -> list[str]:
     return [words[1] for words in lines if len(words) == 2]
 
 
-class Decoder:
-    """Deserialises the messages of one topic."""
+def decoder(path: Path, topic: Topic, *, ros1: bool) -> Callable[[bytes], Any]:
+    """What deserialises the messages of a topic, by the version of their type that fits."""
+    stores: list[Any] = []
 
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.path, self.topic, self.ros1 = path, topic, ros1
-
-    @cached_property
-    def _stores(self) -> list[Any]:
-        """What may deserialise the messages: several where versions of a type are known."""
-        definitions = [""]
-        if self.topic.type in TRANSFORMS:
-            definitions = ["geometry_msgs/TransformStamped[] transforms"]
-        elif self.topic.type == STATE:
-            names = _fields_in(self.topic.definition)
-            definitions = [each for each in STATES if not names or _fields_in(each) == names]
-            if not definitions:
-                raise LogError(
-                    self.path,
-                    f"{self.topic.name}: the definition of {self.topic.type} is none that is known"
-                    f" (its fields are {', '.join(names)[:200]})",
-                )
-        stores = []
-        for definition in definitions:
-            store = get_typestore(Stores.ROS1_NOETIC if self.ros1 else Stores.ROS2_HUMBLE)
-            if definition and self.topic.type not in store.types:
-                store.register(get_types_from_msg(definition, self.topic.type))
-            stores.append(store)
-        return stores
-
-    def __call__(self, data: bytes) -> Any:
-        """Deserialise a message."""
+    def decode(data: bytes) -> Any:
         problem: Exception | None = None
-        for store in self._stores:
-            parse = store.deserialize_ros1 if self.ros1 else store.deserialize_cdr
+        stores[:] = stores or _stores(path, topic, ros1=ros1)
+        for store in stores:
+            parse = store.deserialize_ros1 if ros1 else store.deserialize_cdr
             try:
-                message = parse(data, self.topic.type)
+                message = parse(data, topic.type)
             except DAMAGE as error:
                 problem = error
                 continue
-            self._stores[:] = [store]
+            stores[:] = [store]
             return message
         what = " ".join(str(problem).split()) or type(problem).__name__
-        raise LogError(
-            self.path, f"{self.topic.name}: a message is not a {self.topic.type} ({what})"
-        )
+        raise LogError(path, f"{topic.name}: a message is not a {topic.type} ({what})")
+
+    return decode
+
+
+def _stores(path: Path, topic: Topic, *, ros1: bool) -> list[Any]:
+    """What may deserialise messages: several where versions of their type are known."""
+    definitions = [""]
+    if topic.type in TRANSFORMS:
+        definitions = ["geometry_msgs/TransformStamped[] transforms"]
+    elif topic.type == STATE:
+        names = _fields_in(topic.definition)
+        definitions = [each for each in STATES if not names or _fields_in(each) == names]
+        if not definitions:
+            raise LogError(
+                path,
+                f"{topic.name}: the definition of {topic.type} is none that is known (its fields"
+                f" are {', '.join(names)[:200]})",
+            )
+    stores = []
+    for definition in definitions:
+        store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+        if definition and topic.type not in store.types:
+            store.register(get_types_from_msg(definition, topic.type))
+        stores.append(store)
+    return stores
 
 
 def stamp_of(message: Any) -> int:
@@ -276,7 +273,7 @@ class MotionReader:
     """
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self._decode = Decoder(path, topic, ros1=ros1)
+        self._decode = decoder(path, topic, ros1=ros1)
         self._topic, self._ros1 = topic, ros1
         self._rows, self._signals = MOTION[topic.type]
         self._is_state = topic.type == JOINT_STATE
@@ -423,7 +420,7 @@ class Trajectories:
     """``trajectory_msgs/JointTrajectory``: planned desired motion."""
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.decode = Decoder(path, topic, ros1=ros1)
+        self.decode = decoder(path, topic, ros1=ros1)
         self.topic = topic.name
         self.joints: dict[frozenset[str], list[tuple[int, tuple[str, ...], Any]]] = {}
 
@@ -466,7 +463,7 @@ class Descriptions:
     """``std_msgs/String``: the robot's URDF."""
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.decode = Decoder(path, topic, ros1=ros1)
+        self.decode = decoder(path, topic, ros1=ros1)
         self.urdf = ""
 
     def add(self, received: int, data: bytes) -> None:
