@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.log import SAMPLES, UNIFORM, Clock, Stamps, Track
+from inspector.logs.log import SAMPLES, UNIFORM, Stamps, Track
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import TIME_UNITS, without_unit
 from noisemodel.run import continuous_quaternions, resample
@@ -491,43 +491,34 @@ def estimate(measured: Mapping[str, Track], desired: Mapping[str, Track]) -> Off
         return None
     rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in pair))
     joints = [joint for joint in pair[0].joints if joint in pair[1].joints]
-    measured_motion, desired_motion = (_Motion.of(track, joints) for track in pair)
-    coarse = min(rate, COARSE_RATE)
-    seconds, correlation, next_best = _search(measured_motion, desired_motion, coarse)
-    drift = 0.0
-    span = float(desired_motion.time[-1] - desired_motion.time[0])
+    one, other = (_velocities(track, joints) for track in pair)
+    seconds, correlation, next_best = _search(one, other, min(rate, COARSE_RATE))
+    drift, times = 0.0, pair[1].stamps.time
     for _ in range(3):
-        residuals = _residuals(measured_motion, desired_motion, seconds, drift, rate)
+        residuals = _residuals(one, other, seconds, drift, rate)
         if not len(residuals):
             break
         seconds, drift = _fitted(residuals, seconds, drift)
-    return Offset(seconds, drift, correlation, next_best, span)
+    return Offset(seconds, drift, correlation, next_best, span=float(times[-1] - times[0]))
 
 
-@dataclass(frozen=True, eq=False)
-class _Motion:
-    """Velocities of some joints over time."""
+def _velocities(track: Track, joints: Sequence[str]) -> Track:
+    """Velocities of some joints, differentiated if the track holds positions."""
+    values = np.asarray(track.of(joints), dtype=np.float64)
+    if track.signal.startswith("position"):
+        values = np.gradient(np.unwrap(values, axis=0), track.stamps.time, axis=0)
+    return replace(track, values=values)
 
-    time: Array
-    velocity: Array
-    clock: Clock
 
-    @classmethod
-    def of(cls, track: Track, joints: list[str]) -> "_Motion":
-        values = np.asarray(track.of(joints), dtype=np.float64)
-        if track.signal.startswith("position"):
-            values = np.gradient(np.unwrap(values, axis=0), track.stamps.time, axis=0)
-        return cls(track.stamps.time, values, track.stamps.clock)
-
-    def at(self, instants: Array) -> Array:
-        """Linearly interpolated velocities, 0 in gaps and outside, shape (instants, joints)."""
-        found = np.zeros((len(instants), self.velocity.shape[1]))
-        for stretch in self.clock.stretches:
-            known = self.time[stretch]
-            part = slice(*np.searchsorted(instants, [known[0], known[-1]]))
-            for joint, values in enumerate(self.velocity[stretch].T):
-                found[part, joint] = np.interp(instants[part], known, values)
-        return found
+def _at(motion: Track, instants: Array) -> Array:
+    """Linearly interpolated velocities, 0 in gaps and outside, shape (instants, joints)."""
+    found = np.zeros((len(instants), motion.values.shape[1]))
+    for stretch in motion.stamps.clock.stretches:
+        known = motion.stamps.time[stretch]
+        part = slice(*np.searchsorted(instants, [known[0], known[-1]]))
+        for joint, values in enumerate(motion.values[stretch].T):
+            found[part, joint] = np.interp(instants[part], known, values)
+    return found
 
 
 def _common_tracks(
@@ -545,15 +536,14 @@ def _common_tracks(
     return None
 
 
-def _search(
-    measured_motion: _Motion, desired_motion: _Motion, rate: float
-) -> tuple[float, float, float]:
+def _search(measured: Track, desired: Track, rate: float) -> tuple[float, float, float]:
     """Best offset in [s], its correlation, and that of the next best."""
     from scipy import fft
 
+    times = measured.stamps.time, desired.stamps.time
     one, other = (
-        motion.at(np.arange(motion.time[0], motion.time[-1], 1 / rate))
-        for motion in (measured_motion, desired_motion)
+        _at(motion, np.arange(time[0], time[-1], 1 / rate))
+        for motion, time in zip((measured, desired), times, strict=True)
     )
     scale = np.sqrt((one**2).mean(axis=0) * (other**2).mean(axis=0))
     moving = scale > 0
@@ -576,7 +566,7 @@ def _search(
     distance = np.minimum((lags - best) % length, (best - lags) % length)
     next_best = float(correlation[distance > edge].max(initial=-1.0))
     lag = best if best < len(one) else best - length
-    seconds = lag / rate + float(measured_motion.time[0] - desired_motion.time[0])
+    seconds = lag / rate + float(times[0][0] - times[1][0])
     return seconds, float(correlation[best]), next_best
 
 
@@ -588,24 +578,22 @@ def _crossed(one: Array, other: Array, length: int) -> Array:
     return np.asarray(fft.irfft(product.sum(axis=1), length))
 
 
-def _residuals(
-    measured_motion: _Motion, desired_motion: _Motion, seconds: float, drift: float, rate: float
-) -> Array:
+def _residuals(measured: Track, desired: Track, seconds: float, drift: float, rate: float) -> Array:
     """Residual offset of each segment: time, offset and weight, shape (segments, 3)."""
-    since = desired_motion.time - desired_motion.time[0]
-    shifted = desired_motion.time + seconds + drift * since
-    start = max(measured_motion.time[0], shifted[0]) + 2 * LAG
-    stop = min(measured_motion.time[-1], shifted[-1]) - 2 * LAG
+    known, time = measured.stamps.time, desired.stamps.time
+    shifted = time + seconds + drift * (time - time[0])
+    start = max(known[0], shifted[0]) + 2 * LAG
+    stop = min(known[-1], shifted[-1]) - 2 * LAG
     count = min(SEGMENTS, int((stop - start) / SHORTEST))
     if count < 1:
         return np.empty((0, 3))
-    moved = replace(desired_motion, time=shifted)
+    moved = replace(desired, stamps=replace(desired.stamps, time=shifted))
     reach = int(np.ceil(2 * LAG * rate))
     found = []
     for first, last in pairwise(np.linspace(start, stop, count + 1)):
         instants = np.arange(first, last, 1 / rate)
         longer = first + np.arange(-reach, len(instants) + reach) / rate
-        residual, correlation = _match(measured_motion.at(instants), moved.at(longer), rate)
+        residual, correlation = _match(_at(measured, instants), _at(moved, longer), rate)
         if correlation >= CORRELATION:
             found.append(((first + last) / 2 - shifted[0], residual, correlation))
     return np.array(found).reshape(-1, 3)
