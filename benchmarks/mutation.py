@@ -2,7 +2,7 @@
 
     python -m benchmarks.mutation FOLDER [--seed 27] [--from 0] [--number 500] [--only FILE ...]
 
-The mutants are cosmic-ray's (extra `mutation`), in `noisemodel`, `models` and `inspector/analysis`.
+The mutants are cosmic-ray's (extra `mutation`), in `noisemodel`, `models` and `inspector.analysis`.
 All places that it can change stand in one random order; at each, one of its changes is drawn, too.
 So any first N are a fair sample. Left out is what any test would see (arithmetic that becomes
 shifts or bitwise operations, order that becomes identity, what does not compile), and what no
@@ -48,7 +48,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 SEED = 27
-MEASURED = ("noisemodel", "models", "inspector/analysis")
+MEASURED = ("noisemodel", "models", "inspector/analysis.py")
 ARITHMETIC = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}
 IDENTITY = {"Is", "IsNot"}
 MEMORY = 12 << 30  # address space of a child, in [byte]
@@ -60,7 +60,7 @@ LEFT_OUT = (
 in a process that was forked."""
 ALONE = (
     "inspector_cli.py::test_the_viewer_is_started_on_loopback_and_not_waited_for",
-    "noisemodel_comparisons.py::test_robots_are_compared_many_at_once_and_alike",
+    "noisemodel_compare.py::test_robots_are_compared_many_at_once_and_alike",
 )
 """Tests that hang or fail without a change in a process that was forked: they have threads."""
 OPTIONS = (
@@ -93,7 +93,7 @@ def places() -> list[list[Mutant]]:
     operators = {name: plugins.get_operator(name) for name in plugins.operator_names()}
     operators = {name: each() for name, each in operators.items() if wanted(name)}
     found: dict[tuple[str, int, int], list[Mutant]] = defaultdict(list)
-    for path in sorted(each for folder in MEASURED for each in Path(folder).rglob("*.py")):
+    for path in sorted(each for place in MEASURED for each in modules(Path(place))):
         source, seen = path.read_text(), Counter[str]()
         typed = unread(ast.parse(source))
         for node in ast_nodes(get_ast(source)):
@@ -110,6 +110,11 @@ def places() -> list[list[Mutant]]:
                     if not any(start <= (line, column) < stop for start, stop in typed):
                         found[str(path), line, column].append(mutant)
     return [found[key] for key in sorted(found)]
+
+
+def modules(place: Path) -> list[Path]:
+    """A module, or those of a folder."""
+    return [place] if place.suffix else [*place.rglob("*.py")]
 
 
 def wanted(operator: str) -> bool:
@@ -241,7 +246,7 @@ def measure(folder: Path) -> None:
     """Write `lines.json`; the working directory is the copy of the tree."""
     import coverage
 
-    include = [f"{each}/*" for each in MEASURED]
+    include = [str(each) for place in MEASURED for each in modules(Path(place))]
     cover = coverage.Coverage(data_file=None, include=include, config_file=False)
     plugin = Measuring(cover.switch_context)
     cover.start()
@@ -580,7 +585,7 @@ def table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
     yield "| package | mutants | killed | of them by time | survived | share killed, 95 % |"
     yield "|---|---|---|---|---|---|"
     for package in (*MEASURED, ""):
-        own = [row for row in rows if row["path"].startswith(f"{package}/" if package else "")]
+        own = [row for row in rows if row["path"].startswith(package)]
         if own:
             count = Counter(row["outcome"] for row in own)
             killed = count["killed"] + count["timeout"]

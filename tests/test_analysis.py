@@ -552,17 +552,6 @@ def test_a_noise_that_a_run_cannot_have_is_refused(robot, kind, text):
         estimate(still_and_fast(robot=robot), kind)
 
 
-def test_noises_are_not_written_over_a_file_unasked(tmp_path):
-    from inspector.analysis import write_csv
-    from noisemodel import OutputError
-
-    write_csv(moving(), (), tmp_path / "noise.csv")
-    with pytest.raises(OutputError, match="exists already"):
-        write_csv(moving(), (), tmp_path / "noise.csv")
-    write_csv(moving(seconds=1.0), (), tmp_path / "noise.csv", overwrite=True)
-    assert len((tmp_path / "noise.csv").read_text().splitlines()) == 1 + 1000
-
-
 def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
     from inspector.verdict import work_of
 

@@ -1,6 +1,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -49,12 +50,19 @@ def _package(name):
     return max(found, key=len, default=name)
 
 
+@cache
+def statements(path):
+    """The imports of a module, anywhere in it."""
+    nodes = ast.walk(ast.parse(path.read_text()))
+    return [node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
+
+
 def imports(path):
-    """Names of what a module imports, anywhere in it."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    """Names of what a module imports."""
+    for node in statements(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             assert node.level == 0, f"{path}: imports by relative name"
             yield node.module
 
@@ -108,11 +116,11 @@ MODULES = {name_of(path): path for path, _ in modules()}
 
 
 def modules_imported(path):
-    """Names of our modules that a module imports, anywhere in it; packages only for their own."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    """Names of our modules that a module imports; packages only for their own."""
+    for node in statements(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in MODULES)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             for alias in node.names:
                 name = f"{node.module}.{alias.name}"
                 name = name if name in MODULES else node.module

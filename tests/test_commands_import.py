@@ -1,31 +1,19 @@
 """`inspector import`, from the command line."""
 
-import sys
-
 import numpy as np
 import pytest
+from commandline import call
 from csvlogs import log
 from samplelogs import JOINTS, Talk, joint_states, motion, numbers, write_bag, write_lerobot
 
-from inspector.cli import main
 from noisemodel import Robot, Run
 
 TALK = Talk()
 POSITION, VELOCITY = numbers(), numbers(seed=1)
 
 
-@pytest.fixture
-def importing(monkeypatch, capsys):
-    """Call `inspector import`; returns exit status, standard output and standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["inspector", "import", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            main()
-        printed = capsys.readouterr()
-        return end.value.code or 0, printed.out, printed.err
-
-    return call
+def importing(*arguments):
+    return call("import", *arguments)
 
 
 @pytest.fixture
@@ -35,14 +23,14 @@ def bag(tmp_path):
     return write_bag(tmp_path / "bag", TALK, {"/joint_states": states, "/stop": flag})
 
 
-def test_a_bag_is_imported(importing, bag, tmp_path):
+def test_a_bag_is_imported(bag, tmp_path):
     status, out, err = importing(bag, "-o", tmp_path / "run.npz")
     assert (status, err) == (0, "")
     assert out.endswith("run.npz: 4.00 s at 100 Hz\n")
     assert np.array_equal(Run.load(tmp_path / "run.npz").position, POSITION)
 
 
-def test_contents_are_listed_and_nothing_written(importing, bag, tmp_path):
+def test_contents_are_listed_and_nothing_written(bag, tmp_path):
     before = sorted(tmp_path.rglob("*"))
     status, out, _ = importing(bag, log(tmp_path), "--list")
     assert status == 0
@@ -54,7 +42,7 @@ def test_contents_are_listed_and_nothing_written(importing, bag, tmp_path):
     assert sorted(tmp_path.rglob("*")) == sorted([*before, tmp_path / "log.csv"])
 
 
-def test_episodes_become_a_folder_of_runs(importing, tmp_path):
+def test_episodes_become_a_folder_of_runs(tmp_path):
     states = [motion(np.arange(90) / 30, seed=n)[0] for n in range(3)]
     folder = write_lerobot(tmp_path / "set", states, names=list(JOINTS))
     status, _, err = importing(folder, "-o", tmp_path / "run.npz")
@@ -73,7 +61,7 @@ def test_episodes_become_a_folder_of_runs(importing, tmp_path):
     assert "3 episodes at 30 Hz" in out
 
 
-def test_one_bad_log_does_not_stop_the_others(importing, bag, tmp_path):
+def test_one_bad_log_does_not_stop_the_others(bag, tmp_path):
     (tmp_path / "bad.csv").write_text("time,a.velocity\n0,1\n1,x\n")
     (tmp_path / "gone.hdf5").write_bytes(b"\x89HDF\r\n\x1a\n")
     logs = [tmp_path / "bad.csv", tmp_path / "gone.hdf5", bag]
@@ -84,7 +72,7 @@ def test_one_bad_log_does_not_stop_the_others(importing, bag, tmp_path):
     assert [path.name for path in (tmp_path / "runs").iterdir()] == ["bag.npz"]
 
 
-def test_nothing_is_written_of_a_log_that_cannot_be_read(importing, tmp_path):
+def test_nothing_is_written_of_a_log_that_cannot_be_read(tmp_path):
     (tmp_path / "bad.csv").write_text("time,a.velocity\n0,1\n1,x\n")
     status, out, err = importing(tmp_path / "bad.csv", "-o", tmp_path / "run.npz")
     assert (status, out) == (3, "")
@@ -92,7 +80,7 @@ def test_nothing_is_written_of_a_log_that_cannot_be_read(importing, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
 
 
-def test_a_mapping_is_saved_and_used_again(importing, tmp_path):
+def test_a_mapping_is_saved_and_used_again(tmp_path):
     np.savez(tmp_path / "log.npz", clock=np.arange(400) / 100, dq=VELOCITY)
     options = ["--map", "time=clock", "--map", "velocity=dq", "--joints", ",".join(JOINTS)]
     kept = tmp_path / "mapping.toml"
@@ -105,7 +93,7 @@ def test_a_mapping_is_saved_and_used_again(importing, tmp_path):
     assert Run.load(tmp_path / "b.npz").joint_names == JOINTS
 
 
-def test_the_robot_of_a_bag_is_kept_beside_the_run(importing, tmp_path):
+def test_the_robot_of_a_bag_is_kept_beside_the_run(tmp_path):
     text = Robot.load("panda").path.read_text()
     names = [f"panda_joint{n}" for n in range(1, 8)]
     states = joint_states(TALK, names=names, position=numbers(7), velocity=numbers(7))
@@ -119,7 +107,7 @@ def test_the_robot_of_a_bag_is_kept_beside_the_run(importing, tmp_path):
     assert Robot.load(run.robot).configuration(run)[0].shape == (400, 9)
 
 
-def test_two_logs_of_one_name_are_not_written_over_each_other(importing, tmp_path):
+def test_two_logs_of_one_name_are_not_written_over_each_other(tmp_path):
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         log(tmp_path / folder)
@@ -132,14 +120,14 @@ def test_two_logs_of_one_name_are_not_written_over_each_other(importing, tmp_pat
     assert "log.csv: belongs to one log, 2 are given" in err
 
 
-def test_an_output_is_required(importing, bag):
+def test_an_output_is_required(bag):
     status, _, err = importing(bag)
     assert status == 2
     assert "name the run file to write" in err
 
 
 @pytest.mark.parametrize("missing", ["rosbags", "mcap"])
-def test_a_library_that_is_not_installed_is_named(importing, bag, tmp_path, monkeypatch, missing):
+def test_a_library_that_is_not_installed_is_named(bag, tmp_path, monkeypatch, missing):
     monkeypatch.setattr("inspector.logs.read.find_spec", lambda name: name != missing or None)
     status, _, err = importing(bag, "-o", tmp_path / "run.npz")
     assert status == 3
@@ -156,7 +144,7 @@ def logs(tmp_path):
     return tmp_path / "logs", "-o", tmp_path / "runs"
 
 
-def test_an_interrupted_import_goes_on_and_keeps_what_is_complete(importing, logs, tmp_path):
+def test_an_interrupted_import_goes_on_and_keeps_what_is_complete(logs, tmp_path):
     assert importing(*logs)[0] == 0
     runs = [tmp_path / "runs" / f"{name}.npz" for name in "abc"]
     whole = [run.read_bytes() for run in runs]
@@ -171,7 +159,7 @@ def test_an_interrupted_import_goes_on_and_keeps_what_is_complete(importing, log
 
 
 @pytest.mark.parametrize("change", ["log", "options", "other file", "without digest"])
-def test_a_run_of_another_log_or_other_options_is_not_kept(importing, logs, tmp_path, change):
+def test_a_run_of_another_log_or_other_options_is_not_kept(logs, tmp_path, change):
     importing(*logs)
     more = ()
     (tmp_path / "runs" / "b.npz").unlink()
@@ -189,7 +177,7 @@ def test_a_run_of_another_log_or_other_options_is_not_kept(importing, logs, tmp_
     assert importing(*logs, *more, "--overwrite")[0] == 0
 
 
-def test_a_robot_that_an_interrupted_import_has_written_is_kept(importing, tmp_path):
+def test_a_robot_that_an_interrupted_import_has_written_is_kept(tmp_path):
     states = joint_states(TALK, position=POSITION, velocity=VELOCITY)
     places = enumerate(JOINTS)
     urdf = '<robot name="r"><link name="l0"/>' + "".join(

@@ -1,15 +1,14 @@
 import csv
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rerun as rr
 from chains import chain
+from commandline import call
 from recordings import read
 from rerun.chunk import RrdReader
 
-from inspector.cli import main
 from inspector.compare import picture
 from inspector.compare.models import cells, levels, shades, write, write_csv
 from noisemodel import ROBOTS, Comparisons, compare
@@ -30,18 +29,8 @@ def found(urdf):
     return Comparisons(tuple(one for (one,) in seeds))
 
 
-@pytest.fixture
-def inspector(monkeypatch, capsys):
-    """Call the command line; returns exit status, what it printed, and what it complained."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["inspector", "noise", "--compare", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            main()
-        printed = capsys.readouterr()
-        return end.value.code or 0, printed.out, printed.err
-
-    return call
+def inspector(*arguments):
+    return call("noise", "--compare", *arguments)
 
 
 def entities(path):
@@ -124,7 +113,7 @@ def test_a_picture_is_drawn_without_a_display(found, tmp_path):
 
 
 def test_the_command_writes_everything_and_continues_after_a_robot_that_cannot_be_read(
-    inspector, urdf, tmp_path
+    urdf, tmp_path
 ):
     pytest.importorskip("matplotlib")
     outputs = {name: tmp_path / f"out.{name}" for name in ("csv", "rrd", "png")}
@@ -135,14 +124,9 @@ def test_the_command_writes_everything_and_continues_after_a_robot_that_cannot_b
     assert "correlation" in out
     assert [line.split(": ")[1] for line in err.splitlines()] == ["ur3_empty", "robby"]
     assert all(path.stat().st_size > 0 for path in outputs.values())
-    status, _, err = inspector(*arguments)
-    assert (status, err.count("\n")) == (3, 1)
-    assert "out.csv: exists already" in err
-    status, _, _ = inspector(*arguments, "--overwrite")
-    assert status == 0
 
 
-def test_the_command_compares_runs(inspector, tmp_path):
+def test_the_command_compares_runs(tmp_path):
     run = excitation(chain(tmp_path, "revolute", "revolute"))
     run.save(tmp_path / "run.npz")
     status, out, err = inspector(tmp_path / "run.npz", "--kind", "simplified,C")
@@ -151,12 +135,12 @@ def test_the_command_compares_runs(inspector, tmp_path):
     assert "run.npz" in out
 
 
-def test_the_command_prints_what_the_function_returns(inspector, urdf):
+def test_the_command_prints_what_the_function_returns(urdf):
     status, out, _ = inspector("--robots", f"{urdf},robby", "--kind", ",".join(KINDS))
     assert (status, out) == (0, f"{compare([urdf, 'robby'], kinds=KINDS)}\n")
 
 
-def test_the_command_takes_each_robot_once_and_all_of_the_list(inspector, urdf, monkeypatch):
+def test_the_command_takes_each_robot_once_and_all_of_the_list(urdf, monkeypatch):
     given = []
 
     def listed(sources, **_):
@@ -169,7 +153,7 @@ def test_the_command_takes_each_robot_once_and_all_of_the_list(inspector, urdf, 
     assert given == [[Path("a.npz"), "panda", "go2"], list(ROBOTS)]
 
 
-def test_runs_without_robot_are_one_line_and_nothing_else_is_left(inspector, tmp_path):
+def test_runs_without_robot_are_one_line_and_nothing_else_is_left(tmp_path):
     time = np.arange(1000) / 1000
     np.savez(tmp_path / "bare.npz", time=time, velocity=np.cos(time)[:, None])
     np.savez(tmp_path / "still.npz", time=time, velocity=np.cos(time)[:, None], robot="panda")
@@ -191,14 +175,14 @@ def test_runs_without_robot_are_one_line_and_nothing_else_is_left(inspector, tmp
         (["--robots", "all", "--save", "x.rrd"], 3, "x.rrd: a recording holds 8 robots and runs"),
     ],
 )
-def test_what_cannot_be_compared_is_one_line(inspector, arguments, status, message):
+def test_what_cannot_be_compared_is_one_line(arguments, status, message):
     found, out, err = inspector(*arguments)
     assert (found, out) == (status, "")
     assert message in err
     assert status == 2 or err.count("\n") == 1
 
 
-def test_without_matplotlib_a_picture_is_refused_before_any_work(inspector, monkeypatch, tmp_path):
+def test_without_matplotlib_a_picture_is_refused_before_any_work(monkeypatch, tmp_path):
     monkeypatch.setattr(picture, "find_spec", lambda _: None)
     status, _, err = inspector("--robots", "panda", "--picture", tmp_path / "out.png")
     assert (status, err.count("\n")) == (3, 1)

@@ -78,18 +78,6 @@ def test_runs_that_it_was_trained_on_are_refused_in_one_line(folder):
     assert list(json.loads(out)["seen"]) == ["known1"]
 
 
-def test_existing_files_are_not_replaced(folder, tmp_path):
-    there = tmp_path / "there"
-    there.write_text("kept")
-    for option in ("-o", "--picture"):
-        status, _, err = call("evaluate", folder / "model.npz", folder / "test", option, there)
-        assert (status, err.count("\n")) == (3, 1)
-        assert "exists already" in err
-    assert there.read_text() == "kept"
-    call("evaluate", folder / "model.npz", folder / "test", "-o", there, "--overwrite")
-    assert json.loads(there.read_text())["runs"] == 6
-
-
 def simulated(path, seed, *, robot=None, rate=10_000, **meta):
     """A run that swings from 1 s on, with what is known of it."""
     run(path, seed)

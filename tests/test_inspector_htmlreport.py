@@ -8,15 +8,15 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from commandline import call
 
 from inspector.analysis import analyse_file
 from inspector.assets import demo_run, model_files
-from inspector.cli import main
 from inspector.errors import InspectorError
 from inspector.library import load_library
 from inspector.report import html
 from noiseclassifier import Event
-from noisemodel import Block, OutputError, Run
+from noisemodel import Block, Run
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
@@ -163,25 +163,15 @@ def test_many_joints_are_cut_to_the_loudest_with_a_remark(tmp_path):
     assert "10 quieter ones are left out." in words
 
 
-def test_a_page_that_exists_is_kept(tmp_path):
-    (tmp_path / "out.html").write_text("precious")
-    with pytest.raises(OutputError, match="exists already"):
-        html.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
-    assert (tmp_path / "out.html").read_text() == "precious"
-
-
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(html, "find_spec", lambda _: None)
     with pytest.raises(InspectorError, match=r'pip install "noise-inspector\[report\]"'):
         html.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
 
 
-def test_the_command_line_writes_a_page(tmp_path, monkeypatch, capsys):
+def test_the_command_line_writes_a_page(tmp_path):
     short_run().save(tmp_path / "run.npz")
-    arguments = ["view", str(tmp_path / "run.npz"), "-o", str(tmp_path / "out.html")]
-    monkeypatch.setattr("sys.argv", ["inspector", *arguments])
-    with pytest.raises(SystemExit) as end:
-        main()
-    assert not end.value.code
-    assert f"{tmp_path}/out.html: " in capsys.readouterr().out
+    status, out, _ = call("view", tmp_path / "run.npz", "-o", tmp_path / "out.html")
+    assert status == 0
+    assert f"{tmp_path}/out.html: " in out
     assert "rate: 1000 Hz" in Page((tmp_path / "out.html").read_text()).words

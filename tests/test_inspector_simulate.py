@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import call as inspector
 
-from inspector.cli import main
 from inspector.train import classified
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
@@ -21,20 +21,6 @@ from noisemodel import Block, Run, decimated
 
 ROOT = Path(__file__).parents[1]
 JOINTS = scenarios.ROBOTS["panda"].drives.joints
-
-
-@pytest.fixture
-def inspector(monkeypatch, capsys):
-    """Call the command line; returns exit status, what it printed, and what it complained."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["inspector", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            main()
-        printed = capsys.readouterr()
-        return end.value.code or 0, printed.out, printed.err
-
-    return call
 
 
 @pytest.fixture
@@ -78,7 +64,7 @@ def many(*arguments):
     return ("simulate", "dataset", "--robots", "panda", *arguments)
 
 
-def test_help_explains_one_run_and_many(inspector):
+def test_help_explains_one_run_and_many():
     status, out, _ = inspector("simulate", "--help")
     assert status == 0
     assert "dataset" in out
@@ -87,7 +73,7 @@ def test_help_explains_one_run_and_many(inspector):
     assert {"--robots", "--hours", "--only", "--first-seed"} <= set(out.split())
 
 
-def test_scenarios_are_listed_with_numbers_and_families(inspector):
+def test_scenarios_are_listed_with_numbers_and_families():
     status, out, _ = inspector("simulate", "--list")
     assert status == 0
     *lines, robots = out.splitlines()
@@ -100,7 +86,7 @@ def test_scenarios_are_listed_with_numbers_and_families(inspector):
 
 @pytest.mark.parametrize("command", [["simulate"], ["simulate", "run"]])
 @pytest.mark.parametrize("scenario", ["7", "obstacle-toe"])
-def test_one_run_is_made_by_name_or_number(inspector, simulated, tmp_path, command, scenario):
+def test_one_run_is_made_by_name_or_number(simulated, tmp_path, command, scenario):
     output = tmp_path / "run.npz"
     status, out, err = inspector(
         *command, "panda", "--scenario", scenario, "--seed", 3, "-o", output
@@ -111,7 +97,7 @@ def test_one_run_is_made_by_name_or_number(inspector, simulated, tmp_path, comma
     assert Run.load(output).meta["seed"] == 3
 
 
-def test_a_data_set_is_made_once_and_its_statistics_are_printed(inspector, simulated, tmp_path):
+def test_a_data_set_is_made_once_and_its_statistics_are_printed(simulated, tmp_path):
     simulated.falls.add(("obstacle-toe", 5))
     call = many("--seeds", 2, "--first-seed", 4, "--scenarios", "1,7", "-o", tmp_path)
     status, out, err = inspector(*call)
@@ -125,7 +111,7 @@ def test_a_data_set_is_made_once_and_its_statistics_are_printed(inspector, simul
     assert len(simulated.calls) == 4
 
 
-def test_hours_of_ok_motion_are_reached_in_spite_of_falls(inspector, simulated, tmp_path):
+def test_hours_of_ok_motion_are_reached_in_spite_of_falls(simulated, tmp_path):
     simulated.falls.add(("curve", 0))
     call = many("--only", "ok", "--hours", 100 / 3600, "--duration", 5, "-o", tmp_path, "--json")
     status, out, _ = inspector(*call)
@@ -151,9 +137,7 @@ def test_hours_of_ok_motion_are_reached_in_spite_of_falls(inspector, simulated, 
         (["--duration", "1"], "duration 1 s: expected at least 3 s"),
     ],
 )
-def test_wrong_settings_are_one_line_and_simulate_nothing(
-    inspector, simulated, tmp_path, arguments, problem
-):
+def test_wrong_settings_are_one_line_and_simulate_nothing(simulated, tmp_path, arguments, problem):
     status, out, err = inspector(*many(*arguments, "-o", tmp_path / "data"))
     assert (status, out, err.count("\n")) == (3, "", 1)
     assert problem in err
@@ -161,7 +145,7 @@ def test_wrong_settings_are_one_line_and_simulate_nothing(
     assert simulated.calls == []
 
 
-def test_wrong_outputs_are_one_line(inspector, simulated, tmp_path):
+def test_wrong_outputs_are_one_line(simulated, tmp_path):
     (tmp_path / "file").write_text("precious")
     status, _, err = inspector(*many("-o", tmp_path / "file"))
     assert (status, err.count("\n")) == (3, 1)
@@ -172,7 +156,7 @@ def test_wrong_outputs_are_one_line(inspector, simulated, tmp_path):
     assert (tmp_path / "file").read_text() == "precious"
 
 
-def test_a_damaged_run_is_named_and_replaced_with_overwrite(inspector, simulated, tmp_path):
+def test_a_damaged_run_is_named_and_replaced_with_overwrite(simulated, tmp_path):
     call = many("--seeds", 2, "--scenarios", 1, "-o", tmp_path)
     inspector(*call)
     (tmp_path / "panda/straight-001.npz").write_bytes(b"PK")
@@ -185,7 +169,7 @@ def test_a_damaged_run_is_named_and_replaced_with_overwrite(inspector, simulated
     assert len(simulated.calls) == 3
 
 
-def test_without_the_simulator_one_line_names_what_to_install(inspector, tmp_path, monkeypatch):
+def test_without_the_simulator_one_line_names_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     for call in (("simulate", "panda", "-o", tmp_path / "r.npz"), many("-o", tmp_path / "data")):
         status, _, err = inspector(*call)
@@ -194,7 +178,7 @@ def test_without_the_simulator_one_line_names_what_to_install(inspector, tmp_pat
     assert not (tmp_path / "r.npz").exists()
 
 
-def test_a_model_is_trained_on_a_folder_of_runs(inspector, simulated, tmp_path):
+def test_a_model_is_trained_on_a_folder_of_runs(simulated, tmp_path):
     data, model = tmp_path / "data", tmp_path / "m.npz"
     inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
     status, out, _ = inspector("train", data, "-o", model, "--profile", "norms")
@@ -209,7 +193,7 @@ def test_a_model_is_trained_on_a_folder_of_runs(inspector, simulated, tmp_path):
     assert np.array(json.loads(out)["confusion"]).sum() == 2 * 7
 
 
-def test_a_run_without_a_block_is_skipped(simulated, inspector, tmp_path):
+def test_a_run_without_a_block_is_skipped(simulated, tmp_path):
     data, model = tmp_path / "data", tmp_path / "m.npz"
     inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
     one = data / "panda/straight-002.npz"
@@ -221,7 +205,7 @@ def test_a_run_without_a_block_is_skipped(simulated, inspector, tmp_path):
     assert (status, found["runs"], np.array(found["confusion"]).sum()) == (0, 3, 2 * 2 * 7)
 
 
-def test_a_data_set_keeps_the_signals_of_its_runs_at_its_rate(simulated, inspector, tmp_path):
+def test_a_data_set_keeps_the_signals_of_its_runs_at_its_rate(simulated, tmp_path):
     run = stub("panda", "straight", 0, 7.0)
     for rate in (10_000, 1000):
         data = tmp_path / str(rate)

@@ -99,11 +99,10 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("rate", [1000.0, 10_000.0])
 @given(**FAULTS)
 @settings(max_examples=6, deadline=None, derandomize=True)
-def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(rate, kind, joint, frequency, seed):
-    check_the_law("panda", rate, kind, joint, frequency, seed)
+def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(kind, joint, frequency, seed):
+    check_the_law("panda", 1000.0, kind, joint, frequency, seed)
 
 
 @pytest.mark.slow
@@ -112,7 +111,7 @@ def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(rate, kind, joint, f
     [("panda", 250.0), ("ur5", 10_000.0), ("go2", 2000.0), ("talos", 1000.0)],
 )
 @given(**FAULTS)
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=15, deadline=None, derandomize=True)
 def test_a_loud_fault_of_any_robot_is_a_finding_and_stays_one(
     robot, rate, kind, joint, frequency, seed
 ):
@@ -130,7 +129,7 @@ def test_a_faint_fault_that_is_found_is_found_louder_too(kind, joint, frequency,
     assert found == sorted(found)
 
 
-@pytest.mark.parametrize("amplitude", [0.1, 0.3, 1.0, 3.0, 10.0, 100.0])
+@pytest.mark.parametrize("amplitude", [0.1, 1.0, 100.0])
 @pytest.mark.parametrize("frequency", [35.0, 90.0, 180.0])
 def test_a_tone_on_one_joint_of_a_panda_is_a_finding_however_loud(frequency, amplitude):
     run = good_run("panda", 10_000.0)

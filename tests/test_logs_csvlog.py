@@ -1,28 +1,9 @@
 import numpy as np
 import pytest
-from csvlogs import TIME, text, write
+from csvlogs import text, write
 
 from inspector import read_log
 from inspector.errors import LogError
-
-
-@pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", ", "])
-def test_all_delimiters_are_recognised(tmp_path, delimiter):
-    columns = {"timestamp": TIME, "actual_qd_0": TIME, "target_qd_0": -TIME}
-    run = read_log(write(tmp_path / "log.csv", columns, delimiter)).run
-    assert np.array_equal(run.velocity[:, 0], TIME)
-    assert np.array_equal(run.velocity_desired[:, 0], -TIME)
-
-
-def test_blank_lines_quotes_and_a_byte_order_mark_are_accepted(tmp_path):
-    body = '\ufefftime,"a.velocity"\r\n0,1\r\n\r\n0.01,"2"\r\n0.02,3\r\n\r\n'
-    assert np.array_equal(read_log(text(tmp_path, body)).run.velocity.T, [[1, 2, 3]])
-
-
-def test_numpys_own_header_is_read(tmp_path):
-    table = np.stack((TIME, TIME), axis=1)
-    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="time,a.velocity")
-    assert read_log(tmp_path / "log.csv").run.joint_names == ("a",)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import json
 import h5py
 import numpy as np
 import pytest
-from samplelogs import cut, numbers
+from samplelogs import numbers
 
 from inspector import read_log, read_logs
 from inspector.errors import LogError
@@ -91,12 +91,3 @@ def test_what_is_missing_is_an_error_of_one_line(tmp_path):
     message = "demo_0 holds no known joint positions or velocities; name them, .* obs/eef"
     with pytest.raises(LogError, match=message):
         read_log(path, rate=50)
-
-
-@pytest.mark.parametrize("share", [0.001, 0.5, 0.95])
-def test_a_file_that_was_cut_off_is_an_error_of_one_line(tmp_path, share):
-    path = cut(robomimic(tmp_path), share)
-    with pytest.raises(LogError) as caught:
-        list(read_logs(path))
-    assert str(caught.value).startswith(str(path))
-    assert "\n" not in str(caught.value)

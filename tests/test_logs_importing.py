@@ -32,15 +32,6 @@ def test_an_imported_run_is_saved_and_loaded(tmp_path):
     assert Run.load(tmp_path / "run.npz").meta == run.meta
 
 
-def test_velocities_that_are_missing_are_differentiated_with_a_remark(tmp_path):
-    position, velocity = swing(TIME)
-    imported = read_log(write(tmp_path / "log.csv", {"time": TIME, "a.position": position}))
-    assert np.abs(imported.run.velocity[:, 0] - velocity).max() < 5e-3 * np.abs(velocity).max()
-    method = "Savitzky-Golay, window 7, order 3"
-    assert imported.run.meta["differentiated"] == {"velocity": method}
-    assert imported.remarks == (f"velocity: differentiated from positions ({method})",)
-
-
 def test_a_joint_without_positions_leaves_all_positions_out(tmp_path):
     imported = read_log(log(tmp_path, **{"wrist.velocity": TIME, "elbow.effort": TIME}))
     assert imported.run.joint_names == ("elbow", "wrist")

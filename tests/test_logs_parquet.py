@@ -1,7 +1,5 @@
 """Parquet, wide and as LeRobot has it, written by pyarrow."""
 
-import json
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -165,11 +163,3 @@ def test_a_broken_info_file_is_an_error_of_one_line(tmp_path, info, message):
     (folder / "meta" / "info.json").write_text(info)
     with pytest.raises(LogError, match=message):
         read_log(folder)
-
-
-def test_damaged_data_is_an_error_of_one_line(tmp_path):
-    folder = write_lerobot(tmp_path / "set", [STATE], names=None)
-    cut(folder / "data" / "chunk-000" / "file-000.parquet", 0.7)
-    with pytest.raises(LogError, match="damaged or cut off"):
-        read_log(folder)
-    assert json.loads((folder / "meta" / "info.json").read_text())

@@ -4,11 +4,11 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, motion, numbers, write_bag
+from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
-from noisemodel import Robot, Run
+from noisemodel import Robot
 
 TALK, OLD = Talk(), Talk(ros1=True)
 POSITION, VELOCITY, EFFORT = (numbers(seed=seed) for seed in range(3))
@@ -64,14 +64,6 @@ def test_messages_without_stamps_have_those_of_the_recorder(tmp_path):
     imported = read_log(bag(tmp_path, {"/joint_states": messages}))
     assert np.array_equal(imported.run.position, POSITION)
     assert "bag: the messages have no stamps, those of the recorder are used" in imported.remarks
-
-
-def test_velocities_that_were_not_logged_are_differentiated_with_a_remark(tmp_path):
-    position, velocity = motion((TIMES - EPOCH) * 1e-9)
-    path = bag(tmp_path, {"/joint_states": joint_states(TALK, position=position)})
-    run = read_log(path).run
-    assert np.abs(run.velocity - velocity)[4:-4].max() < 0.01 * np.abs(velocity).max()
-    assert "velocity" in run.meta["differentiated"]
 
 
 def test_the_order_of_the_joints_may_change_from_message_to_message(tmp_path):
@@ -357,12 +349,6 @@ def test_one_nan_is_a_gap_but_columns_of_nan_are_left_out(tmp_path):
     )
     with pytest.raises(LogError, match=message):
         read_log(bag(tmp_path, topics, name="infinite"))
-
-
-def test_an_imported_bag_is_saved_and_loaded(tmp_path):
-    run = read_log(bag(tmp_path, {"/joint_states": states()})).run
-    run.save(tmp_path / "run.npz")
-    assert Run.load(tmp_path / "run.npz").meta == run.meta
 
 
 def test_a_long_bag_takes_little_more_memory_than_its_values(tmp_path):

@@ -14,8 +14,6 @@ from inspector.logs.arrays import followed
 from inspector.logs.clocks import rate_of
 
 STEPS = 400
-TURN = [np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)]
-"""A quarter turn about z, w first."""
 
 
 def moved(rate, joints=7, samples=STEPS):

@@ -7,17 +7,17 @@ from io import BytesIO
 import numpy as np
 import pytest
 import rerun as rr
+from commandline import call as inspector
 from recordings import BAND, LABELS, LINE, MOTION, ROW, STRIP, check_columns, entities, read
 from rerun.chunk import RrdReader
 
-from inspector.cli import main
 from inspector.compare.pair import compare
 from inspector.compare.recording import write
 from inspector.levels import LINKS as LINK_SCALE
 from inspector.levels import link_levels
 from inspector.recording import panels
 from noiseclassifier import Event, Labels
-from noisemodel import Block, OutputError, Run
+from noisemodel import Block, Run
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 LINKS = r"panda_(link\d|leftfinger|rightfinger)"
@@ -366,55 +366,35 @@ def test_different_joints_are_shown_each_and_the_shared_ones_compared(tmp_path):
     )
 
 
-def test_an_existing_recording_is_not_overwritten_unasked(tmp_path):
-    (tmp_path / "out.rrd").write_text("precious")
-    pair = compared(tmp_path, panda(), panda(), robot=False)
-    with pytest.raises(OutputError, match="exists already"):
-        write(pair, tmp_path / "out.rrd")
-    assert (tmp_path / "out.rrd").read_text() == "precious"
-
-
-def inspector(capsys, monkeypatch, *arguments):
-    monkeypatch.setattr("sys.argv", ["inspector", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    printed = capsys.readouterr()
-    return ended.value.code or 0, printed.out, printed.err
-
-
-def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(capsys, monkeypatch, tmp_path):
+def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(tmp_path):
     panda(robot=None).save(tmp_path / "a.npz")
     panda(2.0, robot=None).save(tmp_path / "b.npz")
     save = ("--save", tmp_path / "ab.rrd")
     runs = (tmp_path / "a.npz", tmp_path / "b.npz")
-    status, out, _ = inspector(capsys, monkeypatch, "view", *runs, *save)
+    status, out, _ = inspector("view", *runs, *save)
     assert status == 0
     assert "vibration +6.0 dB" in out
     assert "aligned by the motion: after starts +0.0000 s from before (correlation 1.00" in out
     assert "/class/after/annotated/oscillations" in entities(tmp_path / "ab.rrd")
-    status, out, _ = inspector(
-        capsys, monkeypatch, "view", *runs, *save, "--align", "start", "--overwrite"
-    )
+    status, out, _ = inspector("view", *runs, *save, "--align", "start", "--overwrite")
     assert (status, "aligned from the start, as requested" in out) == (0, True)
 
 
-def test_what_takes_two_runs_or_one_is_wrong_usage_with_the_other(capsys, monkeypatch, tmp_path):
+def test_what_takes_two_runs_or_one_is_wrong_usage_with_the_other(tmp_path):
     panda(robot=None).save(tmp_path / "a.npz")
     run = tmp_path / "a.npz"
-    status, _, err = inspector(capsys, monkeypatch, "view", run, "--align", "start")
+    status, _, err = inspector("view", run, "--align", "start")
     assert (status, "--align takes two runs" in err) == (2, True)
-    status, _, err = inspector(capsys, monkeypatch, "view", run, run, "--terms")
+    status, _, err = inspector("view", run, run, "--terms")
     assert (status, "--terms takes one run" in err) == (2, True)
 
 
-def test_runs_that_share_no_time_end_with_one_line(capsys, monkeypatch, tmp_path):
+def test_runs_that_share_no_time_end_with_one_line(tmp_path):
     run = panda(robot=None, blocks=())
     run.save(tmp_path / "a.npz")
     panda(robot=None, blocks=(), time=run.time + 9).save(tmp_path / "b.npz")
     runs = (tmp_path / "a.npz", tmp_path / "b.npz")
-    status, _, err = inspector(
-        capsys, monkeypatch, "view", *runs, "--align", "none", "--save", tmp_path / "ab.rrd"
-    )
+    status, _, err = inspector("view", *runs, "--align", "none", "--save", tmp_path / "ab.rrd")
     assert status == 3
     assert err.count("\n") == 1
     assert "they share no time; `--align start`" in err

@@ -30,7 +30,7 @@ from inspector.recording.run import linked, write
 from inspector.reference.judging import Scenario, compare
 from inspector.reference.levels import levels as levels_of
 from noiseclassifier import Event, Labels
-from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
+from noisemodel import Block, RobotError, Run, UnknownJointError
 
 SOUND = b"RIFF....WAVE, as far as a recording is concerned"
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
@@ -748,17 +748,6 @@ def test_the_papers_terms_are_shown_on_demand(tmp_path):
 def entities_of(run, tmp_path, path, **options):
     write(inspected(run, tmp_path, **options), path, overwrite=True)
     return entities(path)
-
-
-def test_an_existing_recording_is_not_overwritten_unasked(tmp_path):
-    path = tmp_path / "out.rrd"
-    path.write_text("precious")
-    found = inspected(panda_run(robot=None), tmp_path)
-    with pytest.raises(OutputError, match="exists already"):
-        write(found, path)
-    assert path.read_text() == "precious"
-    write(found, path, overwrite=True)
-    assert "/noise/simplified" in entities(path)
 
 
 def test_a_recording_that_fails_halfway_leaves_nothing(tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ from inspector.errors import InspectorError
 from inspector.recording import picture
 from inspector.recording.run import write
 from inspector.recording.viewer import ViewerError
-from noisemodel import OutputError, Run
+from noisemodel import Run
 
 
 def recording(folder: Path) -> Path:
@@ -44,14 +44,6 @@ def test_system_packages_that_are_missing_are_named(monkeypatch, tmp_path):
     monkeypatch.setattr(picture, "find_library", lambda _: "libvulkan.so.1")
     with pytest.raises(ViewerError, match="`apt-get install mesa-vulkan-drivers`"):
         picture.require()
-
-
-def test_a_picture_that_exists_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(picture, "require", lambda: None)
-    (tmp_path / "run.rrd").write_bytes(picture.MAGIC)
-    (tmp_path / "out.png").write_text("precious")
-    with pytest.raises(OutputError, match="exists already"):
-        picture.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
 
 
 def test_a_viewer_that_ends_is_one_line(monkeypatch):

@@ -45,12 +45,14 @@ TABLE = [
     ("train", ("run.npz",), "-o {}.npz", ("run.npz",)),
     ("tune", ("good", "--validation", "run.npz"), "-o {}", ("run.npz",)),
     ("tune", ("good", "--validation", "run.npz", "-o", "new"), "--train {}.npz", ("run.npz",)),
-    ("evaluate", ("model.npz", "run.npz"), "-o {}", ("run.npz", "model.npz")),
+    ("evaluate", ("model.npz", "run.npz"), "-o {}.json", ("run.npz", "model.npz")),
     ("evaluate", ("model.npz", "run.npz"), "--picture {}.png", ("run.npz", "model.npz")),
 ]
 """Commands, what they read, an output, and the files that it must not replace."""
 WITHOUT = {"robots", "audit", "simulate", "help", "accept"}
 """Commands that write nothing, or read nothing, or are tested elsewhere."""
+STATES = ("--resume {}", "-o {}")
+"""Outputs that a command goes on with, where they are its own."""
 CASES = [(command, read, output, each) for command, read, output, files in TABLE for each in files]
 
 
@@ -87,6 +89,20 @@ def test_an_output_never_replaces_a_file_that_is_read(
     assert status in (3, 5)  # 5: those of a folder are listed after the work is begun
     assert (place / name).read_bytes() == before
     assert f"{target.format('linked')}: is read, too; choose another name" in err
+
+
+@pytest.mark.parametrize(
+    ("command", "read", "output"), [row[:3] for row in TABLE if row[2] not in STATES]
+)
+def test_an_output_that_exists_is_kept(place, monkeypatch, command, read, output):
+    option, _, link = output.partition(" ")
+    target = (link.partition("=")[2] or link).format("there")
+    (place / target).write_text("precious")
+    with (place / "log.csv").open() as rows:
+        monkeypatch.setattr(sys, "stdin", rows)
+        status, _, err = call(command, *read, option, link.format("there"))
+    assert (status, (place / target).read_text()) == (3, "precious")
+    assert f"{target}: exists already" in err
 
 
 def test_each_command_that_reads_and_writes_is_in_the_table():
