@@ -1,4 +1,9 @@
+import contextlib
+import io
+import json
 import os
+import re
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -44,6 +49,37 @@ def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
 
+@pytest.fixture
+def apart(monkeypatch):
+    """Compile in a process of its own, as outside of tests, in two seconds of processor time."""
+    whole = subprocess.run
+
+    def run(command, **options):
+        code = command[-1].replace("mjcf.", "mjcf.SECONDS = 2; mjcf.", 1)
+        return whole([*command[:-1], code], **options)
+
+    monkeypatch.setattr(subprocess, "run", run)
+
+
+@pytest.fixture(autouse=True)
+def here(request, monkeypatch):
+    """Compile in this process, which need not import what it compiles with."""
+
+    def run(command, cwd, **_):
+        said = io.StringIO()
+        with contextlib.chdir(cwd), contextlib.redirect_stdout(said):
+            try:
+                mjcf.compile_here(json.loads(re.search(r"\[.*\]", command[-1])[0]))
+                status = 0
+            except SystemExit as end:
+                status = end.code
+        return subprocess.CompletedProcess(command, status, said.getvalue().encode())
+
+    if "apart" not in request.fixturenames:
+        monkeypatch.setattr("resource.setrlimit", lambda *_: None)
+        monkeypatch.setattr(subprocess, "run", run)
+
+
 def written(folder, text, name="robot.xml"):
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -74,7 +110,7 @@ def state_in_mujoco(model, seed=0):
 
 
 @pytest.mark.parametrize("text", [ARM, LEGS])
-def test_bodies_move_as_in_mujoco(tmp_path, text):
+def test_bodies_move_as_in_mujoco(tmp_path, apart, text):
     path = written(tmp_path, text)
     robot, model = Robot.load(path), mujoco.MjModel.from_xml_path(str(path))
     data, q, v = state_in_mujoco(model)
@@ -594,7 +630,9 @@ ATTACKS = {
 
 
 @pytest.mark.parametrize("attack", ATTACKS)
-def test_what_would_take_gigabytes_or_minutes_is_refused_in_one_line(tmp_path, attack, monkeypatch):
+def test_what_would_take_gigabytes_or_minutes_is_refused_in_one_line(
+    tmp_path, apart, attack, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(RobotError) as caught:
         Surface.of(Robot.load(written(tmp_path, ATTACKS[attack])))
@@ -602,7 +640,7 @@ def test_what_would_take_gigabytes_or_minutes_is_refused_in_one_line(tmp_path, a
     assert os.listdir(tmp_path) == ["robot.xml"]  # no MUJOCO_LOG.TXT
 
 
-def test_models_that_double_with_each_level_are_refused(tmp_path):
+def test_models_that_double_with_each_level_are_refused(tmp_path, apart):
     for level in range(30):
         models = "".join(f'<model name="{n}" file="a{level + 1}.xml"/>' for n in "lr" if level < 29)
         written(tmp_path, f"<mujoco><asset>{models}</asset></mujoco>", f"a{level}.xml")
