@@ -50,3 +50,15 @@ def golden():
         pytest.skip("needs shared/golden/noisytest, the outputs of NoisyTest")
     with np.load(folder / "golden.npz", allow_pickle=False) as arrays:
         return dict(arrays), json.loads((folder / "golden.json").read_text())["results"]
+
+
+@pytest.fixture
+def apart(monkeypatch):
+    """Compile MJCF in a process of its own, which has two seconds of processor time."""
+    whole = subprocess.run
+
+    def run(command, **options):
+        code = command[-1].replace("mjcf.", "mjcf.SECONDS = 2; mjcf.", 1)
+        return whole([*command[:-1], code], **options)
+
+    monkeypatch.setattr(subprocess, "run", run)

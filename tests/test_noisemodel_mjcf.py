@@ -49,18 +49,6 @@ def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
 
-@pytest.fixture
-def apart(monkeypatch):
-    """Compile in a process of its own, as outside of tests, in two seconds of processor time."""
-    whole = subprocess.run
-
-    def run(command, **options):
-        code = command[-1].replace("mjcf.", "mjcf.SECONDS = 2; mjcf.", 1)
-        return whole([*command[:-1], code], **options)
-
-    monkeypatch.setattr(subprocess, "run", run)
-
-
 @pytest.fixture(autouse=True)
 def here(request, monkeypatch):
     """Compile in this process, which need not import what it compiles with."""

@@ -120,7 +120,7 @@ def attached(folder, count):
     return folder / "a0.xml"
 
 
-def test_models_that_attach_each_other_twice_are_one_line(tmp_path):
+def test_models_that_attach_each_other_twice_are_one_line(tmp_path, apart):
     assert len(Robot.load(attached(tmp_path, 3)).joints) == 0
     with pytest.raises(RobotError, match="a0.xml: MuJoCo ") as caught:
         Robot.load(attached(tmp_path, 40))
@@ -136,7 +136,7 @@ def test_models_that_attach_each_other_twice_are_one_line(tmp_path):
         "<body><joint/></body>" * 15_000,
     ],
 )
-def test_an_mjcf_of_more_than_any_robot_has_is_one_line(tmp_path, element):
+def test_an_mjcf_of_more_than_any_robot_has_is_one_line(tmp_path, apart, element):
     path = tmp_path / "r.xml"
     path.write_text(f'<mujoco><worldbody><body name="b">{element}</body></worldbody></mujoco>')
     with pytest.raises(RobotError, match="r.xml: (MuJoCo |30002 bodies and geoms)") as caught:
