@@ -222,8 +222,8 @@ WHOLE = 0.02
 
 def step_of(values: Real) -> float:
     """Quantisation step of a signal."""
-    thinned = values[:: max(1, len(values) // MOST_SAMPLES)].astype(np.float64)
-    distances = np.diff(np.unique(thinned))
+    thinned = np.unique(values[:: max(1, len(values) // MOST_SAMPLES)]).astype(np.float64)
+    distances = np.diff(thinned)
     distances = distances[distances > 1e-12 * np.abs(thinned).max()]  # below: a sum's rounding
     if len(distances) < LEVELS - 1:
         return 0.0

@@ -78,9 +78,10 @@ def norms(run: Run) -> dict[str, Array]:
         ``desired`` and ``error``, the difference of desired and measured velocities of the joints
         that have both, if there are any.
     """
+    motion = run.motion
     signals = {
-        "noise": simplified(run.motion, run.velocity_desired),
-        "measured": simplified(run.motion),
+        "noise": simplified(motion, run.velocity_desired),
+        "measured": simplified(motion),
     }
     if (desired := run.velocity_desired) is not None:
         signals["desired"] = simplified(desired)

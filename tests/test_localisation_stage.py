@@ -3,12 +3,12 @@ import pytest
 
 from inspector.localisation.stage import (
     Localisation,
-    changes,
     first_stage,
     flow,
     onset,
     quiet_statistics,
     rise,
+    sudden,
 )
 from noiseclassifier import Event
 from noisemodel import Block, Run
@@ -156,7 +156,8 @@ def test_the_edge_of_a_gap_is_no_jump():
         stages=empty,
         valid=valid,
     )
-    assert np.abs(changes(flow(gap, slice(3800, 4080)))).max() < 10.0
+    part = flow(gap, slice(3800, 4080))
+    assert np.abs(sudden(part.velocity, part.valid, part.rate)).max() < 10.0
     assert found(gap) == Localisation()
 
 
@@ -177,7 +178,8 @@ def test_slow_motion_is_no_change():
     run = flowing_run(stages={})
     smooth = np.cos(np.outer(run.time, [2.0, 3.0, 4.0]))
     slow = flow(flowing_run(velocity=smooth, velocity_desired=smooth, stages={}), slice(0, 2000))
-    assert np.abs(changes(slow)[:, 80:]).max() < 0.3  # of accelerations of up to 16 rad/s²
+    change = sudden(slow.velocity, slow.valid, slow.rate)
+    assert np.abs(change[:, 80:]).max() < 0.3  # of accelerations of up to 16 rad/s²
 
 
 def test_an_onset_is_the_sample_at_which_something_sets_in():

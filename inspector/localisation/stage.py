@@ -168,13 +168,8 @@ class QuietStatistics:
 
     def innovation(self, stages: Flow) -> Innovation:
         """Compute the innovation of a stretch of the run."""
-        change = changes(stages)
-        lags = _lags(stages.rate)
-        residual = change.copy()
-        for place, weights in enumerate(self.weights):
-            for column, lag in enumerate(lags.tolist()):
-                past = change[place, : change.shape[1] - lag]
-                residual[place + 1, lag:] -= weights[:, column] * past
+        change = sudden(stages.velocity, stages.valid, stages.rate)
+        residual = _residual(change, self.weights, _lags(stages.rate))
         residual[:, ~stages.valid] = 0.0
         total, rest = np.linalg.norm(change, axis=2), np.linalg.norm(residual, axis=2)
         return Innovation(change, residual, total, np.minimum(total, rest))
@@ -190,21 +185,24 @@ def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatis
     zeros = np.zeros(stages)
     if not stretches:
         return QuietStatistics(np.zeros((stages - 1, joints, len(lags))), zeros, zeros)
-    warm = min(first.samples(WARM), first.velocity.shape[1] - 1)
-    change = [changes(each) for each in stretches]
-    size = change[0].shape[1]
-    rows = np.arange(warm, size, max(1, (size - warm) * len(change) // ROWS))
-    target = np.concatenate([each[:, rows] for each in change], axis=1)
-    past = np.concatenate([each[:-1, rows[:, None] - lags] for each in change], axis=1)
-    past = past.transpose(0, 3, 1, 2)  # stages, joints, samples, lags
-    square = past.transpose(0, 1, 3, 2) @ past
+    velocity = np.stack([each.velocity for each in stretches])
+    size = velocity.shape[2]
+    warm = min(first.samples(WARM), size - 1)
+    change = sudden(velocity, np.ones(size, dtype=bool), run.rate)
+    step = max(1, (size - warm) * len(change) // ROWS)
+    # By stage, joint, stretch and sample, and then with all samples in a row.
+    moved = np.ascontiguousarray(change.transpose(1, 3, 0, 2))
+    target = moved[1:, ..., warm::step].reshape(stages - 1, joints, -1)
+    past = np.stack(
+        [moved[:-1, ..., warm - lag : size - lag : step] for lag in lags.tolist()], axis=2
+    ).reshape(stages - 1, joints, len(lags), -1)
+    square = past @ past.swapaxes(2, 3)
     mean = np.trace(square, axis1=2, axis2=3)[..., None, None] / len(lags)
     square = square + (RIDGE * mean + np.finfo(float).tiny) * np.eye(len(lags))
-    right = np.einsum("kjsl,ksj->kjl", past, target[1:])
-    weights = np.linalg.solve(square, right[..., None])[..., 0]
-    fitted = QuietStatistics(weights, zeros, zeros)
-    # stretches, stages, samples
-    level = np.array([fitted.innovation(each).level[:, warm:] for each in stretches])
+    weights = np.linalg.solve(square, past @ target[..., None])[..., 0]
+    total = np.linalg.norm(change, axis=3)
+    rest = np.linalg.norm(_residual(change, weights, lags), axis=3)
+    level = np.minimum(total, rest)[..., warm:]  # stretches, stages, samples
     return QuietStatistics(
         weights,
         power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
@@ -212,13 +210,14 @@ def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatis
     )
 
 
-def changes(stages: Flow) -> Array:
-    """Sudden changes at each stage.
-
-    Returns:
-        Shape (stages, samples, joints), in [rad/s²]; 0 next to gaps.
-    """
-    return sudden(stages.velocity, stages.valid, stages.rate)
+def _residual(change: Array, weights: Array, lags: Indices) -> Array:
+    """Changes less their prediction, shape (..., stages, samples, joints)."""
+    residual = change.copy()
+    for place, own in enumerate(weights):
+        for column, lag in enumerate(lags.tolist()):
+            past = change[..., place, : change.shape[-2] - lag, :]
+            residual[..., place + 1, lag:, :] -= own[:, column] * past
+    return residual
 
 
 def sudden(velocity: Array, valid: Mask, rate: float) -> Array:
@@ -238,12 +237,10 @@ def sudden(velocity: Array, valid: Mask, rate: float) -> Array:
     together = valid[step:] & valid[:-step]
     change[..., step:, :] = (velocity[..., step:, :] - velocity[..., :-step, :]) * rate / step
     change[..., step:, :][..., ~together, :] = 0.0
-    samples = change.shape[-2]
-    sums = np.zeros((*change.shape[:-2], samples + 1, change.shape[-1]))
-    np.cumsum(change, axis=-2, out=sums[..., 1:, :])
-    last = np.arange(1, samples + 1)
-    first = np.maximum(0, last - trail)
-    change -= (sums[..., last, :] - sums[..., first, :]) / (last - first)[:, None]
+    sums = np.cumsum(change, axis=-2)
+    past = sums.copy()
+    past[..., trail:, :] -= sums[..., :-trail, :]
+    change -= past / np.minimum(np.arange(1, past.shape[-2] + 1), trail)[:, None]
     change[..., ~valid, :] = 0.0
     return change
 

@@ -208,25 +208,26 @@ def strong(window: Array, rate: float) -> list[tuple[int, float, float]]:
     Returns:
         Joint, frequency in [Hz] and strength in [dB] of each.
     """
-    power, frequency = spectrum(window, rate)
-    line = power[0]
+    line, frequency = spectrum(window[0], rate)
     loud = line >= 10.0 ** ((STRONG + FLOOR) / 10.0)
     loud &= (frequency >= LOWEST) & (frequency <= HIGHEST * rate)
     loud[:, 1:-1] &= (line[:, 1:-1] >= line[:, :-2]) & (line[:, 1:-1] >= line[:, 2:])
     if not loud.any():
         return []
     rows, places = np.nonzero(loud)
+    loudest, row = np.unique(rows, return_inverse=True)  # most often few joints, or none
+    power = np.concatenate((line[None, loudest], spectrum(window[1:, loudest], rate)[0]))
     median = np.empty((len(power), len(rows)))
     band = np.floor(np.log(frequency[places] / LOWEST) / np.log(BAND))
     for each in np.unique(band).tolist():
         centre = LOWEST * BAND ** (each + 0.5)
         around = slice(*np.searchsorted(frequency, (centre / AROUND, centre * AROUND)))
         own = np.flatnonzero(band == each)
-        beside = power[:, rows[own], around]
+        beside = power[:, row[own], around]
         middle = beside.shape[-1] // 2
         median[:, own] = np.partition(beside, middle, axis=-1)[..., middle]
     # A line of both, at the level of the weaker one.
-    shared = np.maximum(np.minimum(line[rows, places], power[:, rows, places]), TINY)
+    shared = np.maximum(np.minimum(power[0, row, places], power[:, row, places]), TINY)
     level = 10.0 * np.log10(shared)
     prominence = level - 10.0 * np.log10(np.maximum(median, TINY))
     strength = np.minimum(prominence, level - FLOOR).max(axis=0)
