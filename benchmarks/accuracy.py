@@ -26,7 +26,8 @@ Other seeds of robots in wide domains: good runs, faults, tones over whole runs,
 cut out of their runs. Then real logs of good motion, with tones of half a second added."""
 REPEATED = """
 Runs of robots against good repetitions of the same motion, with other sensor noise, friction and
-gains ([statistics](statistics.md))."""
+gains ([statistics](statistics.md)): first of Panda, Go2 and TALOS, on which margins were chosen,
+then of an arm of another simulator (`benchmarks.arm`), which was measured only."""
 
 
 def main() -> None:
@@ -41,7 +42,10 @@ def main() -> None:
     tables = others.partition("\nMissed, of")[0]
     runs = sorted(given.simulated.rglob("*.npz"))
     lasting = printed("benchmarks.lasting", *runs, "--logs", *given.logs)
-    repeated = printed("benchmarks.repetitions", "table", given.repetitions)
+    repetitions = "benchmarks.repetitions"
+    repeated = printed(repetitions, "table", given.repetitions)
+    repeated += "\n" + printed(repetitions, "table", given.repetitions, "arm")
+    repeated += printed(repetitions, "pool")
     sections = [
         ("Other simulators", OTHERS, tables),
         ("What happens and what lasts", LASTING, lasting),

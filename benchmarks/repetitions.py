@@ -2,10 +2,13 @@
 
     python -m benchmarks.repetitions make DIR [panda,go2,talos]     # about 5 processor minutes
     python -m benchmarks.repetitions table DIR [panda,go2,talos]
+    python -m benchmarks.repetitions pool
 
 Each robot makes two motions; a motion has six good repetitions with other sensor noise, frictions
 (by 10 %) and gains (by 2 %), and eight faults. A fault is detectable if the labelling rule says so.
-Margins and floors were chosen on panda, go2 and talos; ur10 and anymal are measured only.
+Margins and floors were chosen on panda, go2 and talos; ur10, anymal and arm are measured only. The
+arm is one of another simulator, `benchmarks.arm`, with five faults of each motion; the pool are
+runs of four of its motions, 15 accepted and 10 others each, as they are and with a chatter.
 """
 
 import sys
@@ -16,9 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import arm
 from inspector.reference.judging import Comparison, Scenario, compare, margin_of
 from inspector.reference.levels import Levels, levels
-from inspector.reference.store import calibrated
+from inspector.reference.store import calibrated, of_runs
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import NO_DEFECT, Imperfections, drawn
 from noiseclassifier.scenarios.labels import annotate, unplanned
@@ -36,6 +40,8 @@ DEFECTS = (
 )
 TONE, BLOW = 0.05, 0.3
 """Added faults: root mean square of a tone of 62 Hz and 1 s, and size of a blow, in [rad/s]."""
+POOLED, JUDGED, CHATTER = 15, 10, 0.012
+"""Runs of each motion of the pool, others, and root mean square of their chatter, in [rad/s]."""
 
 
 def trial(robot: str, way: str, repetition: int, fault: str, seed: int):
@@ -99,9 +105,50 @@ def save(motion, robot: str, way: str, path: Path, blocks=()) -> None:
     print(path, [block.label for block in blocks], flush=True)
 
 
+def make_arm(folder: Path) -> None:
+    """Simulate the runs of the arm."""
+    for place, way in enumerate(WAYS):
+        twins = [arm.trial(place, n) for n in range(GOOD)]
+        runs = {f"{way}-{n}.npz": twin for n, twin in enumerate(twins, 1)}
+        for number, fault in enumerate(arm.FAULTS):
+            twin = number % GOOD
+            run = arm.trial(place, twin, fault)
+            blocks = arm.labelled(run, twins[twin])
+            runs[f"faults/{way}-{fault}-{twin + 1}.npz"] = replace(run, blocks=blocks)
+        for name, run in runs.items():
+            path = folder / "arm" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            run.save(path, overwrite=True)
+
+
+def pool() -> None:
+    """Print what is found among runs of four motions beside 60 accepted ones of all together."""
+    accepted, others = [], []
+    for motion in range(arm.MOTIONS):
+        runs = [arm.trial(motion, number) for number in range(POOLED + JUDGED)]
+        accepted += [levels(run, name=f"motion{motion}") for run in runs[:POOLED]]
+        others += runs[POOLED:]
+    reference = of_runs(accepted)
+    found = flagged = 0
+    for run in others:
+        chatter = CHATTER * np.sqrt(2) * np.sin(2 * np.pi * 62 * run.time)
+        velocity = np.array(run.velocity)
+        velocity[:, 2] += chatter
+        loud = replace(run, velocity=velocity)
+        flagged += bool(compare(levels(run), reference).exceedances)
+        found += bool(compare(levels(loud), reference).exceedances)
+    print(
+        f"{len(accepted)} accepted runs of {arm.MOTIONS} motions: {found} of {len(others)} with a"
+        f" chatter of {CHATTER:g} rad/s found, {flagged} of {len(others)} good ones flagged"
+    )
+
+
 def make(folder: Path, robots: Sequence[str]) -> None:
     """Simulate all runs."""
     for robot in robots:
+        if robot == "arm":
+            make_arm(folder)
+            continue
         for place, way in enumerate(WAYS):
             twins = [trial(robot, way, n, "", 700 + place)[0] for n in range(GOOD)]
             for number, twin in enumerate(twins, 1):
@@ -205,7 +252,7 @@ def table(folder: Path, robots: Sequence[str]) -> None:
     reshuffled(sides)
 
 
-def reshuffled(sides: dict[tuple[str, str], list[Levels]], draws: int = 200) -> None:
+def reshuffled(sides: dict[tuple[str, str], list[Levels]], draws: int = 1000) -> None:
     """Print how often 3 + 3 good runs, drawn anew, differ as `diff` says it: by their median."""
     rng, worse, count = np.random.default_rng(0), 0, 0
     for good in sides.values():
@@ -220,5 +267,8 @@ def reshuffled(sides: dict[tuple[str, str], list[Levels]], draws: int = 200) -> 
 
 
 if __name__ == "__main__":
-    chosen = sys.argv[3].split(",") if len(sys.argv) > 3 else ("panda", "go2", "talos")
-    {"make": make, "table": table}[sys.argv[1]](Path(sys.argv[2]), chosen)
+    if sys.argv[1] == "pool":
+        pool()
+    else:
+        chosen = sys.argv[3].split(",") if len(sys.argv) > 3 else ("panda", "go2", "talos")
+        {"make": make, "table": table}[sys.argv[1]](Path(sys.argv[2]), chosen)

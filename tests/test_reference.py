@@ -1,5 +1,6 @@
 """Runs beside accepted repetitions: what is found, and what the store keeps."""
 
+import io
 import json
 import os
 import re
@@ -181,6 +182,80 @@ def test_a_run_that_is_cut_or_frozen_fails_and_says_so(own, simulate):
     assert "missing: motion from 0." in out
 
 
+def test_a_run_longer_than_its_scenario_is_compared_with_it_as_far_as_it_goes(own, simulate):
+    parts = simulate.run("pick", 9), simulate.run("wave", 9)
+    long = {
+        name: np.concatenate([getattr(each, name) for each in parts])
+        for name in ("position", "velocity", "position_desired", "velocity_desired")
+    }
+    time = np.arange(len(long["velocity"])) / simulate.RATE
+    run = replace(parts[0], time=time, valid=None, **long)
+    found = Reference.load(own / "reference").compare(replace(run, meta={"scenario": "pick"}))
+    assert found.share(judging.Kind.REPETITIONS) == pytest.approx(0.5, abs=0.02)
+    assert not found.exceedances
+    assert "longer than its scenario, 12.0 of 6.0 s" in found.remarks[0]
+    run.save(own / "runs" / "pick-9.npz")
+    assert call("classify", own / "runs" / "pick-9.npz")[0] == 0
+
+
+def test_two_scenarios_with_one_motion_are_told_apart_by_name_or_both_count(own, simulate):
+    for number in (1, 2):
+        simulate.run("pick", 10 + number, "chatter").save(own / "runs" / f"grab-{number}.npz")
+    assert "grab: new, 2 repetitions" in call("accept", own / "runs", "--reason", "louder pick")[1]
+    for name, status in (("pick", 1), ("grab", 0), ("other", 0)):
+        path = own / "now" / f"{name}-8.npz"
+        path.parent.mkdir(exist_ok=True)
+        simulate.run("pick", 20, "chatter").save(path)
+        found, out, _ = call("classify", path)
+        assert found == status, out
+        assert ("of grab, pick, and its name is of none: all count" in out) == (name == "other")
+
+
+def test_a_reference_of_another_robot_is_told_and_the_general_model_decides(own, simulate):
+    names = tuple(f"joint{number}" for number in range(4))
+    run = replace(simulate.run("pick", 9), joint_names=names, desired_joint_names=names)
+    run.save(own / "now.npz")
+    status, out, _ = call("classify", own / "now.npz", "--reference", own / "reference")
+    assert status == 0
+    told = (
+        "no reference: it is of joints shoulder, upperarm, elbow, …, and the run of joints joint0"
+    )
+    assert told in out
+    (own / "pick").mkdir()
+    run.save(own / "pick" / "pick-1.npz")
+    out = call("accept", own / "pick", "--reason", "x", "-o", own / "reference")[1]
+    assert "pick: 1 repetition replace the accepted, of a robot with other joints" in out
+
+
+@pytest.mark.parametrize("command", ["accept", "view", "live", "diff"])
+def test_a_store_of_a_later_version_is_one_line_for_every_command(own, command, monkeypatch):
+    toml = own / "reference" / "reference.toml"
+    toml.write_text(toml.read_text().replace("reference/1", "reference/2"))
+    before = {path.name: path.read_bytes() for path in toml.parent.iterdir()}
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"time,a.velocity\n")))
+    run, out = own / "runs" / "pick-1.npz", own / "out.rrd"
+    options = {
+        "accept": (run, "--reason", "x"),
+        "view": (run, "--reference", toml.parent, "-o", out),
+        "live": ("--rate", 100, "--save", out, "--reference", toml.parent),
+        "diff": (toml.parent, own / "runs"),
+    }
+    status, _, err = call(command, *options[command])
+    assert (status, len(err.splitlines())) == (3, 1)
+    assert "of format 'noise-reference/2'" in err or command == "diff"
+    assert {path.name: path.read_bytes() for path in toml.parent.iterdir()} == before
+    assert not out.exists()
+
+
+def test_a_run_that_cannot_be_read_leaves_the_store_as_it_was(own):
+    before = {path.name: path.read_bytes() for path in (own / "reference").iterdir()}
+    (own / "runs" / "pick-4.csv").write_text("nothing\n")
+    status, _, err = call("accept", own / "runs", "--reason", "x")
+    assert (status, len(err.splitlines())) == (3, 1)
+    assert "pick-4.csv: " in err
+    assert {path.name: path.read_bytes() for path in (own / "reference").iterdir()} == before
+
+
 def test_a_renamed_scenario_is_found_by_its_motion_and_accepted_as_renamed(own, simulate):
     for number in (1, 2, 3):
         (own / "runs" / f"wave-{number}.npz").rename(own / "runs" / f"greet-{number}.npz")
@@ -296,7 +371,10 @@ def test_a_waiver_holds_until_its_day(own, simulate):
         (lambda text: text.replace("robot", "robto", 1), "no 'robto'; there are name"),
         (lambda text: text.replace('levels = "pick', 'levels = "../pick'), "name of an .npz"),
         (lambda text: text.replace("rate_hz = 1000.0", "rate_hz = -1", 1), "expected a rate"),
-        (lambda text: text.replace("rate_hz = 1000.0", "rate_hz = 10.0", 1), "its arrays are not"),
+        (
+            lambda text: text.replace("rate_hz = 1000.0", "rate_hz = 10.0", 1),
+            "its arrays do not belong to",
+        ),
         (lambda text: text.replace("required = true", "required = 1", 1), "true or false"),
         (lambda text: text[:200], "no store of references"),
         (lambda text: text.replace('name = "place"', 'name = "pick"'), "have one name"),

@@ -1,8 +1,9 @@
 """Frames of repetitions that belong to each frame of a run, by dynamic time warping of positions.
 
 The path may begin and end anywhere (open ends), and runs at half to twice the repetition's speed:
-its frame advances by 0, 1 or 2 with each frame of the run, never twice by 0 in a row. So each row
-of costs follows from the row before, for all repetitions at once.
+its frame advances by 0, 1 or 2 with each frame of the run, never twice by 0 in a row but before the
+repetition's start and after its end, where a longer run may stay. So each row of costs follows from
+the row before, for all repetitions at once.
 """
 
 from collections.abc import Sequence
@@ -17,6 +18,10 @@ PAD = 20
 """Frames for which a repetition is held before its start and after its end: delays."""
 STEP_COST = 1e-3
 """Cost of a frame that is skipped or held, in squared standard deviations of the motion."""
+OUTSIDE = 0.36
+"""Largest cost of a frame before the start or after the end, in squared standard deviations."""
+STEPS = np.array([1, 1, 2, 2, 0])
+"""Frames by which a path advances, by how it came: the frame before was itself held, or not."""
 LARGEST = 4_000_000
 """Cells of a matrix of costs; of longer runs every second frame is aligned, and so on."""
 STILL = 0.05
@@ -66,7 +71,7 @@ def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:
     held = [np.pad(each / scale, ((PAD, PAD), (0, 0)), mode="edge") for each in repetitions]
     longest = max(map(len, held))
     thin = int(np.ceil(np.sqrt(len(run) * longest / LARGEST)))
-    paths = _paths(run[::thin], [each[::thin] for each in held])
+    paths = _paths(run[::thin], [each[::thin] for each in held], -(-PAD // thin))
     if thin > 1:
         at = np.arange(len(run)) / thin
         paths = [np.round(np.interp(at, np.arange(len(p)), p * thin)).astype(int) for p in paths]
@@ -90,16 +95,20 @@ def _comparable(path: NDArray[np.int64]) -> NDArray[np.bool_]:
     return np.asarray((slope >= SLOPE[0] - slack) & (slope <= SLOPE[1] + slack))
 
 
-def _paths(run: Array, held: Sequence[Array]) -> list[NDArray[np.int64]]:
-    """Frame of each padded repetition for each frame of a run."""
+def _paths(run: Array, held: Sequence[Array], pad: int) -> list[NDArray[np.int64]]:
+    """Frame of each repetition for each frame of a run; so many are before and after it."""
     count, width, rows = len(held), max(map(len, held)), len(run)
     distance = np.full((rows, count, width), np.inf, dtype=np.float32)
     for place, other in enumerate(held):
         square = (run**2).mean(axis=1)[:, None] + (other**2).mean(axis=1)
         square -= 2 * run @ other.T / run.shape[1]
+        for outside in (slice(pad), slice(-pad, None)):
+            square[:, outside] = np.minimum(square[:, outside], OUTSIDE)
         distance[:, place, : len(other)] = np.maximum(square, 0.0)
+    every = np.arange(count)[:, None]
+    edges = np.array([[0, len(other) - 1] for other in held])
     # moved: the path came from another frame; stayed: from the same one, which it may only once.
-    moved = distance[0] + STEP_COST * np.abs(np.arange(width) - PAD)
+    moved = distance[0] + STEP_COST * np.abs(np.arange(width) - pad)
     stayed = np.full((count, width), np.inf)
     came = np.zeros((rows, count, width), dtype=np.uint8)
     for row in range(1, rows):
@@ -114,8 +123,12 @@ def _paths(run: Array, held: Sequence[Array]) -> list[NDArray[np.int64]]:
         skipped = np.zeros((count, width), dtype=np.uint8)
         skipped[:, 2:] = from_stay[:, :-2]
         came[row] = np.where(skips, 2 + skipped, source)
+        held_on = (distance[row] + moved)[every, edges] + STEP_COST
         stayed = distance[row] + moved + STEP_COST
         moved = distance[row] + np.minimum(one, two)
+        longer = held_on < moved[every, edges]
+        moved[every, edges] = np.where(longer, held_on, moved[every, edges])
+        came[row][every, edges] = np.where(longer, len(STEPS) - 1, came[row][every, edges])
     stay = stayed.min(axis=1) < moved.min(axis=1)
     at = np.where(stay, stayed.argmin(axis=1), moved.argmin(axis=1))
     path = np.zeros((rows, count), dtype=np.int64)
@@ -123,7 +136,7 @@ def _paths(run: Array, held: Sequence[Array]) -> list[NDArray[np.int64]]:
         path[row] = at
         if row:
             code = came[row, np.arange(count), at]
-            step = np.where(stay, 0, 1 + code // 2)
+            step = np.where(stay, 0, STEPS[code])
             stay = np.where(stay, False, code % 2 == 1)
             at = at - step
     return list(path.T)

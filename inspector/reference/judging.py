@@ -55,6 +55,8 @@ GAP = 1.0
 SAME_MOTION, SAME_NAME = 0.8, 0.2
 """Share of a run that has to lie on a scenario's motion to be of it, and the same if it has its
 name: a fault may end the motion early."""
+LONGER, SHARE_LONGER = 0.5, 0.1
+"""Time and share of its scenario by which a run may be longer or shorter without a word."""
 ALIKE = 0.9
 """Share of the best one's from which another scenario is of the same motion, too."""
 
@@ -275,7 +277,7 @@ class Comparison:
     @property
     def noise(self) -> Array:
         """Level of the run's noise in the joints and octaves that are compared, as in the band."""
-        return _noise(_view(self.run, self.joints, self.octaves))
+        return _noise(self.run, self.joints, self.octaves)
 
     @property
     def time(self) -> Array:
@@ -329,7 +331,7 @@ class Comparison:
 
 def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     """Compare a run with its reference."""
-    known = [each for each in scenarios if _robot_fits(run, each)]
+    known = [each for each in scenarios if robot_fits(run, each)]
     joints, octaves, remarks = _common(run, known, scenarios)
     frames = len(run.guide)
     over = _unknown(frames, joints, octaves)
@@ -352,6 +354,12 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
             scores = [score for scenario in known for score in scenario.scores]
             margins[Kind.REPETITIONS] = margin_of(scores, count)
             slope = float(np.nanmedian([each.slope for each in aligned]))
+            longest = max(each.duration for each in references)
+            if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
+                remarks.append(
+                    f"longer than its scenario, {run.duration:.1f} of {longest:.1f} s: the rest is"
+                    " compared with other motions"
+                )
         left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
         others = [each for s in known if s not in matched for each in s.repetitions]
         if len(left) and (others or references):
@@ -434,7 +442,7 @@ def _largest(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(np.isfinite(lowered), lowered, np.nan).astype(np.float32)
 
 
-def _robot_fits(run: Levels, scenario: Scenario) -> bool:
+def robot_fits(run: Levels, scenario: Scenario) -> bool:
     """Whether a scenario may be of the robot: the same name if both have one, and a joint."""
     newest = scenario.repetitions[-1]
     same = not run.robot or not newest.robot or run.robot == newest.robot
@@ -446,8 +454,13 @@ def _common(
 ) -> tuple[tuple[str, ...], tuple[tuple[float, float], ...], list[str]]:
     """Joints and octaves that can be compared, and what cannot."""
     if not known:
-        robots = {each.repetitions[-1].robot or "a robot without name" for each in accepted}
-        own = run.robot or f"joints {', '.join(run.joints[:3])}"
+        newest = [each.repetitions[-1] for each in accepted]
+        robots = {each.robot for each in newest} - {""}
+        if not run.robot or not robots or run.robot in robots:  # then the joints are others
+            robots = {_joints(each) for each in newest}
+            own = _joints(run)
+        else:
+            own = run.robot
         there = ", ".join(sorted(robots)) or "nothing"
         return (), (), [f"no reference: it is of {there}, and the run of {own}"]
     every = [each for scenario in known for each in scenario.repetitions]
@@ -465,6 +478,10 @@ def _common(
             f" {run.rate:g} Hz, the reference {shown} Hz"
         )
     return joints, octaves, remarks
+
+
+def _joints(run: Levels) -> str:
+    return f"joints {', '.join(run.joints[:3])}{', …' * (len(run.joints) > 3)}"
 
 
 def _view(
@@ -657,9 +674,11 @@ def _quieter(
     return max(0.0, min(known)) if known else 0.0
 
 
-def _noise(level: NDArray[np.float32]) -> Array:
+def _noise(run: Levels, joints: Sequence[str], octaves: Sequence[tuple[float, float]]) -> Array:
     """Level of the velocities of all joints in all octaves, shape (frames,); NaN where none is."""
-    power = np.nansum(10.0 ** (level[:, :, 0].reshape(len(level), -1) / 10), axis=1)
+    power = np.zeros(len(run.guide))
+    for joint in joints:
+        power += np.nansum(10.0 ** (_view(run, (joint,), octaves)[:, 0, 0] / 10), axis=1)
     return np.asarray(10 * np.log10(np.where(power > 0.0, power, np.nan)))
 
 
@@ -672,7 +691,7 @@ def _band(
     """Quietest and loudest repetition at each frame of the run, shape (frames, 2)."""
     low = high = np.full(len(aligned[0].frame), np.nan)
     for each, path in zip(references, aligned, strict=True):
-        noise = _noise(_view(each, joints, octaves))[path.frame]
+        noise = _noise(each, joints, octaves)[path.frame]
         noise[path.residual > RESIDUAL] = np.nan
         low, high = np.fmin(low, noise), np.fmax(high, noise)
     return np.stack((low, high), axis=1)

@@ -329,6 +329,8 @@ def accepted(
         worst = max((each.worst for each in over if isfinite(each.worst)), default=float("nan"))
         words = f"{counted(len(fresh), 'repetition')} {'added' if same else 'replace the accepted'}"
         told = f", {worst:+.1f} dB over the reference at most" if isfinite(worst) else ""
+        if not any(set(each.joints) & set(old.repetitions[-1].joints) for each in fresh):
+            told = ", of a robot with other joints"
         changes.append(Change(new.name, f"{words}{told}, {len(repetitions)} kept"))
     scenarios = tuple(kept[name] for name in sorted(kept))
     return Reference(reference.path, scenarios, stored=True), changes

@@ -15,11 +15,14 @@ from inspector.library import Library
 from inspector.logs.read import Reading
 from inspector.reference.judging import (
     GAP,
+    LONGER,
+    SHARE_LONGER,
     Comparison,
     Exceedance,
     Kind,
     Scenario,
     compare,
+    robot_fits,
 )
 from inspector.reference.levels import HOP, Levels, levels
 from inspector.reference.store import NAME, Reference, find, line_of, scenario_of
@@ -29,8 +32,6 @@ from noiseclassifier import UNKNOWN, Event, Labels
 
 LOUDER = "louder"
 """Class of a finding that only the reference shows."""
-SHORTER = 0.1
-"""Share of its scenario by which a run may be shorter, half a second at least."""
 STOPPED, MOVES, STILL_FOR = 0.1, 0.3, 0.5
 """A run is frozen where it moves at less than a tenth of its references' speed, for half a second,
 while these make three tenths of their usual speed."""
@@ -335,12 +336,12 @@ def _failures(comparison: Comparison, reference: Reference) -> Iterable[tuple[st
     """What of its scenario a run lacks: its end, or its motion; and why, in a few words."""
     run = comparison.run
     known = [reference.named(name) for name in comparison.scenarios] or [reference.named(run.name)]
-    scenarios = [each for each in known if each is not None and each.robot in ("", run.robot)]
+    scenarios = [each for each in known if each is not None and robot_fits(run, each)]
     if not scenarios:
         return
     shortest = min(each.duration[0] for each in scenarios)
     names = " and ".join(each.name for each in scenarios)
-    if run.duration < shortest - max(0.5, SHORTER * shortest):
+    if run.duration < shortest - max(LONGER, SHARE_LONGER * shortest):
         yield END, f"{run.duration:.1f} of {shortest:.1f} s"
     still = frozen(run, [each for one in scenarios for each in one.repetitions])
     if still is not None:
