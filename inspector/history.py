@@ -1,7 +1,8 @@
 """Results of many commits: how far each scenario is over its reference, and where that changed.
 
 A file of `classify --write json=FILE` is a commit. They are in order of their names, numbers by
-their value, and named after what stands behind the last dash: ``0061-3f2a1c9.json``.
+their value, and named after what stands behind the last dash: ``0061-3f2a1c9.json``. Levels are
+those over a reference: results without one have findings only.
 """
 
 import re
@@ -58,16 +59,18 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Commits in order, series with most change first, and what could not be read."""
+    """Commits in order, series with most change first, and what was not read or left out."""
 
     commits: tuple[str, ...]
     series: tuple[Series, ...]
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def lines(self) -> Iterator[str]:
         """The changes, a line each."""
         number = len(self.commits)
         yield f"{counted(number, 'commit')}, {self.commits[0]} to {self.commits[-1]}"
+        yield from self.notes
         quiet = 0
         for series in self.series:
             found = changes(series)
@@ -89,9 +92,19 @@ class History:
 
 
 def read(folder: Path) -> History:
-    """Read the results of a folder; what is no result is named and left out."""
-    commits, results, problems = [], [], []
-    for path in sorted(folder.glob("*.json"), key=_natural):
+    """Read the results of a folder; what is no result is named and left out.
+
+    Of results with one number, as a rebase leaves them, the one that was written last counts.
+    """
+    commits, results, problems, notes = [], [], [], []
+    last: dict[str, Path] = {}
+    paths = sorted(folder.glob("*.json"), key=lambda path: (path.stat().st_mtime, path))
+    for path in paths:
+        number = path.stem.rpartition("-")[0] or path.stem
+        if number in last:
+            notes.append(f"{last[number].name}: replaced by {path.name}")
+        last[number] = path
+    for path in sorted(last.values(), key=_natural):
         try:
             results.append(read_results(path))
             commits.append(path.stem.rpartition("-")[2])
@@ -101,7 +114,7 @@ def read(folder: Path) -> History:
         why = f"; {problems[0]}" if problems else ""
         raise InspectorError(f"{folder}: no result of `classify --write json=FILE`{why}")
     series = sorted(_series(results), key=lambda each: -_largest(each))
-    return History(tuple(commits), tuple(series), tuple(problems))
+    return History(tuple(commits), tuple(series), tuple(problems), tuple(notes))
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
@@ -111,24 +124,26 @@ def _natural(path: Path) -> list[tuple[int, str]]:
 
 
 def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
-    """The series of each scenario, and of the joints that a finding was in."""
+    """The series of each scenario, and of its joints."""
     runs: dict[str, Array] = {}
-    over: dict[str, Array] = {}
+    over: dict[tuple[str, str], Array] = {}
     found: dict[tuple[str, str], Array] = {}
     for commit, verdicts in enumerate(results):
         for group in groups(verdicts):
             name = str(Path(group.name).with_suffix(""))
             runs.setdefault(name, np.full(len(results), np.nan))[commit] = len(group.verdicts)
             for verdict in group.verdicts:
-                if verdict.beside and verdict.beside.worst is not None:
-                    level = over.setdefault(name, np.full(len(results), np.nan))
-                    level[commit] = np.fmax(level[commit], verdict.beside.worst)
+                known = verdict.beside
+                levels = {} if known is None or known.worst is None else {"": known.worst}
+                for joint, worst in (levels | dict(known.joints if known else {})).items():
+                    level = over.setdefault((name, joint), np.full(len(results), np.nan))
+                    level[commit] = np.fmax(level[commit], worst)
                 for event in verdict.failing:
                     where = verdict.localisations.get(event)
                     joint = where.joints[0][0] if where and where.joints else ""
                     for key in {(name, ""), (name, joint)}:
                         found.setdefault(key, np.zeros(len(results)))[commit] += 1
-    yield from (Series(name, "", "dB", level) for name, level in over.items())
+    yield from (Series(*of, "dB", level) for of, level in over.items())
     for name in runs:
         found.setdefault((name, ""), np.zeros(len(results)))
     yield from (
@@ -199,15 +214,17 @@ def _error(value: Array) -> float:
 
 
 def page(history: History) -> str:
-    """Write all series as one HTML page, those with most change first."""
+    """Write series as one HTML page, those with most change first; no joints without a change."""
     html, body = document("Noise over commits", STYLE + LOOK, POLICY)
     add_text(body, "h1", "Noise over commits")
     add_text(body, "p", next(history.lines()), "verdict")
-    for problem in history.problems:
+    for problem in (*history.problems, *history.notes):
         add_text(body, "p", problem, "note")
     for series in history.series:
-        add_text(body, "h2", series.name)
         found = changes(series)
+        if series.joint and not found:
+            continue
+        add_text(body, "h2", series.name)
         for change in found:
             add_text(body, "p", history.told(series, change), "step")
         _draw(body, history, series, found)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Allowed: TypeAlias = "str | tuple[str, float, float]"
 """A class of findings; or a class, and from when to when, in [s]."""
+FINDING = "noise_finding"
+"""Property of a test that failed: its first finding, in a line."""
 LONGEST = 120
 """Most characters of a file name that a test's name may take."""
 PLAIN = re.compile(
@@ -57,6 +59,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="append",
         help="classify by this model only: a file, or the name of a shipped one; repeatable",
     )
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print the first finding of each test that failed: pytest cuts its own lines."""
+    lines = [
+        value
+        for report in terminalreporter.getreports("failed")
+        for name, value in report.user_properties
+        if name == FINDING
+    ]
+    if lines:
+        terminalreporter.section("noise")
+    for line in lines:
+        terminalreporter.write_line(str(line))
 
 
 @pytest.fixture
@@ -262,6 +278,7 @@ class Noise:
         number = len(events) + len(verdict.missing)
         by = f", {verdict.beside.words}" if verdict.beside else f", by model {analysis.model}"
         first = brief(verdict, events[0]) if events else str(verdict.missing[0])
+        self._node.user_properties.append((FINDING, f"{verdict.path}: {first}"))
         lines = [f"noise: {first} ({verdict.path})"]
         lines += [f"{number} finding{'s' * (number != 1)} in {shown}{by}"]
         lines += [f"  {sentence(verdict, event)}" for event in events]

@@ -224,6 +224,7 @@ class Beside:
         margins: From how many decibels on a moment is a finding, by kind of evidence.
         bounds: What is known of the margins, by kind of evidence, a sentence or two each.
         worst: Largest score of a frame over the reference, in [dB]; None without one.
+        joints: Loudest exceedance of each joint that is compared, in [dB].
         quieter: By how much it is quieter than each repetition, in [dB]; 0 if it is not.
         speed: Its speed divided by the repetitions'; None without.
         failures: What it lacks of its scenario, and why.
@@ -237,6 +238,7 @@ class Beside:
     margins: Mapping[str, float] = field(default_factory=dict)
     bounds: Mapping[str, str] = field(default_factory=dict)
     worst: float | None = None
+    joints: Mapping[str, float] = field(default_factory=dict)
     quieter: float = 0.0
     speed: float | None = None
     failures: tuple[tuple[str, str], ...] = ()
@@ -256,7 +258,12 @@ class Beside:
         return {names.get(name, name): value for name, value in asdict(self).items()}
 
 
-UNITS_GONE = {"margins_db": "margins", "over_db": "worst", "quieter_db": "quieter"}
+UNITS_GONE = {
+    "margins_db": "margins",
+    "over_db": "worst",
+    "joints_db": "joints",
+    "quieter_db": "quieter",
+}
 """Names of `Beside` by those that JSON has, which state the unit."""
 
 

@@ -42,7 +42,8 @@ def project(tmp_path):
         done = subprocess.run(
             [*map(str, command), *map(str, options), str(tmp_path / "test_robot.py")],
             cwd=ROOT,
-            env=os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},  # it may be installed too
+            # It may be installed, too; a terminal is 40 columns wide.
+            env=os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "COLUMNS": "40"},
             capture_output=True,
             text=True,
             check=False,
@@ -118,6 +119,8 @@ def test_runs_are_compared_with_accepted_ones(project, tmp_path, processes):
     assert re.search(r"^noise: \w+ \d+\.\d\d-", out, re.MULTILINE)
     assert "wrist" in out
     assert 'meant to be so? pytest --noise-accept "reason" accepts it' in out
+    whole = r"^reach: \w+ \d.\d\d-\d.\d\d s, wrist.*, 64-128 Hz, \+\d+ dB over 3 repetitions$"
+    assert re.search(whole, out, re.MULTILINE), out  # in a terminal of 40 columns, too
     left = {path.name for path in (tmp_path / "noise-artefacts").iterdir()}
     assert {"test_robot-test_one.rrd", "test_robot-test_one.png"} <= left
     loud = CHECKED.format(tone=0.05, first=5)

@@ -1,6 +1,7 @@
 """Settings of a project, results of several jobs, and results over commits."""
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -164,7 +165,8 @@ def test_a_history_of_200_commits_names_two_steps_and_a_drift(tmp_path):
         for name, value in (("pick", pick), ("scan", scan), ("calm", calm)):
             if name == "scan" and 20 <= commit < 30:
                 continue  # a gap
-            beside = Beside("reference", (name,), 3, {}, {}, worst=float(value[commit]))
+            joints = {"elbow": float(calm[commit]), "wrist": float(value[commit])}
+            beside = Beside("reference", (name,), 3, worst=float(value[commit]), joints=joints)
             for number in range(2):
                 run = Verdict(Path(f"{name}-{number}.npz"), Status.OK, beside=beside)
                 if name == "pick" and commit >= 60:
@@ -184,6 +186,8 @@ def test_a_history_of_200_commits_names_two_steps_and_a_drift(tmp_path):
     assert drift.by == pytest.approx(8.0, abs=0.5)
     assert history.changes(series["calm", "dB"]) == []
     assert [each.first for each in history.changes(series["pick, wrist", "findings"])] == [60]
+    assert [each.first for each in history.changes(series["pick, wrist", "dB"])] == [60, 150]
+    assert history.changes(series["pick, elbow", "dB"]) == []
     (tmp_path / "200-broken.json").write_text("{")
     status, out, err = call("history", tmp_path, "-o", tmp_path / "page.html")
     assert status == 3
@@ -193,6 +197,18 @@ def test_a_history_of_200_commits_names_two_steps_and_a_drift(tmp_path):
     page = (tmp_path / "page.html").read_text()
     assert page.index("<h2>scan</h2>") < page.index("<h2>calm</h2>")
     assert "at c150" in page
+
+
+def test_results_that_a_rebase_replaced_are_left_out_and_told(tmp_path):
+    for name, time in (("1-old", 1), ("2-old", 2), ("1-new", 3)):
+        path = results(tmp_path / f"{name}.json", Verdict(Path("a.npz"), Status.OK))
+        os.utime(path, (time, time))
+    status, out, err = call("history", tmp_path)
+    assert (status, err) == (0, "")
+    assert out.splitlines()[:2] == [
+        "2 commits, new to old",
+        "1-old.json: replaced by 1-new.json",
+    ]
 
 
 def test_a_folder_without_results_is_one_line(tmp_path):

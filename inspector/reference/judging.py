@@ -292,10 +292,16 @@ class Comparison:
         """
         return _largest(self.over.reshape(*self.over.shape[:2], -1))
 
+    @property
+    def peaks(self) -> Array:
+        """Loudest exceedance of each joint, shape (joints,), in [dB]; minus infinity without."""
+        over = np.nan_to_num(self.by_joint, nan=-np.inf)
+        pairs = np.minimum(over[:-1], over[1:])  # one frame alone is no evidence
+        return np.asarray(pairs.max(axis=0, initial=-np.inf), dtype=np.float64)
+
     def loudest(self, count: int) -> list[int]:
         """Places of the joints that are most over the reference, in their order."""
-        peaks = np.nan_to_num(self.by_joint, nan=-np.inf).max(axis=0, initial=-np.inf)
-        return sorted(np.argsort(-peaks, kind="stable")[:count].tolist())
+        return sorted(np.argsort(-self.peaks, kind="stable")[:count].tolist())
 
     @property
     def worst(self) -> float:

@@ -212,6 +212,11 @@ def beside(
         shares=shares,
         margins={str(kind): round(each.db, 2) for kind, each in comparison.margins.items()},
         worst=_known(comparison.worst),
+        joints={
+            joint: round(float(peak), 2)
+            for joint, peak in zip(comparison.joints, comparison.peaks, strict=True)
+            if np.isfinite(peak)
+        },
         quieter=round(comparison.quieter, 2) if comparison.quieter > _least(comparison) else 0.0,
         speed=_known(comparison.slope),
         failures=tuple(_failures(comparison, reference)),
