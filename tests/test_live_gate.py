@@ -11,7 +11,9 @@ import pytest
 from commandline import call
 
 from inspector.assets import demo_run
+from inspector.reference.judging import Kind
 from inspector.reference.levels import LevelStream, levels
+from inspector.reference.store import Reference
 from noisemodel import Run
 
 
@@ -184,6 +186,23 @@ def test_a_stream_too_long_to_be_kept_is_compared_while_it_runs(
     assert "elbow" in out.splitlines()[0]
     assert "minutes are not compared as a whole" in err
     assert live(*options, text=streamed(simulate.run("pick", 5)), rate=1000)[0] == 0
+
+
+def test_each_stretch_of_a_stream_is_compared_with_the_same_motion(accepted, simulate):
+    run, latest = simulate.run("wave", 7), []
+    stream = LevelStream(run.joint_names, run.rate, tell=latest.append)
+    time = np.tile(run.velocity, (3, 1))  # the motion is made three times
+    signals = {"velocity": time, "velocity_desired": np.tile(run.velocity_desired, (3, 1))}
+    count = len(time)
+    stream.push(0.0, signals, np.ones(count, dtype=bool), np.zeros(count))
+    reference = Reference.load(accepted)
+    found = [reference.compare(each) for each in latest]
+    assert [each.run.start for each in found[:3]] == pytest.approx([0.0, 0.0, 3.0])
+    assert len(found) == 5
+    for each in found[:2]:  # the arm does not return to where it began
+        assert each.share(Kind.REPETITIONS) > 0.9
+        assert each.scenarios == ("wave",)
+        assert not each.exceedances
 
 
 def test_levels_that_come_in_pieces_are_those_of_the_whole(simulate):

@@ -516,7 +516,10 @@ def _guides(
         for each in (run, *others)
     ]
     if any(each.guided_by.endswith("velocities") for each in (run, *others)):
-        every = [each - each[:1] for each in every]
+        every = [
+            guide - each.first[[each.joints.index(j) for j in shared]]
+            for guide, each in zip(every, (run, *others), strict=True)
+        ]
     return every[0], every[1:]
 
 

@@ -54,6 +54,8 @@ class Levels:
         guide: Slow positions, shape (frames, joints), in [rad] or [m].
         guided_by: What these are: desired positions, or what stands in for them.
         pace: Slow measured speed, root mean square over the joints, shape (frames,), in [rad/s].
+        origin: Slow positions at the start of the stream that it is a part of, shape (joints,), in
+            [rad] or [m]; None of a whole run.
     """
 
     name: str
@@ -69,6 +71,14 @@ class Levels:
     guide: NDArray[np.float32]
     guided_by: str
     pace: NDArray[np.float32]
+    origin: NDArray[np.float32] | None = None
+
+    @property
+    def first(self) -> NDArray[np.float32]:
+        """Slow positions at the start of the run or stream, shape (joints,), in [rad] or [m]."""
+        if self.origin is not None:
+            return self.origin
+        return self.guide[0] if len(self.guide) else np.zeros(len(self.joints), np.float32)
 
     @property
     def time(self) -> Array:
@@ -157,6 +167,7 @@ class LevelStream:
         self._before = 0  # bins of the samples held that were measured already
         self._count = 0
         self._parts: list[Levels] = []
+        self._origin: NDArray[np.float32] | None = None
         self.too_long = False
 
     def push(
@@ -197,7 +208,8 @@ class LevelStream:
         }
         frames = len(whole["guide"])
         start = self._start + (self._frames - frames) * HOP
-        return replace(parts[-1], start=start, duration=(frames + BINS - 1) * HOP, **whole)
+        duration = (frames + BINS - 1) * HOP
+        return replace(parts[-1], start=start, duration=duration, origin=self._origin, **whole)
 
     def _add_gap(self, lost: int, widths: Mapping[str, int]) -> None:
         piece = round(PIECE * self._rate)
@@ -255,6 +267,7 @@ class LevelStream:
             guide = (guide + step).astype(np.float32)
         part = replace(found, guide=guide[taken], level=level[taken], pace=found.pace[taken])
         if len(part.guide):
+            self._origin = part.guide[0] if self._origin is None else self._origin
             self._parts.append(part)
             self._frames += len(part.guide)
             if self._tell is not None and frames is not None:
