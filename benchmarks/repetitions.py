@@ -24,7 +24,7 @@ from inspector.reference.judging import Comparison, Scenario, compare, margin_of
 from inspector.reference.levels import Levels, levels
 from inspector.reference.store import calibrated, of_runs
 from noiseclassifier.scenarios.drives import Drives
-from noiseclassifier.scenarios.faults import NO_DEFECT, Imperfections, drawn
+from noiseclassifier.scenarios.faults import Imperfections, no_defect
 from noiseclassifier.scenarios.labels import annotate, unplanned
 from noiseclassifier.scenarios.motions import RATE, STEP, times
 from noiseclassifier.scenarios.robots import ROBOTS
@@ -51,13 +51,8 @@ def trial(robot: str, way: str, repetition: int, fault: str, seed: int):
     motion = SCENARIOS[way].cases[simulated.family].motion
     plan = family.plan(simulated, motion, np.random.default_rng((seed, 1)), 5.0)
     joints = len(simulated.drives.joints)
-    same = Imperfections.draw(
-        np.random.default_rng((seed, 2)),
-        joints,
-        bodies=reduced_model(simulated).njoints - 1,
-        payload=simulated.payload,
-        force=simulated.force_noise,
-    )
+    bodies = reduced_model(simulated).njoints - 1
+    same = Imperfections.draw(np.random.default_rng((seed, 2)), simulated, bodies=bodies)
     rng = np.random.default_rng((seed, 3, repetition))
 
     def other(values: Sequence[float], spread: float) -> tuple[float, ...]:
@@ -70,16 +65,11 @@ def trial(robot: str, way: str, repetition: int, fault: str, seed: int):
         stiffness=other(same.stiffness, 0.02),
         damping=other(same.damping, 0.02),
     )
-    defect = SCENARIOS[fault].cases[simulated.family].defect if fault else NO_DEFECT
+    defect = SCENARIOS[fault].cases[simulated.family].defect if fault else no_defect
     rng = np.random.default_rng((seed, 4, len(fault)))
-    faults = drawn(defect, rng, plan, simulated.drives)
+    faults = defect(rng, plan)
     scene = family.scene(simulated, plan, faults, imperfections)
-    drives = Drives(
-        scene.start[-joints:],
-        drivetrain=simulated.drives,
-        offset=faults.offsets(joints),
-        imperfections=imperfections,
-    )
+    drives = Drives(scene.start[-joints:], simulated.drives, faults.offsets(joints), imperfections)
     noise = np.random.default_rng((seed, 5, repetition))
     found = recorded(scene, drives, plan, faults, imperfections, noise)
     return found, (*faults.events, *scene.events, *unplanned(found.contact, plan.contacts))

@@ -14,20 +14,25 @@ import os
 import shutil
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from zlib import crc32
+
+import numpy as np
 
 import noiseclassifier as nc
 from inspector.progress import progress
 from inspector.train import ANY_RATE, evaluate, train
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
-from noiseclassifier.scenarios.dataset import DatasetSpec, Folder, Side, Task, choose, wide_tasks
-from noiseclassifier.scenarios.logs import beginning_anywhere, with_fault_throughout, with_faults
+from noiseclassifier.scenarios.dataset import Folder, Side, Task, choose, scenario_tasks, wide_tasks
+from noiseclassifier.scenarios.faults import octave
+from noiseclassifier.scenarios.labels import visible
+from noiseclassifier.scenarios.logs import kept, overlap
 from noiseclassifier.scenarios.robots import TARGETS, WIDE
 from noiseclassifier.scenarios.simulation import GOOD, RECIPE, WIDE_RECIPE
-from noisemodel import Run
+from noisemodel import Block, Run
 
 HERE = Path(__file__).parent
 DOMAINS = 10  # seeds of every robot in wide domains: a good run, two with faults of a while,
@@ -47,6 +52,16 @@ COPIES = 2
 EVERY = 3
 """One log in so many is also learnt from in a piece that begins anywhere, and one good log with a
 fault throughout: every frame of these is a failure, and all of them would outnumber the rest."""
+ADDED = {"tone": "oscillations", "noise": "oscillations", "blow": "impact"}
+"""Faults that are added to good logs, and the class of each kind."""
+LOWEST = 15.0  # lowest frequency, in [Hz]; the highest is 0.45 of the sample rate
+LEVELS = 0.03, 10.0  # least and most root mean square while it lasts, in [rad/s]
+LASTS = 0.4, 1.2  # shortest and longest tone or noise, in [s]
+BLOW = 0.1  # duration of a blow, in [s]
+APART = 2.5  # from the start of a fault to that of the next, in [s]
+UNLABELLED = 0.05  # time around a fault that has no label, in [s]
+PIECE = 1.0, 4.0  # shortest and longest piece of a log that begins anywhere, in [s]
+ALL = 0.3  # share of the faults that all joints have
 NAME = "general"
 DEMO = ("panda", "obstacle-full", 102, 4.0)
 CARD = """# {name}
@@ -57,7 +72,7 @@ unknown.
 
 Made by `make models`: profile `general`, trained on {runs} logs of {robots} robots: logs of wide
 domains (recipe {wide}, {domains} seeds of every source robot) at {rates} Hz, with faults of a while
-and of the whole run; copies of the good ones with faults added (scenarios/logs.py), of a while and
+and of the whole run; copies of the good ones with faults added (models/build.py), of a while and
 throughout (one in {every}); pieces of one log in {every} that begin anywhere; and {seeds} seeds of
 every scenario at home (recipe {recipe}) of {home}, each without the part that is held out by hash.
 The model file has the hashes of all of them. Their licences allow anyone anything (docs/robots.md).
@@ -81,9 +96,9 @@ def main() -> None:
     tasks += wide_tasks(first=FAST, seeds=1, throughout=THROUGHOUT)
     wide = timed("simulate domains", simulate, build / "domains", tasks, given.jobs, wide=True)
     seeds = max(1, round(SEEDS * given.seeds / DOMAINS))
-    learnt = DatasetSpec(choice=choose(HOME), seeds=seeds).tasks()
+    learnt = scenario_tasks(choose(HOME), seeds=seeds)
     home = timed("simulate home", simulate, build / "home", learnt, given.jobs)
-    fresh = DatasetSpec(choice=choose(TEST), first=FIRST, seeds=1).tasks()
+    fresh = scenario_tasks(choose(TEST), first=FIRST, seeds=1)
     test = timed("simulate the test", simulate, build / "home-test", fresh, given.jobs)
     sources = [timed(f"logs at {rate:g} Hz", logs, wide, build, rate, "source") for rate in RATES]
     inputs = [*sources, home.path]
@@ -158,6 +173,104 @@ def copies(
             change(Run.load(file), seed=seed).save(target, overwrite=True)
         part.rename(path)
     return path
+
+
+def with_faults(run: Run, *, seed: int) -> Run:
+    """A good log with faults added to its measured velocities."""
+    rng = np.random.default_rng(seed)
+    velocity = run.velocity.astype(np.float64)
+    end, blocks, events = len(velocity) / run.rate, list[Block](), list[dict[str, Any]]()
+    starts = np.arange(1.0, end - LASTS[1], APART) + rng.uniform(0.0, 0.3)
+    edge = 0.0
+    for start in starts.tolist():
+        kind = str(rng.choice(list(ADDED)))
+        stop = start + (BLOW if kind == "blow" else rng.uniform(*LASTS))
+        part = slice(round(start * run.rate), round(stop * run.rate))
+        added = np.zeros_like(velocity)
+        added[part] = some_fault(kind, part.stop - part.start, run, rng)
+        around = slice(max(0, part.start - round(run.rate / 2)), part.stop + round(run.rate / 2))
+        seen = visible(added[around], run.velocity[around], rate=run.rate).any()
+        velocity += added
+        labelled = stop - start if seen else 0.0
+        events.append({"label": ADDED[kind], "start": start, "stop": stop, "labelled": labelled})
+        blocks.append(Block(edge, start - UNLABELLED, "ok"))
+        blocks += [Block(start, stop, ADDED[kind])] if seen else []
+        edge = stop + UNLABELLED
+    blocks.append(Block(edge, end, "ok"))
+    meta = {**run.meta, "scenario": "added", "events": events}
+    return replace(run, velocity=velocity.astype(np.float32), blocks=tuple(blocks), meta=meta)
+
+
+def some_fault(kind: str, samples: int, run: Run, rng: np.random.Generator) -> Any:
+    """A fault of any frequency and level on one joint or all, shape (samples, joints)."""
+    frequency = LOWEST * (0.45 * run.rate / LOWEST) ** rng.uniform()
+    level = LEVELS[0] * (LEVELS[1] / LEVELS[0]) ** rng.uniform()
+    joints = np.arange(run.velocity.shape[1])
+    if rng.uniform() > ALL:
+        joints = rng.choice(joints, 1)
+    added = np.zeros((samples, run.velocity.shape[1]))
+    added[:, joints] = level * fault(kind, samples, frequency, run.rate, rng)[:, None]
+    return added
+
+
+def fault(kind: str, samples: int, frequency: float, rate: float, rng: np.random.Generator) -> Any:
+    """A fault of level 1, shape (samples,)."""
+    if kind == "noise":
+        signal = octave(rng.standard_normal(samples), frequency, 1 / rate)
+    else:
+        time = np.arange(samples) / rate
+        signal = np.sin(2 * np.pi * (frequency * time + rng.uniform()))
+        if kind == "blow":
+            signal *= np.exp(-time * frequency / 3.0)
+    return signal / max(np.sqrt(np.mean(signal**2)), 1e-9)
+
+
+def with_fault_throughout(run: Run, *, seed: int) -> Run:
+    """A good log with a tone or an octave of noise from its first sample to its last."""
+    rng = np.random.default_rng((seed, 1))
+    kind = str(rng.choice(("tone", "noise")))
+    added = some_fault(kind, len(run.velocity), run, rng)
+    whole = Block(0.0, len(added) / run.rate, ADDED[kind])
+    blocks = kept((whole,), visible(added, run.velocity, rate=run.rate))
+    labelled = sum(block.stop - block.start for block in blocks)
+    event = {"label": whole.label, "start": 0.0, "stop": whole.stop, "labelled": labelled}
+    return replace(
+        run,
+        velocity=(run.velocity + added).astype(np.float32),
+        blocks=blocks,
+        meta={**run.meta, "scenario": "added-throughout", "events": [event]},
+    )
+
+
+def beginning_anywhere(run: Run, *, seed: int) -> Run:
+    """A piece of a log: it begins in standing or in motion, or, one in two, in a failure."""
+    rng = np.random.default_rng((seed, 2))
+    end = len(run.velocity) / run.rate
+    last = max(end - PIECE[0], 0.0)
+    failures = [block for block in run.blocks if block.label != "ok" and block.start < last]
+    start = rng.uniform(0.0, last)
+    if failures and rng.uniform() < 0.5:
+        chosen = failures[int(rng.integers(len(failures)))]
+        start = min(rng.uniform(chosen.start, chosen.stop), last)
+    piece = run.cut(start, start + rng.uniform(*PIECE))
+    first = float(piece.time[0])
+    blocks = tuple(
+        replace(block, start=max(block.start - first, 0.0), stop=block.stop - first)
+        for block in piece.blocks
+    )
+    over = len(piece.time) / piece.rate
+    events = [
+        {
+            **event,
+            "start": max(event["start"] - first, 0.0),
+            "stop": min(event["stop"] - first, over),
+            "labelled": overlap({**event, "start": event["start"] - first}, blocks),
+        }
+        for event in run.meta["events"]
+        if event["stop"] > first and event["start"] < first + over
+    ]
+    meta = {**run.meta, "events": events, "piece": [first, first + over]}
+    return replace(piece, time=piece.time - first, blocks=blocks, meta=meta)
 
 
 def measured(model: Path, title: str, path: Path) -> str:

@@ -9,18 +9,16 @@ import pytest
 from simulated import simulated
 
 from noiseclassifier.scenarios.dataset import Folder, Task
-from noiseclassifier.scenarios.domains import DISTRIBUTION, Logger
+from noiseclassifier.scenarios.domains import Logger
 from noiseclassifier.scenarios.errors import DatasetError
+from noiseclassifier.scenarios.faults import Imperfections
 from noiseclassifier.scenarios.logs import logged, visible
-from noiseclassifier.scenarios.motions import PUSH, RATE
-from noiseclassifier.scenarios.robots import WIDE
+from noiseclassifier.scenarios.motions import PUSH
 from noiseclassifier.scenarios.simulation import (
     GOOD,
     WIDE_RECIPE,
     Start,
-    _imperfections,
     _setup,
-    _twin,
 )
 from noiseclassifier.scenarios.table import FAULTS
 from noiseclassifier.scenarios.world import configuration, real_model, reduced_model
@@ -48,12 +46,13 @@ def pushed():
 
 def real_panda():
     """The Panda of the seed with its real masses, and the Coulomb friction of its joints."""
-    drawn = _setup(Start("panda", STANDS, distribution=DISTRIBUTION))
-    imperfections = _imperfections(
-        drawn, len(drawn.robot.drives.joints), reduced_model(drawn.robot).njoints - 1
+    drawn = _setup(Start("panda", STANDS))
+    model = reduced_model(drawn.robot)
+    imperfections = Imperfections.draw(
+        drawn.body, drawn.robot, bodies=model.njoints - 1, domain=drawn.domain
     )
     tool = drawn.robot.tool
-    model = real_model(reduced_model(drawn.robot), tool.frame, np.array(tool.point), imperfections)
+    model = real_model(model, tool.frame, np.array(tool.point), imperfections)
     friction = np.array(drawn.robot.drives.friction) * imperfections.friction
     return model, friction * drawn.domain.stiction
 
@@ -94,20 +93,9 @@ def test_a_push_shows_in_the_efforts_as_the_torque_that_holds_its_force(twin, pu
 def pushes(run):
     from noiseclassifier.scenarios.arm import plan
 
-    drawn = _setup(Start("panda", STANDS, distribution=DISTRIBUTION))
+    drawn = _setup(Start("panda", STANDS))
     planned = plan(drawn.robot, drawn.motion, drawn.planned, SECONDS)
-    return FAULTS["arm"]["push"].draw(drawn.faulty, planned).loads
-
-
-def test_efforts_are_those_that_the_drives_measure_at_the_rate_of_the_run(twin):
-    assert twin.effort.dtype == np.float32
-    assert twin.effort.shape == twin.velocity.shape
-    drives, scale = WIDE["panda"].drives, twin.meta["domain"]["torque_limit"]
-    assert twin.meta["effort_limit"] == pytest.approx(np.array(drives.torque) * scale)
-    trial = _twin(Start("panda", STANDS, distribution=DISTRIBUTION), SECONDS)
-    step = round(RATE / twin.rate)
-    steady = slice(200, -200)
-    np.testing.assert_allclose(twin.effort[steady], trial.motion.torque[::step][steady], atol=0.5)
+    return FAULTS["arm"]["push"](drawn.faulty, planned).loads
 
 
 @pytest.mark.slow
@@ -174,11 +162,6 @@ def test_efforts_have_steps_noise_and_are_held_as_velocities_are(twin):
     np.testing.assert_allclose((noisy - fine).std(axis=0), 0.01 * limit, rtol=0.1)
     held = logged(twin, twin, replace(PLAIN, hold=10), seed=1).effort
     assert np.array_equal(held[::10], held[9::10])
-
-
-def test_a_run_without_efforts_has_logs_without(twin):
-    old = replace(twin, effort=None, meta={**twin.meta, "recipe": "domains 1"})
-    assert logged(old, old, PLAIN, seed=1).effort is None
 
 
 def test_a_slow_change_is_visible_beside_a_weight_only_where_means_are_left_out():

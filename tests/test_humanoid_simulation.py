@@ -10,8 +10,7 @@ from simulated import simulated
 
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import Faults, Imperfections
-from noiseclassifier.scenarios.humanoid import SETTLING, plan, scene, standing
-from noiseclassifier.scenarios.humanoid_plan import footsteps, walk
+from noiseclassifier.scenarios.humanoid import SETTLING, footsteps, plan, scene, standing, walk
 from noiseclassifier.scenarios.loop import record
 from noiseclassifier.scenarios.motions import STEPS, TICK, Walk
 from noiseclassifier.scenarios.robots import WIDE
@@ -21,18 +20,11 @@ G1 = WIDE["g1"]
 TALOS = WIDE["talos"]
 
 SEED, SHORT = 1, 4.0
-HUMANOIDS = pytest.mark.parametrize("robot", [TALOS, G1], ids=lambda robot: robot.name)
 
 
 def imperfect(robot, seed=3):
     rng = np.random.default_rng(seed)
-    return Imperfections.draw(
-        rng,
-        12,
-        bodies=reduced_model(robot).njoints - 1,
-        payload=robot.payload,
-        force=robot.force_noise,
-    )
+    return Imperfections.draw(rng, robot, bodies=reduced_model(robot).njoints - 1)
 
 
 def stood(robot, duration=0.3):
@@ -40,17 +32,15 @@ def stood(robot, duration=0.3):
     like = imperfect(robot)
     scenery = scene(robot, walk(robot, (), duration), Faults(), like)
     exact = replace(like, stiffness=1.0, damping=1.0)
-    drives = Drives(
-        scenery.start[-12:], drivetrain=robot.drives, offset=np.zeros(12), imperfections=exact
-    )
+    drives = Drives(scenery.start[-12:], robot.drives, np.zeros(12), exact)
     ticks = SETTLING + round(duration / TICK)
     quiet = np.zeros((ticks * STEPS, 12))
     error = np.zeros((ticks, scenery.model.nsensordata))
     return record(scenery, drives, encoder_error=quiet, sensor_error=error), like
 
 
-@HUMANOIDS
-def test_a_standing_robot_stands_still_and_the_ground_bears_its_weight(robot):
+def test_a_standing_robot_stands_still_and_the_ground_bears_its_weight():
+    robot = TALOS
     motion, like = stood(robot)
     assert np.abs(motion.velocity).max() < 0.02
     assert np.ptp(motion.base_pose[:, :3], axis=0).max() < 2e-3
@@ -60,8 +50,8 @@ def test_a_standing_robot_stands_still_and_the_ground_bears_its_weight(robot):
     assert (motion.contact.min(axis=0) > 0.3 * weight).all()
 
 
-@HUMANOIDS
-def test_mujoco_and_pinocchio_agree_on_soles_and_centre_of_mass_along_a_walk(robot):
+def test_mujoco_and_pinocchio_agree_on_soles_and_centre_of_mass_along_a_walk():
+    robot = G1
     model = reduced_model(robot)
     way = plan(robot, Walk(way="curve"), np.random.default_rng(0), SHORT)
     built = scene(robot, way, Faults(), imperfect(robot)).model
@@ -127,12 +117,6 @@ def test_it_walks_upright_to_where_its_steps_lead(straight):
     assert np.abs(turn[:3]).max() < 0.03
 
 
-def test_the_drives_stay_far_from_their_limits(straight):
-    assert np.abs(straight.effort).max() < 0.6 * max(TALOS.drives.torque)
-    error = straight.velocity - straight.velocity_desired
-    assert error.std() < 0.02
-
-
 def test_an_obstacle_is_an_early_contact_and_an_impact(obstacle):
     (event, *_) = obstacle.meta["events"]
     assert event["label"] == "impact"
@@ -167,24 +151,11 @@ def test_planned_velocities_are_those_that_drives_follow_where_nothing_disturbs(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "way"),
-    [("g1", "straight"), ("talos", "curve"), ("g1", "directions"), ("talos", "spot")],
+    [("talos", "curve"), ("g1", "directions")],
 )
 def test_humanoids_walk_every_way_without_an_event(robot, way):
     run = simulated(robot, way, 2)
     assert [block.label for block in run.blocks] == ["ok"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("side", ["heel", "toe", "left"])
-def test_obstacles_under_any_part_of_a_sole_are_impacts(side):
-    run = simulated("talos", f"obstacle-{side}", 2)
-    assert "impact" in {block.label for block in run.blocks}
-
-
-@pytest.mark.slow
-def test_too_high_gains_end_in_oscillations():
-    run = simulated("talos", "limit-cycle", 2)
-    assert "oscillations" in {block.label for block in run.blocks}
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.humanoid_plan import footsteps, walk
+from noiseclassifier.scenarios.humanoid import footsteps, walk
 from noiseclassifier.scenarios.motions import TICK, Walk
 from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.world import centre_of_mass
@@ -33,11 +33,6 @@ def test_the_centre_of_mass_moves_as_a_pendulum_over_its_zero_moment_point(way):
     np.testing.assert_allclose(zmp, plan.zmp[1:-1], rtol=0, atol=1e-7)
 
 
-def test_a_pendulum_over_a_point_at_rest_rests():
-    still = np.tile([0.3, -0.1], (2000, 1))
-    np.testing.assert_allclose(centre_of_mass(still, 3.4), still, rtol=0, atol=1e-9)
-
-
 def test_the_centre_of_mass_starts_to_move_before_the_zero_moment_point_jumps():
     zmp = np.repeat([[0.0, 0.0], [0.1, 0.0]], 1000, axis=0)
     x = centre_of_mass(zmp, 3.0)[:, 0]
@@ -48,9 +43,8 @@ def test_the_centre_of_mass_starts_to_move_before_the_zero_moment_point_jumps():
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("seed", range(3))
-def test_feet_land_where_and_when_they_are_to(way, seed):
-    steps, plan = steps_of(way, seed), plan_of(way, seed)
+def test_feet_land_where_and_when_they_are_to(way):
+    steps, plan = steps_of(way), plan_of(way)
     for step in steps:
         tick = int(np.ceil(step.stop / TICK))
         np.testing.assert_allclose(plan.places[tick, step.foot], step.place, atol=1e-9)
@@ -79,9 +73,9 @@ def test_the_foot_in_the_air_bears_no_weight_and_the_other_one_all(way):
         np.testing.assert_allclose(np.linalg.norm(beside, axis=1), 0.005, atol=1e-6)
 
 
-@pytest.mark.parametrize("robot", [TALOS, G1], ids=lambda robot: robot.name)
 @pytest.mark.parametrize("way", WAYS)
-def test_a_walk_fills_its_time_and_ends_standing(way, robot):
+def test_a_walk_fills_its_time_and_ends_standing(way):
+    robot = G1
     for seed in range(5):
         steps, plan = steps_of(way, seed, robot), plan_of(way, seed, robot)
         assert DURATION - 2.5 < steps[-1].stop < DURATION - 0.8
@@ -106,8 +100,8 @@ def test_seeds_walk_differently():
     assert {steps_of("curve", seed)[-1].yaw > 0 for seed in range(9)} == {True, False}
 
 
-@pytest.mark.parametrize("robot", [TALOS, G1], ids=lambda robot: robot.name)
-def test_a_platform_is_left_over_its_edge(robot):
+def test_a_platform_is_left_over_its_edge():
+    robot = G1
     for seed in range(10):
         plan = plan_of(seed=seed, robot=robot, drop=0.06, height=(0.07, 0.07))
         platform, floor = plan.ground
@@ -130,12 +124,3 @@ def test_contacts_state_when_feet_stand_and_when_they_are_highest():
             height = plan.places[round(contact.approach / TICK), contact.effector, 2]
             assert height == pytest.approx(0.05, abs=1e-3)
             assert plan.places[round(contact.start / TICK), contact.effector, 2] < 0.006
-
-
-def test_a_plan_that_begins_later_stands_before():
-    plan = plan_of()
-    later = plan.after(100)
-    assert later.duration == pytest.approx(plan.duration + 0.1)
-    assert (later.centre[:100] == plan.centre[0]).all()
-    np.testing.assert_array_equal(later.places[100:], plan.places)
-    assert later.contacts[-1].start == pytest.approx(plan.contacts[-1].start + 0.1)

@@ -7,30 +7,19 @@ import pinocchio as pin
 import pytest
 
 from noiseclassifier.scenarios import simulation
-from noiseclassifier.scenarios.domains import (
-    GAITS,
-    QUADRUPED_LIMITS,
-    QUICK,
-    quadruped_motion,
-    steady,
-)
+from noiseclassifier.scenarios.domains import LIMITS, quadruped_motion, steady
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.errors import DivergedError, ScenarioError
-from noiseclassifier.scenarios.faults import NO_DEFECT, ON_DRIVES
+from noiseclassifier.scenarios.faults import no_defect
 from noiseclassifier.scenarios.motions import Trot
+from noiseclassifier.scenarios.quadruped import SHIFT, TILT, poses, stand
 from noiseclassifier.scenarios.quadruped import plan as planned
-from noiseclassifier.scenarios.quadruped_plan import SHIFT, TILT, poses, stand
 from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.simulation import Start, _trial
-from noiseclassifier.scenarios.table import FAULTS
 from noiseclassifier.scenarios.world import GRAVITY, reduced_model
 
-OWN = {n: each for n, each in FAULTS["quadruped"].items() if n not in ON_DRIVES}
-
 A1 = WIDE["a1"]
-ANYMAL_C = WIDE["anymal_c"]
 GO2 = WIDE["go2"]
-HYQ = WIDE["hyq"]
 QUADRUPEDS = tuple(robot for robot in WIDE.values() if robot.family == "quadruped")
 
 SIMILAR = [robot for robot in QUADRUPEDS if robot.name not in ("go2", "solo12", "anymal")]
@@ -41,7 +30,7 @@ def plan(robot=GO2, seed=1, duration=5.0, **motion):
 
 
 def run(robot, motion, seed=1, duration=3.0):
-    return _trial(Start(robot.name, seed, motion), NO_DEFECT, duration)
+    return _trial(Start(robot.name, seed, motion), no_defect, duration)
 
 
 def upright(trial):
@@ -53,7 +42,7 @@ def touchdowns(trial, robot):
     """Downward speed of each foot 2 ms before it touches the ground after a swing, in [m/s]."""
     motion, model = trial.motion, reduced_model(robot)
     data, axes, out = model.createData(), pin.LOCAL_WORLD_ALIGNED, []
-    for foot, touching in zip(robot.feet, motion.contact.T > 0, strict=True):
+    for foot, touching in zip(robot.effectors, motion.contact.T > 0, strict=True):
         frame = model.getFrameId(foot.frame)
         for sample in np.flatnonzero(np.diff(np.flatnonzero(touching)) > 500):
             before = np.flatnonzero(touching)[sample + 1] - 20
@@ -69,28 +58,27 @@ def touchdowns(trial, robot):
 
 @pytest.mark.parametrize("robot", SIMILAR, ids=lambda robot: robot.name)
 def test_mass_and_leg_of_a_similar_robot_are_those_of_its_model(robot):
-    model, foot = reduced_model(robot), robot.feet[0]
+    model, foot = reduced_model(robot), robot.effectors[0]
     frame = model.frames[model.getFrameId(foot.frame)]
     thigh = model.jointPlacements[frame.parentJoint].translation
     leg = np.linalg.norm(thigh) + np.linalg.norm(frame.placement.translation)
-    assert leg / foot.radius == pytest.approx(0.426 / GO2.feet[0].radius, rel=1e-3)
+    assert leg / foot.radius == pytest.approx(0.426 / GO2.effectors[0].radius, rel=1e-3)
     mass = stand(robot).weight / GRAVITY
     assert mass / robot.payload == pytest.approx(16.085 / GO2.payload, rel=1e-3)
 
 
-@pytest.mark.parametrize("robot", QUADRUPEDS, ids=lambda robot: robot.name)
-def test_every_quadruped_stands_with_its_mass_over_its_feet_and_within_its_limits(robot):
+@pytest.mark.parametrize("robot", QUADRUPEDS[::3], ids=lambda robot: robot.name)
+def test_every_third_quadruped_stands_with_its_mass_over_its_feet_and_within_its_limits(robot):
     standing, model = stand(robot), reduced_model(robot)
     joints = standing.configuration[7:]
     assert (model.lowerPositionLimit[7:] < joints).all()
     assert (joints < model.upperPositionLimit[7:]).all()
-    assert standing.height > 0.5 * (robot.feet[0].radius * 0.426 / 0.022)
+    assert standing.height > 0.5 * (robot.effectors[0].radius * 0.426 / 0.022)
     assert standing.feet[:, :2].mean(axis=0) == pytest.approx([0, 0], abs=1e-9)
 
 
-@pytest.mark.parametrize(("robot", "gait"), [(A1, "walk"), (HYQ, "trot")])
-def test_a_target_robot_walks_upright_and_where_it_is_planned(robot, gait):
-    motion = Trot(gait=gait)
+def test_a_target_robot_walks_upright_and_where_it_is_planned():
+    robot, motion = A1, Trot(gait="walk")
     trial = run(robot, motion)
     assert upright(trial)
     assert (*trial.events, *trial.contacts) == ()
@@ -106,16 +94,16 @@ def test_a_target_robot_walks_upright_and_where_it_is_planned(robot, gait):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "gait"),
-    list(zip(QUADRUPEDS, cycle(["stand", "trot", "walk", "pace"]), strict=False)),
+    list(zip(QUADRUPEDS[::2], cycle(["stand", "trot", "walk", "pace"]), strict=False)),
     ids=lambda each: getattr(each, "name", each),
 )
-def test_every_quadruped_and_every_gait_stays_upright(robot, gait):
+def test_every_gait_stays_upright(robot, gait):
     assert upright(run(robot, Trot(gait=gait, posing=(0.5, 0.5) if gait == "stand" else (0, 0))))
 
 
 def test_the_body_of_a_walk_moves_as_its_feet_push_it():
     walk = plan(gait="walk")
-    zmp = np.einsum("tf,tfa->ta", walk.load, walk.feet[..., :2])
+    zmp = np.einsum("tf,tfa->ta", walk.load, walk.places[..., :2])
     acceleration = np.gradient(np.gradient(walk.centre[:, :2], 1e-3, axis=0), 1e-3, axis=0)
     expected = GRAVITY / walk.size * (walk.centre[:, :2] - zmp)
     np.testing.assert_allclose(acceleration[5:-5], expected[5:-5], atol=0.05)
@@ -125,7 +113,7 @@ def test_the_body_of_a_walk_moves_as_its_feet_push_it():
 def test_a_standing_robot_lifts_no_foot_and_moves_its_body():
     still = plan(gait="stand", posing=(1.0, 1.0))
     assert not still.swing.any()
-    assert not np.ptp(still.feet, axis=0).any()
+    assert not np.ptp(still.places, axis=0).any()
     assert 0.02 < np.abs(still.tilt).max() <= max(TILT)
     assert 0.01 < np.ptp(still.centre, axis=0).max() / still.size < 2 * max(SHIFT)
     np.testing.assert_array_equal(still.tilt[[0, -1]], 0)
@@ -171,9 +159,9 @@ def test_a_robot_of_another_size_is_similar():
 
 def test_motions_of_the_domain_are_wider_the_wilder():
     rng = np.random.default_rng(0)
-    mild = [quadruped_motion(rng, 0.0) for _ in range(200)]
-    wild = [quadruped_motion(rng, 1.0) for _ in range(200)]
-    assert {motion.gait for motion in wild} == set(GAITS)
+    mild = [quadruped_motion(rng, 0.0, GO2) for _ in range(200)]
+    wild = [quadruped_motion(rng, 1.0, GO2) for _ in range(200)]
+    assert {motion.gait for motion in wild} == {"trot", "walk", "pace", "stand"}
     assert {motion.pauses for motion in mild} == {0}
     assert {motion.pauses for motion in wild} == {0, 1, 2}
     for name in ("period", "height"):
@@ -181,51 +169,27 @@ def test_motions_of_the_domain_are_wider_the_wilder():
         assert np.ptp(narrow) < 0.21 < 0.5 < np.ptp(wide)
     periods = [GO2.period * motion.period[0] for motion in wild]
     assert min(periods) < 0.35
-    assert quadruped_motion(np.random.default_rng(3), 0.5) == quadruped_motion(
-        np.random.default_rng(3), 0.5
-    )
 
 
 def test_steps_on_soft_drives_are_quick_trots_or_walks():
-    for gait, wanted in (("trot", "trot"), ("pace", "trot"), ("walk", "walk")):
-        quick = QUICK[wanted]
+    for gait, wanted, quick in (
+        ("trot", "trot", 0.7),
+        ("pace", "trot", 0.7),
+        ("walk", "walk", 0.8),
+    ):
         assert steady(Trot(gait=gait)) == Trot(gait=wanted, period=(quick, quick))
     assert steady(Trot(gait="stand")) == Trot(gait="stand")
     fast = Trot(period=(0.5, 0.6))
     assert steady(fast) == fast
 
 
-@pytest.mark.parametrize("name", OWN)
-def test_a_defect_can_be_drawn_for_every_motion(name):
-    for seed in range(12):
-        rng = np.random.default_rng(seed)
-        motion = quadruped_motion(rng, seed / 11)
-        steps = planned(ANYMAL_C, motion, rng, 3.0)
-        faults = OWN[name].draw(rng, steps)
-        assert all(event.start < event.stop for event in faults.events)
-        lift = np.ptp(steps.feet[..., 2])
-        assert all(box.top <= 0.65 * lift for box in faults.boxes)
-
-
-@pytest.mark.parametrize("name", ["obstacle-full", "platform", "force-jump"])
-def test_a_defect_of_steps_draws_nothing_where_the_robot_stands(name):
-    faults = OWN[name].draw(np.random.default_rng(1), plan(gait="stand"))
-    assert (faults.boxes, faults.ground, faults.events) == ((), None, ())
-
-
-def test_a_step_down_is_not_drawn_for_a_robot_on_the_spot():
-    step = OWN["platform"]
-    assert step.draw(np.random.default_rng(1), plan(way="spot")).ground is None
-    assert step.draw(np.random.default_rng(1), plan(way="straight")).ground is not None
-
-
 def soften(monkeypatch, **scales):
     """Replace the drives by soft ones that hold targets, with a delay."""
 
     class Soft(Drives):
-        def __init__(self, start, **others):
+        def __init__(self, *given):
             self._targets, self._number = (), 0
-            super().__init__(start, **others)
+            super().__init__(*given)
             self._stiffness = scales["stiffness"] * self._stiffness
             self._damping = scales["damping"] * self._damping
 
@@ -239,7 +203,7 @@ def soften(monkeypatch, **scales):
 
 
 def at_the_limits(robot, monkeypatch, gait):
-    limits = QUADRUPED_LIMITS
+    limits = LIMITS["quadruped"]
     soften(
         monkeypatch,
         stiffness=limits.stiffness[0],

@@ -6,19 +6,16 @@ import numpy as np
 import pytest
 
 from noiseclassifier.scenarios.motions import TICK, times
-from noiseclassifier.scenarios.quadruped_plan import (
-    ACROSS,
+from noiseclassifier.scenarios.quadruped import (
     CHANGE,
     GAITS,
     LANDING,
-    NEAR,
     TOP,
     TROT,
     beats,
     footholds,
     height_of,
     loads,
-    progress_of,
     steer,
     swings,
 )
@@ -43,15 +40,6 @@ def test_pairs_swing_in_turn_and_never_together(timing):
     assert 5.5 - 0.55 <= timing[-1].touch <= 5.5
 
 
-def test_cycles_vary_by_the_given_share(timing):
-    cycles = np.diff([beat.begin for beat in timing[::2]])
-    assert cycles.min() >= 0.45
-    assert cycles.max() <= 0.55
-    assert np.ptp(cycles) > 0.02
-    stands = [two.lift - one.touch for one, two in zip(timing, timing[2:], strict=False)]
-    assert np.mean(stands) / cycles.mean() == pytest.approx(TROT.duty, abs=0.02)
-
-
 def test_the_feet_share_the_weight_and_feet_in_the_air_bear_none(timing):
     load, share = loads(TIME, timing), swings(TIME, timing)
     np.testing.assert_allclose(load.sum(axis=1), 1, atol=1e-12)
@@ -72,11 +60,6 @@ def test_a_foot_goes_up_and_comes_down_softly():
     assert slope[-1] == pytest.approx(-LANDING / (1 - TOP), rel=1e-2)
     assert slope.min() < 10 * slope[-1]
     assert np.abs(np.diff(slope)).max() < 0.01
-
-
-def test_a_foot_is_over_its_place_before_it_may_touch():
-    assert progress_of(np.array([0.0, ACROSS, 1.0])) == pytest.approx([0, 1, 1])
-    assert height_of(np.array([NEAR]))[0] < 0.35
 
 
 def test_feet_come_down_at_the_neutral_point(timing):

@@ -13,19 +13,20 @@ import workers
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
 from noiseclassifier.scenarios.dataset import (
-    DatasetSpec,
     Folder,
-    Statistics,
     Task,
     choose,
+    described,
     grouped_by_twin,
     make,
+    scenario_tasks,
+    statistics,
 )
 from noiseclassifier.scenarios.simulation import RECIPE
 from noisemodel import Block, Run, parallel, runfile
 
 JOINTS = scenarios.ROBOTS["panda"].drives.joints
-ALL = DatasetSpec(choice=choose(["panda", "ur5"], ["1", "2", "7"]), seeds=2).tasks()
+ALL = scenario_tasks(choose(["panda", "ur5"], ["1", "2", "7"]), seeds=2)
 
 
 @pytest.fixture
@@ -100,18 +101,15 @@ def test_unknown_robots_and_scenarios_are_refused():
     [
         ({"seeds": 0}, "0 seeds, expected 1 or more"),
         ({"first": -1}, "the first seed is -1, expected 0 or more"),
-        ({"hours": 0.0}, "0 hours, expected more than 0"),
-        ({"hours": float("nan")}, "nan hours"),
-        ({"seeds": 2, "hours": 1.0}, "2 seeds and 1 hours; expected one of the two"),
     ],
 )
 def test_numbers_out_of_range_are_refused(numbers, problem):
     with pytest.raises(scenarios.DatasetError, match=problem):
-        DatasetSpec(choice={"panda": ("straight",)}, **numbers)
+        scenario_tasks({"panda": ("straight",)}, **numbers)
 
 
 def test_runs_that_share_their_twin_are_one_group():
-    tasks = DatasetSpec(choice=choose(["panda", "ur5"]), seeds=2).tasks()
+    tasks = scenario_tasks(choose(["panda", "ur5"]), seeds=2)
     groups = grouped_by_twin(tasks)
     assert sorted(task for group in groups for task in group) == sorted(tasks)
     assert len(set(tasks)) == len(tasks)
@@ -124,29 +122,6 @@ def test_runs_that_share_their_twin_are_one_group():
     assert max(map(len, groups)) > 10
 
 
-def test_hours_are_divided_evenly_between_robots():
-    choice = choose(["panda", "ur5"], healthy=True)
-    seconds = {}
-    for task in DatasetSpec(choice=choice, hours=0.2, first=5).tasks():
-        assert task.seed >= 5
-        motion = scenarios.SCENARIOS[task.scenario].cases["arm"].motion
-        seconds.setdefault(task.robot, []).append(motion.duration)
-    for mine in seconds.values():
-        assert 360 <= sum(mine) < 360 + sum(mine[:4])
-
-
-def test_a_run_that_fell_does_not_count_towards_the_hours():
-    choice = choose(["panda"], healthy=True)
-    spec = DatasetSpec(choice=choice, hours=100 / 3600)
-    tasks = spec.tasks(duration=5.0)
-    assert len(tasks) == 20
-    more = spec.tasks(duration=5.0, fallen=tasks[:1])
-    assert more[: len(tasks)] == tasks
-    assert len(more) == 24
-    with pytest.raises(scenarios.DatasetError, match="panda fell in 20 of 20 runs, so that 100 s"):
-        spec.tasks(duration=5.0, fallen=more)
-
-
 def test_every_run_is_simulated_once(simulated, tmp_path):
     place = Folder.opened(tmp_path / "data")
     made = list(make(place, ALL))
@@ -157,14 +132,22 @@ def test_every_run_is_simulated_once(simulated, tmp_path):
     assert list(make(Folder.opened(tmp_path / "data"), ALL)) == []
     assert len(simulated.calls) == len(ALL)
     assert Run.load(place.path / "panda/curve-001.npz").robot == "panda"
+    with (place.path / "times.csv").open("a") as times:  # damaged lines, and files of others
+        times.write("panda/curve-000,99.00\nbaxter/curve-000,1.00\npanda/cur\n\n")
+    (place.path / "panda" / "straight-x.npz").write_bytes(b"")
+    assert place.times()[Task("panda", "curve", 0)] == 99.0
+    assert set(place.times()) == set(place.kept()) == set(ALL)
 
 
 def test_a_data_set_that_was_interrupted_resumes(simulated, tmp_path):
     place = Folder.opened(tmp_path)
+    assert "0 runs" in described(statistics(place))
     assert len(list(islice(make(place, ALL), 4))) == 4
     assert len(place.kept()) == 4
+    (place.file(ALL[-1]).parent / f".{place.file(ALL[-1]).stem}.npz.x1y2z3").write_bytes(b"half")
     assert len(list(make(place, ALL))) == len(ALL) - 4
     assert sorted(simulated.calls) == sorted(ALL)
+    assert not [name for name in files(tmp_path) if "x1y2z3" in name]
 
 
 def test_a_run_that_fell_is_recorded_and_not_simulated_again(simulated, tmp_path):
@@ -177,10 +160,11 @@ def test_a_run_that_fell_is_recorded_and_not_simulated_again(simulated, tmp_path
     assert (record["time"], record["problem"], record["seed"]) == (1.25, "it fell", 1)
     assert record["recipe"] == RECIPE
     assert list(make(place, ALL)) == []
-    statistics = Statistics.of(place)
-    assert statistics.upright["panda"]["obstacle-toe"] == (1, 2)
-    assert statistics.upright["ur5"]["obstacle-toe"] == (2, 2)
-    assert "1 of which fell" in str(statistics)
+    found = statistics(place)
+    assert found["upright"]["panda"]["obstacle-toe"] == {"upright": 1, "runs": 2}
+    assert found["upright"]["ur5"]["obstacle-toe"] == {"upright": 2, "runs": 2}
+    assert "12 runs, 1 of which fell" in described(found)
+    assert "5/6   obstacle-toe (1)" in described(found)
 
 
 def test_complete_frames_of_a_block_count_and_one_for_a_shorter_block(
@@ -192,7 +176,7 @@ def test_complete_frames_of_a_block_count_and_one_for_a_shorter_block(
     monkeypatch.setattr(Folder, "read", lambda *_: (blocks, 7.0))
     place = Folder.opened(tmp_path)
     list(make(place, ALL[:1]))
-    amount = Statistics.of(place).amounts["panda"]["ok"]
+    amount = statistics(place)["classes"]["panda"]["ok"]
     assert amount["blocks"] == 5
     assert amount["seconds"] == pytest.approx(sum(lengths))
     assert amount["frames"] == 1 + 1 + 1 + 2 + 9
@@ -201,25 +185,12 @@ def test_complete_frames_of_a_block_count_and_one_for_a_shorter_block(
 def test_statistics_are_plain_data_too(simulated, tmp_path):
     place = Folder.opened(tmp_path)
     list(make(place, ALL))
-    statistics = json.loads(json.dumps(Statistics.of(place).as_dict()))
-    assert statistics["upright"]["panda"]["curve"] == {"upright": 2, "runs": 2}
-    assert statistics["classes"]["ur5"]["ok"] == {"blocks": 6, "seconds": 3.0, "frames": 12}
-    assert statistics["cpu"]["panda"]["simulated"] == pytest.approx(6.0, abs=0.01)
-    assert statistics["cpu"]["panda"]["seconds"] > 0
-    assert statistics["bytes"] == sum((tmp_path / name).stat().st_size for name in files(tmp_path))
-
-
-def test_an_empty_data_set_has_empty_statistics(tmp_path):
-    assert "0 runs" in str(Statistics.of(Folder.opened(tmp_path)))
-
-
-def test_damaged_lines_of_processor_times_are_skipped(simulated, tmp_path):
-    place = Folder.opened(tmp_path)
-    list(make(place, ALL))
-    with (tmp_path / "times.csv").open("a") as times:
-        times.write("panda/curve-000,99.00\nbaxter/curve-000,1.00\npanda/cur\n\n")
-    assert place.times()[Task("panda", "curve", 0)] == 99.0
-    assert set(place.times()) == set(ALL)
+    found = json.loads(json.dumps(statistics(place)))
+    assert found["upright"]["panda"]["curve"] == {"upright": 2, "runs": 2}
+    assert found["classes"]["ur5"]["ok"] == {"blocks": 6, "seconds": 3.0, "frames": 12}
+    assert found["cpu"]["panda"]["simulated"] == pytest.approx(6.0, abs=0.01)
+    assert found["cpu"]["panda"]["seconds"] > 0
+    assert found["bytes"] == sum((tmp_path / name).stat().st_size for name in files(tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -283,15 +254,6 @@ def test_a_full_disk_is_one_line_and_leaves_no_partial_file(simulated, tmp_path,
     assert len(list(make(place, ALL))) == len(ALL) - 3
 
 
-def test_temporary_files_of_a_killed_process_are_removed(simulated, tmp_path):
-    place = Folder.opened(tmp_path)
-    (tmp_path / "panda").mkdir()
-    (tmp_path / "panda" / ".straight-000.npz.x1y2z3").write_bytes(b"half")
-    assert Task("panda", "straight", 0) in place.missing(ALL)
-    list(make(place, ALL))
-    assert not [name for name in files(tmp_path) if "x1y2z3" in name]
-
-
 def test_a_damaged_run_is_replaced_only_with_overwrite(simulated, tmp_path):
     place = Folder.opened(tmp_path)
     list(make(place, ALL))
@@ -322,18 +284,9 @@ def test_without_mujoco_nothing_is_simulated_but_a_complete_data_set_is_read(
     assert len(simulated.calls) == 2
 
 
-def test_runs_of_other_robots_are_not_mistaken(simulated, tmp_path):
-    place = Folder.opened(tmp_path)
-    list(make(place, ALL))
-    (tmp_path / "baxter").mkdir()
-    (tmp_path / "baxter" / "straight-000.npz").write_bytes(b"")
-    (tmp_path / "panda" / "straight-x.npz").write_bytes(b"")
-    assert sorted(place.kept()) == sorted(ALL)
-
-
 @pytest.mark.slow
 def test_several_processes_make_the_same_files_as_one(tmp_path):
-    tasks = DatasetSpec(choice=choose(["panda"], ["2", "3", "7"]), seeds=1).tasks()
+    tasks = scenario_tasks(choose(["panda"], ["2", "3", "7"]), seeds=1)
     places = [Folder.opened(tmp_path / str(jobs), duration=3.0) for jobs in (1, 2)]
     for jobs, place in enumerate(places, start=1):
         assert sorted(make(place, tasks, jobs=jobs)) == sorted(tasks)
@@ -361,7 +314,7 @@ def test_a_run_that_kills_its_worker_is_named_and_all_others_are_made(tmp_path, 
 @pytest.mark.slow
 def test_an_error_in_another_process_is_one_line(tmp_path):
     place = replace(Folder.opened(tmp_path), duration=1.0)
-    tasks = DatasetSpec(choice=choose(["panda"], ["2", "3"]), seeds=1).tasks()
+    tasks = scenario_tasks(choose(["panda"], ["2", "3"]), seeds=1)
     with pytest.raises(
         scenarios.DatasetError, match="duration 1 s: expected at least 3 s; the same command"
     ):

@@ -6,9 +6,8 @@ import pinocchio as pin
 import pytest
 
 from noiseclassifier.scenarios.errors import ScenarioError
-from noiseclassifier.scenarios.motions import Ball, Box, Rod, Sole
+from noiseclassifier.scenarios.motions import Box, Sole, Tip
 from noiseclassifier.scenarios.world import (
-    Physics,
     box_changes,
     build,
     pinocchio_base,
@@ -34,9 +33,8 @@ ODD = """<robot name="odd"><link name="base"/>
   <origin xyz="0 0 0.2" rpy="1 0 0"/><axis xyz="0 1 0"/></joint></robot>"""
 
 
-def physics(joints: int, **changes: float) -> Physics:
-    nothing = np.zeros(joints)
-    return Physics(timestep=1e-4, armature=nothing, damping=nothing, friction=nothing, **changes)
+def physics(joints):
+    return dict.fromkeys(("armature", "damping", "friction"), np.zeros(joints))
 
 
 @pytest.fixture(params=["panda", "odd"])
@@ -60,7 +58,7 @@ def states(model, rng):
 
 def test_bodies_are_where_pinocchio_has_them_and_move_as_fast(model):
     rng = np.random.default_rng(0)
-    built = build(model, physics(model.nv))
+    built = build(model, **physics(model.nv))
     ours, theirs = model.createData(), mujoco.MjData(built)
     for _ in range(20):
         q, angles, v = states(model, rng)
@@ -83,7 +81,7 @@ def test_bodies_are_where_pinocchio_has_them_and_move_as_fast(model):
 
 def test_the_same_motion_takes_the_same_torques(model):
     rng = np.random.default_rng(1)
-    built = build(model, physics(model.nv))
+    built = build(model, **physics(model.nv))
     data = mujoco.MjData(built)
     for _ in range(5):
         q, angles, v = states(model, rng)
@@ -95,7 +93,7 @@ def test_the_same_motion_takes_the_same_torques(model):
 
 
 def test_actuators_are_the_joints_in_pinocchio_order(model):
-    built = build(model, physics(model.nv))
+    built = build(model, **physics(model.nv))
     assert [built.actuator(index).name for index in range(built.nu)] == list(model.names)[1:]
     assert built.nq == built.nv == model.nv
 
@@ -108,8 +106,8 @@ def test_a_rod_touches_with_its_tip_and_its_sensor_measures_the_weight_on_it():
       <limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
     built = build(
         pin.buildModelFromXML(urdf),
-        physics(1),
-        effectors=(Rod("tool", length=0.1, radius=0.01),),
+        **physics(1),
+        effectors=(Tip("tool", length=0.1, radius=0.01),),
         boxes=(Box(centre=(0.0, 0.0, 0.15), half=(0.2, 0.2, 0.05)),),
     )
     data = mujoco.MjData(built)
@@ -125,7 +123,7 @@ def test_a_rod_touches_with_its_tip_and_its_sensor_measures_the_weight_on_it():
 def test_a_floating_base_falls_freely_and_its_sensors_measure_it():
     model = pin.buildModelFromXML(ODD, pin.JointModelFreeFlyer())
     model.inertias[1] = pin.Inertia.FromSphere(3.0, 0.1)
-    built = build(model, physics(model.nv - 6), effectors=(Ball("a", radius=0.01),))
+    built = build(model, **physics(model.nv - 6), effectors=(Tip("a", radius=0.01),))
     data = mujoco.MjData(built)
     mujoco.mj_forward(built, data)
     start = data.sensordata.copy()
@@ -147,7 +145,7 @@ def test_the_base_is_converted_to_pinocchios_conventions():
     rng = np.random.default_rng(3)
     model = pin.buildModelFromXML(ODD, pin.JointModelFreeFlyer())
     model.inertias[1] = pin.Inertia.FromSphere(3.0, 0.1)
-    built = build(model, physics(model.nv - 6))
+    built = build(model, **physics(model.nv - 6))
     theirs, ours = mujoco.MjData(built), model.createData()
     theirs.qpos[:7] = rng.normal(size=7)
     theirs.qpos[3:7] /= np.linalg.norm(theirs.qpos[3:7])
@@ -175,10 +173,8 @@ def test_a_sole_measures_the_weight_that_it_bears():
     model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
     floor = Box(centre=(0.0, 0.0, -0.05), half=(1.0, 1.0, 0.05))
     sole = Sole("foot", patch=(0.1, 0.05), point=(0.0, 0.0, -0.1))
-    stiff = Physics(
-        timestep=1e-4, armature=np.ones(1), damping=np.array([1e5]), friction=np.zeros(1)
-    )
-    built = build(model, stiff, effectors=(sole,), boxes=(floor,))
+    stiff = {"armature": np.ones(1), "damping": np.array([1e5]), "friction": np.zeros(1)}
+    built = build(model, **stiff, effectors=(sole,), boxes=(floor,))
     data = mujoco.MjData(built)
     data.qpos[2] = 0.6001
     for _ in range(8000):
@@ -197,7 +193,7 @@ def test_boxes_appear_and_vanish():
         Box((0, 0, 0), (1, 1, 1), since=0.5, until=0.8),
     )
     model = pin.buildModelFromXML(ODD)
-    built = build(model, physics(model.nv), boxes=boxes)
+    built = build(model, **physics(model.nv), boxes=boxes)
     late = built.geom("box1").id
     assert box_changes(built, boxes) == {500: [(late, True)], 800: [(late, False)]}
     assert (built.geom_contype[late], built.geom_contype[built.geom("box0").id]) == (0, 2)
@@ -208,11 +204,11 @@ def test_boxes_appear_and_vanish():
 def test_an_effector_without_its_frame_is_refused_with_the_known_frames():
     model = pin.buildModelFromXML(ODD)
     with pytest.raises(ScenarioError, match="no frame 'sole' for an effector; it has .*slide"):
-        build(model, physics(model.nv), effectors=(Ball("sole", radius=0.01),))
+        build(model, **physics(model.nv), effectors=(Tip("sole", radius=0.01),))
 
 
 def test_a_body_without_mass_is_refused():
     model = pin.buildModelFromXML(ODD)
     model.inertias[2] = pin.Inertia.Zero()
     with pytest.raises(ScenarioError, match="MuJoCo refuses the robot: .*slide"):
-        build(model, physics(model.nv))
+        build(model, **physics(model.nv))

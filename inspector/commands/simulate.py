@@ -65,7 +65,7 @@ def run(
 
     if list_:
         for name, line in scenarios.SCENARIOS.items():
-            families = ", ".join(line.families)
+            families = ", ".join(line.cases)
             typer.echo(f"{line.number:>2} {name:23} {families:26} {line.description}")
     if list_ or not robot:
         typer.echo(f"robots: {', '.join(scenarios.ROBOTS)}", err=not list_)
@@ -82,11 +82,8 @@ def run(
 def dataset(
     robots: Annotated[str, typer.Option(help="Names of robots: talos,go2,panda.")],
     output: To,
-    seeds: Annotated[int | None, typer.Option(help="Per robot and scenario; 8 by default.")] = None,
+    seeds: Annotated[int, typer.Option(help="Seeds per robot and scenario.")] = 8,
     first_seed: First = 0,
-    hours: Annotated[
-        float | None, typer.Option(help="Instead of --seeds: in all, split between robots.")
-    ] = None,
     scenarios: Annotated[str, typer.Option(help="Names or numbers; by default all.")] = "",
     only: Annotated[
         Literal["ok"] | None, typer.Option(help="Only scenarios without a failure.")
@@ -99,17 +96,22 @@ def dataset(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Simulate a data set; resumes if killed: only missing runs are made."""
-    from noiseclassifier.scenarios.dataset import DatasetSpec, Folder, Statistics, choose
+    from noiseclassifier.scenarios.dataset import (
+        Folder,
+        choose,
+        described,
+        scenario_tasks,
+        statistics,
+    )
 
     where = jobs_or_dask(jobs, dask)
     choice = choose(_listed(robots), _listed(scenarios), healthy=only is not None)
-    spec = DatasetSpec(choice=choice, first=first_seed, seeds=seeds, hours=hours)
+    tasks = scenario_tasks(choice, first=first_seed, seeds=seeds)
     folder = Folder.opened(output, duration=duration, rate=rate)
     folder.clear(overwrite=overwrite)
-    while missing := folder.missing(spec.tasks(duration=duration, fallen=folder.fallen())):
-        _make(folder, missing, where)
-    found = Statistics.of(folder)
-    typer.echo(json.dumps(found.as_dict(), indent=2) if as_json else f"{output}: {found}")
+    _make(folder, folder.missing(tasks), where)
+    found = statistics(folder)
+    typer.echo(json.dumps(found, indent=2) if as_json else f"{output}: {described(found)}")
 
 
 @app.command(epilog="Example: inspector simulate domains --seeds 8 -o data/ -j 2")
@@ -125,14 +127,14 @@ def domains(
     list_: List = False,
 ) -> None:
     """Simulate wide domains: many robots, drives, controllers, motions; resumes if killed."""
-    from noiseclassifier.scenarios.dataset import Folder, Statistics, wide_tasks
-    from noiseclassifier.scenarios.domains import DISTRIBUTION
+    from noiseclassifier.scenarios.dataset import Folder, described, statistics, wide_tasks
+    from noiseclassifier.scenarios.domains import listing
     from noiseclassifier.scenarios.robots import TARGETS, WIDE
 
     if list_ or output == Path():
         sources = [robot for robot in WIDE if robot not in TARGETS]
         typer.echo(f"{len(sources)} robots to learn from: {', '.join(sources)}")
-        typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}\n\n{DISTRIBUTION}")
+        typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}\n\n{listing()}")
         return
     chosen = wide_tasks(
         _listed(robots),
@@ -144,7 +146,7 @@ def domains(
     )
     folder = Folder.opened(output, wide=True)
     _make(folder, folder.missing(chosen), jobs)
-    typer.echo(f"{output}: {Statistics.of(folder)}")
+    typer.echo(f"{output}: {described(statistics(folder))}")
 
 
 @app.command(epilog="Example: inspector simulate logs data/ -o logs/ --copies 2")

@@ -1,6 +1,6 @@
 """An arm that picks from a table: plan, controller, and the scene of any arm."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,83 +8,39 @@ import pinocchio as pin
 
 from noiseclassifier.scenarios.arm_reaching import (
     HIGHEST_ACCELERATION,
-    MARGIN,
-    SHARE,
-    TURN,
-    Ability,
     JointControl,
     ReachPlan,
+    Tool,
     reach,
 )
 from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Faults, Imperfections
-from noiseclassifier.scenarios.loop import Control, Reference, Scene, forces
+from noiseclassifier.scenarios.forces import force
+from noiseclassifier.scenarios.loop import Control, Reference, Scene
 from noiseclassifier.scenarios.motions import (
     TICK,
     Box,
     Contact,
-    Effector,
-    Payload,
     Picks,
+    Plan,
     Reach,
-    Rod,
-    Units,
     bump,
     minimum_jerk,
-    times,
 )
 from noiseclassifier.scenarios.robots import Arm
-from noiseclassifier.scenarios.world import (
-    box_changes,
-    configuration,
-    real_world,
-    reduced_model,
-)
-from noisemodel import Robot
+from noiseclassifier.scenarios.world import box_changes, real_world
 from noisemodel.types import Array
 
 NEAR = 0.002  # height over the table at which force control starts, in [m]
-METRIC = Units()  # metres and newtons
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """Plan of the motion of a tool, at every tick."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PickPlan(Plan):
+    """Plan of the motion of a tool."""
 
-    position: Array  # of the tool's tip, shape (ticks, 3), in [m]
     yaw: Array  # turn of the tool about the vertical since the start, shape (ticks,), in [rad]
     force: Array  # force to press with; NaN while force control is off, shape (ticks,), in [N]
     keep: Array  # share of the last offset of the force control that remains, shape (ticks,)
-    contacts: tuple[Contact, ...]
-    effectors: tuple[Effector, ...]
-    ground: tuple[Box, ...]
-    units: Units = METRIC
-
-    @property
-    def time(self) -> Array:
-        """Time of each tick, shape (ticks,), in [s]."""
-        return times(len(self.yaw), TICK)
-
-    @property
-    def payloads(self) -> tuple[Payload, ...]:
-        """None."""
-        return ()
-
-    @property
-    def duration(self) -> float:
-        """Duration, in [s]."""
-        return len(self.yaw) * TICK
-
-    def after(self, ticks: int) -> "Plan":
-        """The plan after some ticks of rest."""
-        return replace(
-            self,
-            position=np.pad(self.position, ((ticks, 0), (0, 0)), "edge"),
-            yaw=np.pad(self.yaw, (ticks, 0), "edge"),
-            force=np.pad(self.force, (ticks, 0), constant_values=np.nan),
-            keep=np.pad(self.keep, (ticks, 0)),
-            contacts=tuple(contact.later(ticks * TICK) for contact in self.contacts),
-        )
 
 
 @dataclass(frozen=True)
@@ -99,27 +55,21 @@ class Segment:
     bend: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def pick(
-    motion: Picks,
-    rng: np.random.Generator,
-    *,
-    start: Array,
-    tool: Rod,
-    table: float,
-    reach: tuple[tuple[float, float], tuple[float, float]],
-    duration: float,
-    units: Units = METRIC,
-) -> Plan:
+def pick(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> PickPlan:
     """Plan of picks, one after the other."""
-    segments = [Segment(0.2, (float(start[0]), float(start[1]), float(start[2])), 0.0)]
+    if arm.reach is None:
+        raise ScenarioError(f"{arm.name} has no table to pick from")
+    table, area = arm.table, arm.reach
+    x, y, z = Tool(arm).place(np.array(arm.rest)).tolist()
+    segments = [Segment(0.2, (x, y, z), 0.0)]
     contacts = []
     now = segments[0].duration
-    spot = _place(rng, reach) if motion.way == "spot" else None
+    spot = _place(rng, area) if motion.way == "spot" else None
     while now < duration:
         one = (
-            _one_flight(rng, table, reach)
+            _one_flight(rng, table, area)
             if motion.way == "directions"
-            else _one_pick(motion, rng, table, spot or _place(rng, reach))
+            else _one_pick(motion, rng, table, spot or _place(rng, area))
         )
         for segment in one:
             if not np.isnan(segment.force):
@@ -130,22 +80,22 @@ def pick(
         segments += one
     ticks = round(duration / TICK)
     position, yaw, force, keep = (np.concatenate(part)[:ticks] for part in _sample(segments))
-    return Plan(
-        position,
-        yaw,
-        force * units.force,
-        keep,
+    return PickPlan(
+        places=position[:, None],
+        yaw=yaw,
+        force=force * arm.units.force,
+        keep=keep,
         contacts=tuple(contact for contact in contacts if contact.start < duration),
-        effectors=(tool,),
+        effectors=arm.effectors,
+        torques=arm.drives.torque,
         ground=(Box(centre=(0.5, 0.0, table - 0.05), half=(0.6, 1.0, 0.05)),),
-        units=units,
+        units=arm.units,
     )
 
 
-def _place(
-    rng: np.random.Generator, reach: tuple[tuple[float, float], tuple[float, float]]
-) -> tuple[float, float]:
-    return float(rng.uniform(*reach[0])), float(rng.uniform(*reach[1]))
+def _place(rng: np.random.Generator, area: Any) -> tuple[float, float]:
+    """A place in ranges of x and y."""
+    return float(rng.uniform(*area[0])), float(rng.uniform(*area[1]))
 
 
 def _one_pick(
@@ -169,11 +119,9 @@ def _one_pick(
     ]
 
 
-def _one_flight(
-    rng: np.random.Generator, table: float, reach: tuple[tuple[float, float], tuple[float, float]]
-) -> list[Segment]:
+def _one_flight(rng: np.random.Generator, table: float, area: Any) -> list[Segment]:
     """A movement over the table in any direction."""
-    position = (*_place(rng, reach), table + float(rng.uniform(0.05, 0.3)))
+    position = (*_place(rng, area), table + float(rng.uniform(0.05, 0.3)))
     pause = Segment(float(rng.uniform(0.02, 0.3)), position, 0.0)
     return [Segment(float(rng.uniform(0.5, 1.3)), position, 0.0), pause]
 
@@ -208,32 +156,22 @@ class ToolControl:
     """Follows a plan with a tool that points down, and presses with the planned force."""
 
     def __init__(
-        self,
-        model: Any,
-        frame: str,
-        point: Array,
-        rest: Array,
-        plan: Plan,
-        *,
-        gain: Array,
-        time_constant: float,
+        self, tool: Tool, rest: Array, plan: PickPlan, *, gain: Array, time_constant: float
     ) -> None:
-        self._model, self._data = model, model.createData()
-        self._frame, self._point = model.getFrameId(frame), point
-        pin.framesForwardKinematics(model, self._data, configuration(model, rest))
-        self._upright = self._data.oMf[self._frame].rotation.copy()
-        self._plan, self._gain = plan, gain
+        self._tool, self._plan, self._gain = tool, plan, gain
+        self._upright = tool.pose(rest).rotation.copy()
         self._share = TICK / (time_constant + TICK)
         self._force = self._offset = self._left = self._excess = 0.0
         self._pressing = 0  # ticks of force control so far
         self._joints = [rest] * 3  # of the last three ticks
         self._velocity = self._planned = np.zeros(len(rest))
-        self._velocities = np.gradient(plan.position, TICK, axis=0)
+        self._path = plan.places[:, 0]
+        self._velocities = np.gradient(self._path, TICK, axis=0)
         self._turning = np.gradient(plan.yaw, TICK)
 
     def tick(self, number: int, sensors: Array) -> Reference:
         """Advance by one tick."""
-        tip = self._plan.position[number] + (0.0, 0.0, self._press(number, float(sensors[0])))
+        tip = self._path[number] + (0.0, 0.0, self._press(number, float(sensors[0])))
         joints, inverse = self._solve(tip, self._plan.yaw[number])
         before, here, after = self._joints = [*self._joints[1:], joints]
         velocity = (after - before) / (2 * TICK)
@@ -243,10 +181,8 @@ class ToolControl:
             position=np.stack((before, here)),
             velocity=np.stack((self._velocity, velocity)),
             planned=np.stack((self._planned, planned)),
-            torque=pin.rnea(
-                self._model,
-                self._data,
-                configuration(self._model, here),
+            torque=self._tool.torque(
+                here,
                 velocity,
                 np.clip(acceleration, -HIGHEST_ACCELERATION, HIGHEST_ACCELERATION),
             ),
@@ -288,17 +224,9 @@ class ToolControl:
         One step per tick is enough: the tool moves by a millimetre in that time.
         """
         joints = self._joints[-1]
-        pin.computeJointJacobians(self._model, self._data, configuration(self._model, joints))
-        placement = pin.updateFramePlacement(self._model, self._data, self._frame)
-        lever = placement.rotation @ self._point
-        jacobian = pin.getFrameJacobian(
-            self._model, self._data, self._frame, pin.LOCAL_WORLD_ALIGNED
-        )
-        jacobian[:3] -= pin.skew(lever) @ jacobian[3:]  # of the tip, not of the frame
-        turn = placement.rotation.T @ pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ self._upright
-        error = np.concatenate(
-            (tip - placement.translation - lever, placement.rotation @ pin.log3(turn))
-        )
+        place, lever, rotation, jacobian = self._tool.jacobian(joints)
+        turn = rotation.T @ pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ self._upright
+        error = np.concatenate((tip - place - lever, rotation @ pin.log3(turn)))
         damped = jacobian @ jacobian.T + 1e-8 * np.eye(6)
         inverse = jacobian.T @ np.linalg.inv(damped)
         joints = joints + inverse @ error
@@ -309,104 +237,49 @@ SETTLING = 300
 """Ticks before the recording during which the arm comes to rest under its unknown load."""
 
 
-def plan(
-    arm: Arm, motion: Picks | Reach, rng: np.random.Generator, duration: float
-) -> Plan | ReachPlan:
+def plan(arm: Arm, motion: Picks | Reach, rng: np.random.Generator, duration: float) -> Plan:
     """Plan of the motion of one run."""
-    model = reduced_model(arm)
     if isinstance(motion, Reach):
-        ability = _ability(arm)
-        return reach(
-            motion, rng, ability=ability, tool=arm.tool, units=arm.units, duration=duration
-        )
-    if arm.reach is None:
-        raise ScenarioError(f"{arm.name} has no table to pick from")
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, configuration(model, np.array(arm.rest)))
-    start = data.oMf[model.getFrameId(arm.tool.frame)].act(_tip(arm))
-    return pick(
-        motion,
-        rng,
-        start=start,
-        tool=arm.tool,
-        table=arm.table,
-        reach=arm.reach,
-        duration=duration,
-        units=arm.units,
-    )
+        return reach(arm, motion, rng, duration)
+    return pick(arm, motion, rng, duration)
 
 
-def scene(arm: Arm, plan: Plan | ReachPlan, faults: Faults, imperfections: Imperfections) -> Scene:
+def scene(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
     """Scene of one run."""
-    model, rest = reduced_model(arm), np.array(arm.rest)
-    boxes = faults.boxes_on(plan)
+    rest, boxes = np.array(arm.rest), faults.boxes_on(plan)
+    tip = np.array(arm.tool.point)
     world = real_world(
-        arm, boxes, imperfections, frame=arm.tool.frame, point=_tip(arm), contact=arm.contact
+        arm, boxes, imperfections, frame=arm.tool.frame, point=tip, contact=arm.contact
     )
     return Scene(
         model=world,
         start=rest - faults.offsets(len(rest)),  # the encoders read the rest position
-        control=_control(arm, model, plan, faults, imperfections),
+        control=_control(arm, plan, faults, imperfections),
         effectors=1,
         settling=SETTLING,
         noise=np.array([imperfections.force_noise]),
         changes=box_changes(world, boxes),
-        forces=forces(world, (*plan.payloads, *faults.loads)),
+        forces=tuple(force(world, load) for load in (*plan.payloads, *faults.loads)),
     )
 
 
-def _control(
-    arm: Arm, model: Any, plan: Plan | ReachPlan, faults: Faults, imperfections: Imperfections
-) -> Control:
+def _control(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) -> Control:
     """Controller of the tool, or of the joints, that rests at first."""
+    tool = Tool(arm)
     if isinstance(plan, ReachPlan):
-        shift = faults.shift(plan.time)[:, 0] if faults.shift else np.zeros_like(plan.position)
-        rest = ((SETTLING, 0), (0, 0))
+        shift = faults.shift(plan.time)[:, 0] if faults.shift else np.zeros_like(plan.places[:, 0])
         return JointControl(
-            model,
-            arm.tool,
-            np.pad(plan.joints, rest, "edge"),
-            np.pad(shift, rest),
+            tool,
+            plan.after(SETTLING).joints,
+            np.pad(shift, ((SETTLING, 0), (0, 0))),
             fastest=HIGHEST_ACCELERATION if plan.foreseen else 0.0,
         )
+    assert isinstance(plan, PickPlan)
     gain = np.pad(faults.gain(plan.time), (SETTLING, 0), "edge")
     return ToolControl(
-        model,
-        arm.tool.frame,
-        _tip(arm),
+        tool,
         np.array(arm.rest),
-        _shifted(plan, faults).after(SETTLING),
+        plan.shifted(faults.shift).after(SETTLING),
         gain=arm.force_gain * imperfections.force_gain * gain,
         time_constant=arm.force_filter,
     )
-
-
-def _ability(arm: Arm) -> Ability:
-    """What an arm can do, by its URDF and its drives."""
-    model, rest = Robot.load(arm.name, floating_base=False).model, np.array(arm.rest)
-    joints = [model.joints[model.getJointId(name)] for name in arm.drives.joints]
-    low, high = rest - TURN, rest + TURN
-    for index, joint in enumerate(joints):
-        if joint.nq == 1:  # a continuous joint has no limits
-            low[index] = max(low[index], model.lowerPositionLimit[joint.idx_q] + MARGIN)
-            high[index] = min(high[index], model.upperPositionLimit[joint.idx_q] - MARGIN)
-    speed = np.array([model.velocityLimit[joint.idx_v] for joint in joints])
-    return Ability(
-        reduced_model(arm),
-        rest,
-        low=np.minimum(low, rest),
-        high=np.maximum(high, rest),
-        speed=SHARE * np.where(speed > 0, speed, np.inf),
-        torque=np.array(arm.drives.torque),
-        armature=np.array(arm.drives.armature),
-    )
-
-
-def _shifted(plan: Plan, faults: Faults) -> Plan:
-    if faults.shift is None:
-        return plan
-    return replace(plan, position=plan.position + faults.shift(plan.time)[:, 0])
-
-
-def _tip(arm: Arm) -> Array:
-    return np.array(arm.tool.point)

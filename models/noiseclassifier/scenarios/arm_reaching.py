@@ -13,16 +13,17 @@ from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.loop import Reference
 from noiseclassifier.scenarios.motions import (
     TICK,
-    Box,
-    Contact,
-    Effector,
     Payload,
+    Plan,
     Reach,
+    Tip,
     Units,
     minimum_jerk,
     times,
 )
-from noiseclassifier.scenarios.world import configuration
+from noiseclassifier.scenarios.robots import Arm
+from noiseclassifier.scenarios.world import configuration, reduced_model
+from noisemodel import Robot
 from noisemodel.types import Array
 
 HIGHEST_ACCELERATION = 30.0
@@ -45,44 +46,53 @@ HAND = (0.4, 1.5)  # bandwidth of the hand that teleoperates, in [Hz]
 SENDING = (20.0, 60.0)  # rate at which a teleoperation device sends positions, in [Hz]
 
 
-@dataclass(frozen=True, eq=False)
-class ReachPlan:
-    """Plan of the motion of an arm's joints, at every tick."""
+class Tool:
+    """The tip of an arm's tool: kinematics, and torques of the arm."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.model = reduced_model(arm)
+        self._data = self.model.createData()
+        self._frame, self._point = self.model.getFrameId(arm.tool.frame), np.array(arm.tool.point)
+
+    def pose(self, joints: Array) -> Any:
+        """Placement of the tool's frame."""
+        pin.framesForwardKinematics(self.model, self._data, configuration(self.model, joints))
+        return self._data.oMf[self._frame]
+
+    def place(self, joints: Array) -> Array:
+        """Position of the tip, shape (3,), in [m]."""
+        return np.asarray(self.pose(joints).act(self._point))
+
+    def jacobian(self, joints: Array) -> tuple[Array, Array, Array, Array]:
+        """Frame's position, way from there to the tip, rotation, and Jacobian of the tip."""
+        model, data = self.model, self._data
+        pin.computeJointJacobians(model, data, configuration(model, joints))
+        placement = pin.updateFramePlacement(model, data, self._frame)
+        lever = placement.rotation @ self._point
+        jacobian = pin.getFrameJacobian(model, data, self._frame, pin.LOCAL_WORLD_ALIGNED)
+        jacobian[:3] -= pin.skew(lever) @ jacobian[3:]  # of the tip, not of the frame
+        return placement.translation, lever, placement.rotation, jacobian
+
+    def torque(self, joints: Array, velocity: Array, acceleration: Array) -> Array:
+        """Torques of a motion, without the inertia of drives, shape (joints,), in [N m]."""
+        q = configuration(self.model, joints)
+        return np.asarray(pin.rnea(self.model, self._data, q, velocity, acceleration))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReachPlan(Plan):
+    """Plan of the motion of an arm's joints."""
 
     joints: Array  # positions, shape (ticks, joints), in [rad]
-    position: Array  # of the tool's tip, shape (ticks, 3), in [m]
-    effectors: tuple[Effector, ...]
-    units: Units
-    payloads: tuple[Payload, ...] = ()
     stops: tuple[float, ...] = ()  # times of emergency stops, in [s]
     foreseen: bool = True
-
-    @property
-    def time(self) -> Array:
-        """Time of each tick, shape (ticks,), in [s]."""
-        return times(len(self.joints), TICK)
-
-    @property
-    def duration(self) -> float:
-        """Duration, in [s]."""
-        return len(self.joints) * TICK
-
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """None."""
-        return ()
-
-    @property
-    def ground(self) -> tuple[Box, ...]:
-        """None."""
-        return ()
 
 
 @dataclass(frozen=True, eq=False)
 class Ability:
-    """What an arm can do."""
+    """What an arm can do, by its URDF and its drives."""
 
-    model: Any
+    tool: Tool
     rest: Array  # joint positions around which it moves, shape (joints,), in [rad]
     low: Array  # lowest positions, shape (joints,), in [rad]
     high: Array  # highest positions, shape (joints,), in [rad]
@@ -90,13 +100,29 @@ class Ability:
     torque: Array  # largest torques, shape (joints,), in [N m]
     armature: Array  # inertia of the drives, shape (joints,), in [kg m²]
 
-    def feasible(self, positions: Array, fastest: float, ticks: int) -> bool:
-        """Whether drives can follow.
+    @classmethod
+    def of(cls, arm: Arm) -> "Ability":
+        """What an arm can do."""
+        model, rest = Robot.load(arm.name, floating_base=False).model, np.array(arm.rest)
+        joints = [model.joints[model.getJointId(name)] for name in arm.drives.joints]
+        low, high = rest - TURN, rest + TURN
+        for index, joint in enumerate(joints):
+            if joint.nq == 1:  # a continuous joint has no limits
+                low[index] = max(low[index], model.lowerPositionLimit[joint.idx_q] + MARGIN)
+                high[index] = min(high[index], model.upperPositionLimit[joint.idx_q] - MARGIN)
+        speed = np.array([model.velocityLimit[joint.idx_v] for joint in joints])
+        return cls(
+            Tool(arm),
+            rest,
+            low=np.minimum(low, rest),
+            high=np.maximum(high, rest),
+            speed=SHARE * np.where(speed > 0, speed, np.inf),
+            torque=SHARE * np.array(arm.drives.torque),
+            armature=np.array(arm.drives.armature),
+        )
 
-        Args:
-            positions: Of each tick, shape (ticks, joints), in [rad].
-            fastest: Largest acceleration, in [rad/s²].
-        """
+    def feasible(self, positions: Array, fastest: float, ticks: int) -> bool:
+        """Whether drives can follow positions of each tick, accelerating in [rad/s²] at most."""
         coarse = positions[::ticks]
         if len(coarse) < 3:
             return True
@@ -104,35 +130,23 @@ class Ability:
         acceleration = np.gradient(velocity, ticks * TICK, axis=0)
         if np.abs(acceleration).max() > fastest or (np.abs(velocity) > self.speed).any():
             return False
-        data = self.model.createData()
         return all(
-            (
-                np.abs(pin.rnea(self.model, data, configuration(self.model, q), v, a)
-                       + self.armature * a)
-                <= SHARE * self.torque
-            ).all()
+            (np.abs(self.tool.torque(q, v, a) + self.armature * a) <= self.torque).all()
             for q, v, a in zip(coarse, velocity, acceleration, strict=True)
-        )  # fmt: skip
+        )
 
 
 Movement: TypeAlias = Callable[[float], Array]
 """From a duration, in [s], to positions at its ticks, shape (ticks, joints), in [rad]."""
 
 
-def reach(
-    motion: Reach,
-    rng: np.random.Generator,
-    *,
-    ability: Ability,
-    tool: Effector,
-    units: Units,
-    duration: float,
-) -> ReachPlan:
+def reach(arm: Arm, motion: Reach, rng: np.random.Generator, duration: float) -> ReachPlan:
     """Plan of movements, one after the other."""
     if motion.kind not in KINDS:
         raise ScenarioError(
             f"motion of kind {motion.kind!r} is unknown; there are {', '.join(KINDS)}"
         )
+    ability = Ability.of(arm)
     moving, stopping, loading = rng.spawn(3)
     parts = [np.tile(ability.rest, (round(motion.stand / TICK), 1))]
     ticks = round(duration / TICK)
@@ -142,12 +156,13 @@ def reach(
         parts += [np.tile(parts[-1][-1], (round(pause / TICK), 1))]
     joints, stops = _stopped(motion, stopping, np.concatenate(parts), ticks)
     return ReachPlan(
-        joints,
-        _tips(ability.model, tool, joints),
-        (tool,),
-        units,
-        _payloads(motion, loading, tool, units, duration),
-        stops,
+        joints=joints,
+        places=np.array([[ability.tool.place(position)] for position in joints]),
+        effectors=arm.effectors,
+        torques=arm.drives.torque,
+        payloads=_payloads(motion, loading, arm.tool, arm.units, duration),
+        units=arm.units,
+        stops=stops,
         foreseen=motion.kind != "teleoperation",
     )
 
@@ -317,7 +332,7 @@ def _stopped(
 
 
 def _payloads(
-    motion: Reach, rng: np.random.Generator, tool: Effector, units: Units, duration: float
+    motion: Reach, rng: np.random.Generator, tool: Tip, units: Units, duration: float
 ) -> tuple[Payload, ...]:
     """What the tool carries from time to time."""
     payloads, now = [], float(rng.uniform(*CARRYING))
@@ -329,33 +344,14 @@ def _payloads(
     return tuple(payloads)
 
 
-def _tips(model: Any, tool: Effector, joints: Array) -> Array:
-    """Positions of the tool's tip, shape (ticks, 3), in [m]."""
-    data, frame, point = model.createData(), model.getFrameId(tool.frame), np.array(tool.point)
-    tips = np.empty((len(joints), 3))
-    for tick, position in enumerate(joints):
-        pin.framesForwardKinematics(model, data, configuration(model, position))
-        tips[tick] = data.oMf[frame].act(point)
-    return tips
-
-
 DAMPING = 1e-3  # of the inverse Jacobian, in [m²]
 
 
 class JointControl:
-    """Follows planned joint positions with the torque of the model as feed-forward."""
+    """Follows planned joint positions, moved by a shift of the tip, with the model's torque."""
 
-    def __init__(
-        self,
-        model: Any,
-        tool: Effector,
-        joints: Array,
-        shift: Array,
-        *,
-        fastest: float = HIGHEST_ACCELERATION,
-    ) -> None:
-        self._model, self._data = model, model.createData()
-        self._frame, self._point = model.getFrameId(tool.frame), np.array(tool.point)
+    def __init__(self, tool: Tool, joints: Array, shift: Array, *, fastest: float) -> None:
+        self._tool = tool
         self._planned = np.gradient(joints, TICK, axis=0)
         joints = joints.copy()
         for tick in np.flatnonzero(shift.any(axis=1)):
@@ -372,13 +368,7 @@ class JointControl:
             position=self._position[ends],
             velocity=self._velocity[ends],
             planned=self._planned[ends],
-            torque=pin.rnea(
-                self._model,
-                self._data,
-                configuration(self._model, here),
-                self._velocity[number],
-                self._acceleration[number],
-            ),
+            torque=self._tool.torque(here, self._velocity[number], self._acceleration[number]),
             lift=self._inverse(here)[None, :, 2],
         )
 
@@ -388,12 +378,6 @@ class JointControl:
 
     def _inverse(self, joints: Array) -> Array:
         """Damped inverse Jacobian of the tip's place, shape (joints, 3), in [rad/m]."""
-        q = configuration(self._model, joints)
-        pin.computeJointJacobians(self._model, self._data, q)
-        placement = pin.updateFramePlacement(self._model, self._data, self._frame)
-        jacobian = pin.getFrameJacobian(
-            self._model, self._data, self._frame, pin.LOCAL_WORLD_ALIGNED
-        )
-        lever = placement.rotation @ self._point
-        place = jacobian[:3] - pin.skew(lever) @ jacobian[3:]
+        *_, jacobian = self._tool.jacobian(joints)
+        place = jacobian[:3]
         return np.asarray(place.T @ np.linalg.inv(place @ place.T + DAMPING * np.eye(3)))

@@ -10,20 +10,19 @@ import json
 import re
 import time
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
-from itertools import count
 from pathlib import Path
 from typing import Any, Literal, Self, TypeAlias, get_args
 from zlib import crc32
 
 import numpy as np
 
-from noiseclassifier.scenarios.domains import DISTRIBUTION, Distribution, Domain, Logger
-from noiseclassifier.scenarios.errors import DatasetError, ScenarioError, SimulationError, unknown
-from noiseclassifier.scenarios.faults import THROUGHOUT
+from noiseclassifier.scenarios.domains import Domain, Logger
+from noiseclassifier.scenarios.errors import DatasetError, ScenarioError, SimulationError
+from noiseclassifier.scenarios.labels import FRAME, HOP
 from noiseclassifier.scenarios.logs import logged
 from noiseclassifier.scenarios.motions import RATE
 from noiseclassifier.scenarios.robots import ROBOTS, TARGETS, WIDE
@@ -35,22 +34,19 @@ from noiseclassifier.scenarios.simulation import (
     WIDE_RECIPE,
     digest,
     faults_of,
-    look_up,
+    robot_of,
+    scenario_of,
     simulate,
     software,
 )
-from noiseclassifier.scenarios.table import SCENARIOS
+from noiseclassifier.scenarios.table import SCENARIOS, THROUGHOUT
 from noisemodel import Block, NoiseModelError, Run, decimated
 from noisemodel.files import replacing
 from noisemodel.parallel import DIED, Jobs, as_done
 from noisemodel.runfile import ArchiveError, read_text
 
 FORMAT, MANIFEST, TIMES, FALLEN = "noise-dataset/1", "dataset.json", "times.csv", ".fallen.json"
-LEAST_RUNS = 20  # number of runs from which too many falls are an error
-FAULTY_RUNS = 2  # faulty runs of each robot and seed in wide domains
-FRAME, HOP = 0.4, 0.1
-"""Length of a frame, and time from one to the next (paper, Sec. III-A), in [s]."""
-FEW = 8  # robots up to which each has a column, and scenarios named at most
+FEW = 8  # scenarios in which a robot fell that are named at most
 _NAMES = re.compile(r"([a-z0-9_]+)/(.+)-(\d{3,})")
 
 Choice: TypeAlias = Mapping[str, tuple[str, ...]]  # names of the scenarios of each robot
@@ -83,16 +79,20 @@ class Task:
 
 def choose(
     robots: Sequence[str], scenarios: Sequence[str] = (), *, healthy: bool = False
-) -> dict[str, tuple[str, ...]]:
-    """Scenarios of each robot."""
+) -> Choice:
+    """Scenarios of each robot, by names or numbers; those that it does not have are left out."""
     if not robots:
         raise DatasetError(f"no robot is named; there are {', '.join(ROBOTS)}")
+    asked = {scenario_of(name).name for name in scenarios}
     chosen = {}
     for robot in robots:
-        every = [name for name in SCENARIOS if _has(robot, name)]
-        asked = {look_up(robot, name)[0].name for name in scenarios if _has(robot, name)}
-        names = [name for name in every if name in asked or not scenarios]
-        chosen[robot] = tuple(name for name in names if SCENARIOS[name].healthy or not healthy)
+        family = robot_of(robot).family
+        every = [name for name, entry in SCENARIOS.items() if family in entry.cases]
+        chosen[robot] = tuple(
+            name
+            for name in every
+            if (name in asked or not scenarios) and (SCENARIOS[name].healthy or not healthy)
+        )
         if not chosen[robot]:
             of_list = f"of {', '.join(scenarios)} " if scenarios else ""
             ok = " without a failure" if healthy else ""
@@ -102,75 +102,18 @@ def choose(
     return chosen
 
 
-def _has(robot: str, scenario: str) -> bool:
-    """Whether a robot has a scenario; both must be known."""
-    if robot not in ROBOTS:
-        raise unknown(f"robot {robot!r} cannot be simulated", robot, ROBOTS)
-    numbers = {str(entry.number): entry for entry in SCENARIOS.values()}
-    entry = SCENARIOS.get(scenario) or numbers.get(scenario)
-    if entry is None:
-        raise unknown(f"no scenario {scenario!r}", scenario, SCENARIOS)
-    return ROBOTS[robot].family in entry.cases
-
-
-@dataclass(frozen=True, kw_only=True)
-class DatasetSpec:
-    """The size of a data set of scenarios: a number of seeds, or of hours."""
-
-    choice: Choice
-    first: int = 0
-    seeds: int | None = None
-    hours: float | None = None  # total duration of all runs, in [h]
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        if self.seeds is not None and self.hours is not None:
-            raise DatasetError(
-                f"{self.seeds} seeds and {self.hours:g} hours; expected one of the two"
-            )
-        if self.first < 0:
-            raise DatasetError(f"the first seed is {self.first}, expected 0 or more")
-        if self.seeds is not None and self.seeds < 1:
-            raise DatasetError(f"{self.seeds} seeds, expected 1 or more")
-        if self.hours is not None and not 0 < self.hours < float("inf"):
-            raise DatasetError(f"{self.hours:g} hours, expected more than 0")
-
-    def tasks(self, *, duration: float | None = None, fallen: Collection[Task] = ()) -> list[Task]:
-        """The runs, seed by seed; those that fell do not count towards the hours."""
-        if self.hours is None:
-            last = self.first + (8 if self.seeds is None else self.seeds)
-            seeds = range(self.first, last)
-            return [
-                task for seed in seeds for robot in self.choice for task in self._seed(robot, seed)
-            ]
-        share = 3600 * self.hours / len(self.choice)
-        filling = [self._fill(robot, share, duration, set(fallen)) for robot in self.choice]
-        return sorted((task for tasks in filling for task in tasks), key=lambda task: task.seed)
-
-    def _seed(self, robot: str, seed: int) -> list[Task]:
-        return [Task(robot, scenario, seed) for scenario in self.choice[robot]]
-
-    def _fill(
-        self, robot: str, seconds: float, duration: float | None, fallen: set[Task]
-    ) -> list[Task]:
-        """The runs of as many seeds as a duration takes."""
-        tasks: list[Task] = []
-        filled, lost = 0.0, 0
-        for seed in count(self.first):
-            if filled >= seconds:
-                break
-            if lost > len(tasks) / 2 and len(tasks) >= LEAST_RUNS:
-                raise DatasetError(
-                    f"{robot} fell in {lost} of {len(tasks)} runs, so that {seconds:.0f} s cannot"
-                    " be reached; take other scenarios"
-                )
-            for task in self._seed(robot, seed):
-                tasks.append(task)
-                if task in fallen:
-                    lost += 1
-                else:
-                    filled += duration or task.motion.duration
-        return tasks
+def scenario_tasks(choice: Choice, *, first: int = 0, seeds: int = 8) -> list[Task]:
+    """The runs of a data set of scenarios, seed by seed."""
+    if first < 0:
+        raise DatasetError(f"the first seed is {first}, expected 0 or more")
+    if seeds < 1:
+        raise DatasetError(f"{seeds} seeds, expected 1 or more")
+    return [
+        Task(robot, scenario, seed)
+        for seed in range(first, first + seeds)
+        for robot, scenarios in choice.items()
+        for scenario in scenarios
+    ]
 
 
 def wide_tasks(
@@ -178,7 +121,7 @@ def wide_tasks(
     *,
     first: int = FIRST,
     seeds: int = 8,
-    faults: int = FAULTY_RUNS,
+    faults: int = 2,
     always: Sequence[str] = (),
     throughout: int = 0,
 ) -> list[Task]:
@@ -198,26 +141,23 @@ def wide_tasks(
         Task(robot, name, seed)
         for seed in range(first, first + seeds)
         for robot in known
-        for name in (
-            *(GOOD, *_faults(robot, seed, faults, always)),
-            *_whole_runs(robot, seed, throughout),
-        )
+        for name in (GOOD, *_faults(robot, seed, faults, always, throughout))
     ]
 
 
-def _whole_runs(robot: str, seed: int, count: int) -> list[str]:
-    """Names of faults that are there from the first sample to the last."""
-    rng = np.random.default_rng((seed, crc32(robot.encode()), 4))
-    return sorted(rng.choice(list(THROUGHOUT), count, replace=False).tolist())
-
-
-def _faults(robot: str, seed: int, count: int, always: Sequence[str]) -> list[str]:
+def _faults(robot: str, seed: int, count: int, always: Sequence[str], throughout: int) -> list[str]:
+    """Names of the faults of a seed: some that suit its motion, those asked for, of whole runs."""
     suited = faults_of(robot, seed)
     names = [name for name in suited if name not in always]
-    rng = np.random.default_rng((seed, crc32(robot.encode()), 2))
+    number = crc32(robot.encode())
+    rng, other = (np.random.default_rng((seed, number, stream)) for stream in (2, 4))
     chosen = rng.choice(len(names), min(count, len(names)), replace=False)
-    drawn = [names[index] for index in sorted(chosen.tolist())]
-    return drawn + [name for name in always if name in suited]
+    whole = other.choice(list(THROUGHOUT), throughout, replace=False)
+    return [
+        *(names[index] for index in sorted(chosen.tolist())),
+        *(name for name in always if name in suited),
+        *sorted(whole.tolist()),
+    ]
 
 
 @dataclass(frozen=True)
@@ -252,10 +192,16 @@ class Folder:
             if path.exists() and not path.is_dir():
                 raise DatasetError(f"{path}: is a file; name a folder")
             if (path / MANIFEST).exists():
+                made = _made(path)
                 # The latest recipe of wide domains only adds to those before.
-                free = any_recipe or (wide and _made(path).get("recipe") in range(2, recipe))
-                compared = {k: v for k, v in settings.items() if k != "recipe" or not free}
-                _compare(path, compared)
+                if any_recipe or (wide and made.get("recipe") in range(2, recipe)):
+                    settings["recipe"] = made.get("recipe")
+                for key, wanted in settings.items():
+                    if (found := made.get(key)) != wanted:
+                        raise DatasetError(
+                            f"{path}: made with {key} {json.dumps(found)}, now it is"
+                            f" {json.dumps(wanted)}; name another folder"
+                        )
             elif path.is_dir() and any(path.iterdir()):
                 raise DatasetError(
                     f"{path}: holds other files (it has no {MANIFEST}); name an empty folder"
@@ -385,17 +331,6 @@ def _made(path: Path) -> dict[str, Any]:
     return made if isinstance(made, dict) else {}
 
 
-def _compare(path: Path, settings: dict[str, Any]) -> None:
-    made = _made(path)
-    for key, wanted in settings.items():
-        found = made.get(key)
-        if found != wanted:
-            raise DatasetError(
-                f"{path}: made with {key} {json.dumps(found)}, now it is {json.dumps(wanted)};"
-                " name another folder"
-            )
-
-
 def _text(path: Path) -> str:
     try:
         return read_text(path)
@@ -486,7 +421,6 @@ def logs(
     copies: int = 1,
     rate: float | None = None,
     side: Side = "all",
-    distribution: Distribution = DISTRIBUTION,
 ) -> Iterator[tuple[str, Run]]:
     """Logs of the runs of wide domains, each with its name: ``<robot>/<fault>[.copy]-<seed>``."""
     if side not in get_args(Side):
@@ -494,22 +428,22 @@ def logs(
     kept = set(folder.kept())
     if not kept:
         raise DatasetError(f"{folder.path}: holds no run; `inspector simulate domains` makes them")
-    twin: tuple[Task | None, Run | None] = (None, None)
+    twin: tuple[Task, Run] | None = None
     for task in sorted(kept, key=lambda task: (task.robot, task.seed, task.scenario)):
         good = Task(task.robot, GOOD, task.seed)
         if good not in kept:  # its twin fell
             continue
-        if twin[0] != good:
+        if twin is None or twin[0] != good:
             twin = good, Run.load(folder.file(good))
         reference = twin[1]
-        assert reference is not None
         run = reference if task == good else Run.load(folder.file(task))
-        domain = _domain(run)
+        facts = run.meta["domain"]
+        domain = Domain(**{name: value for name, value in facts.items() if name != "name"})
         if run.rate < (rate or 0.0) * (1 - 1e-6):
             continue
         for copy in range(copies):
             draw = np.random.default_rng((task.seed, crc32(task.name.encode()), copy))
-            logger = distribution.logger(draw, domain, most=run.rate, rate=rate)
+            logger = Logger.draw(draw, domain, most=run.rate, rate=rate)
             if side not in ("all", side_of(task.robot, domain, logger)):
                 continue
             noise = int(np.random.default_rng((task.seed, copy, 3)).integers(2**32))
@@ -535,124 +469,74 @@ def write_logs(logs: Iterator[tuple[str, Run]], output: Path) -> Iterator[tuple[
         yield name, run
 
 
-def _domain(run: Run) -> Domain:
-    facts: dict[str, Any] = dict(run.meta["domain"])
-    del facts["name"]
-    return Domain(**facts)
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """Statistics of a data set.
-
-    Attributes:
-        upright: Runs that stood, and all runs, by robot and scenario.
-        amounts: Blocks, their seconds and frames, by robot and class.
-        costs: Processor time and duration of the runs of each robot, in [s].
-    """
-
-    upright: Mapping[str, Mapping[str, tuple[int, int]]]
-    amounts: Mapping[str, Mapping[str, Mapping[str, float]]]
-    costs: Mapping[str, Mapping[str, float]]
-    motion: float  # total duration of all runs, in [s]
-    size: int  # of all files, in [B]
-
-    @classmethod
-    def of(cls, folder: Folder) -> Self:
-        """Statistics of a folder."""
-        kept, fallen, times = folder.kept(), folder.fallen(), folder.times()
-        stood = Counter((task.robot, task.scenario) for task in kept)
-        fell = Counter((task.robot, task.scenario) for task in fallen)
-        known = WIDE if folder.wide else ROBOTS
-        robots = [robot for robot in known if any(robot == key[0] for key in stood + fell)]
-        names = dict.fromkeys((*SCENARIOS, *(name for _, name in sorted(stood + fell))))
-        amounts: dict[str, dict[str, dict[str, float]]] = {robot: {} for robot in robots}
-        costs = {robot: {"seconds": 0.0, "simulated": 0.0} for robot in robots}
-        motion = 0.0
-        for task in kept:
-            blocks, duration = folder.read(task)
-            motion += duration
-            for block in blocks:
-                zero = {"blocks": 0, "seconds": 0.0, "frames": 0}
-                mine = amounts[task.robot].setdefault(block.label, zero)
-                seconds = block.stop - block.start
-                mine["blocks"] += 1
-                mine["seconds"] += seconds
-                # Blocks start and stop on samples, up to rounding.
-                mine["frames"] += 1 + int(max(seconds - FRAME, 0.0) / HOP + 1e-6)
-            if task in times:
-                costs[task.robot]["seconds"] += times[task]
-                costs[task.robot]["simulated"] += duration
-        upright = {
+def statistics(folder: Folder) -> dict[str, Any]:
+    """What a data set has, as plain data: by robot, runs, classes and processor times."""
+    kept, fallen, times = folder.kept(), folder.fallen(), folder.times()
+    stood = Counter((task.robot, task.scenario) for task in kept)
+    fell = Counter((task.robot, task.scenario) for task in fallen)
+    runs = stood + fell
+    known = {robot for robot, _ in runs}
+    robots = [robot for robot in (WIDE if folder.wide else ROBOTS) if robot in known]
+    names = dict.fromkeys((*SCENARIOS, *(name for _, name in sorted(runs))))
+    classes: dict[str, dict[str, dict[str, float]]] = {robot: {} for robot in robots}
+    cpu = {robot: {"seconds": 0.0, "simulated": 0.0} for robot in robots}
+    motion = 0.0
+    for task in kept:
+        blocks, duration = folder.read(task)
+        motion += duration
+        for block in blocks:
+            zero = {"blocks": 0, "seconds": 0.0, "frames": 0}
+            mine = classes[task.robot].setdefault(block.label, zero)
+            seconds = block.stop - block.start
+            mine["blocks"] += 1
+            mine["seconds"] += seconds
+            # Blocks start and stop on samples, up to rounding.
+            mine["frames"] += 1 + int(max(seconds - FRAME, 0.0) / HOP + 1e-6)
+        if task in times:
+            cpu[task.robot]["seconds"] += times[task]
+            cpu[task.robot]["simulated"] += duration
+    return {
+        "format": "noise-balance/1",
+        "upright": {
             robot: {
-                name: (stood[robot, name], stood[robot, name] + fell[robot, name])
+                name: {"upright": stood[robot, name], "runs": runs[robot, name]}
                 for name in names
-                if (robot, name) in stood + fell
+                if (robot, name) in runs
             }
             for robot in robots
-        }
-        size = sum(path.stat().st_size for path in folder.path.rglob("*") if path.is_file())
-        return cls(upright, amounts, costs, motion, size)
+        },
+        "classes": {robot: dict(sorted(mine.items())) for robot, mine in classes.items()},
+        "cpu": cpu,
+        "motion": motion,
+        "bytes": sum(path.stat().st_size for path in folder.path.rglob("*") if path.is_file()),
+    }
 
-    def as_dict(self) -> dict[str, Any]:
-        """All numbers as plain data."""
-        return {
-            "format": "noise-balance/1",
-            "upright": {
-                robot: {name: {"upright": up, "runs": runs} for name, (up, runs) in mine.items()}
-                for robot, mine in self.upright.items()
-            },
-            "classes": {robot: dict(sorted(mine.items())) for robot, mine in self.amounts.items()},
-            "cpu": dict(self.costs),
-            "motion": self.motion,
-            "bytes": self.size,
-        }
 
-    def __str__(self) -> str:
-        pairs = [pair for mine in self.upright.values() for pair in mine.values()]
-        runs, fell = sum(all_ for _, all_ in pairs), sum(all_ - up for up, all_ in pairs)
-        first = (
-            f"{runs} runs, {fell} of which fell and are left out; {self.motion / 3600:.2f} h of"
-            f" motion, {self.size / 1e6:.0f} MB"
-        )
-        return "\n\n".join((first, self._upright(), self._amounts(), self._costs()))
-
-    def _upright(self) -> str:
-        if len(self.upright) > FEW:
-            return self._upright_by_robot()
-        lines = [f"{'upright':26}" + "".join(f"{robot:>10}" for robot in self.upright)]
-        for name in {name: None for mine in self.upright.values() for name in mine}:
-            shares = (mine.get(name) for mine in self.upright.values())
-            cells = (f"{share[0]}/{share[1]}" if share else "-" for share in shares)
-            number = f"{SCENARIOS[name].number:>2}" if name in SCENARIOS else "  "
-            lines.append(f"{number} {name:23}" + "".join(f"{cell:>10}" for cell in cells))
-        return "\n".join(lines)
-
-    def _upright_by_robot(self) -> str:
-        """One line per robot, with the scenarios in which it fell most."""
-        lines = [f"{'upright':26}{'runs':>10}   fell in"]
-        for robot, mine in self.upright.items():
-            up, runs = (sum(pair[side] for pair in mine.values()) for side in (0, 1))
-            fell = sorted(((n - u, name) for name, (u, n) in mine.items() if n > u), reverse=True)
-            most = ", ".join(f"{name} ({count})" for count, name in fell[:FEW])
-            lines.append(f"{robot:26}{f'{up}/{runs}':>10}   {most or 'none'}")
-        return "\n".join(lines)
-
-    def _amounts(self) -> str:
-        lines = [f"{'class':26}{'blocks':>10}{'seconds':>10}{'frames':>10}{'of time':>10}"]
-        for robot, mine in self.amounts.items():
-            whole = sum(amount["seconds"] for amount in mine.values())
-            for label, amount in sorted(mine.items(), key=lambda item: -item[1]["seconds"]):
-                seconds = amount["seconds"]
-                lines.append(
-                    f"{robot:8} {label:17}{amount['blocks']:>10}{seconds:>10.1f}"
-                    f"{amount['frames']:>10}{seconds / whole:>10.1%}"
-                )
-        return "\n".join(lines)
-
-    def _costs(self) -> str:
-        lines = [f"{'processor time':26}{'seconds':>10}{'per simulated second':>22}"]
-        for robot, cost in self.costs.items():
-            each = f"{cost['seconds'] / cost['simulated']:.2f}" if cost["simulated"] else "-"
-            lines.append(f"{robot:26}{cost['seconds']:>10.0f}{each:>22}")
-        return "\n".join(lines)
+def described(found: Mapping[str, Any]) -> str:
+    """Statistics as text, with the scenarios in which each robot fell most."""
+    upright, all_runs, all_fell = [f"{'upright':26}{'runs':>10}   fell in"], 0, 0
+    for robot, mine in found["upright"].items():
+        up, runs = (sum(pair[key] for pair in mine.values()) for key in ("upright", "runs"))
+        lost = {name: pair["runs"] - pair["upright"] for name, pair in mine.items()}
+        fell = sorted(((count, name) for name, count in lost.items() if count), reverse=True)
+        most = ", ".join(f"{name} ({count})" for count, name in fell[:FEW])
+        upright.append(f"{robot:26}{f'{up}/{runs}':>10}   {most or 'none'}")
+        all_runs, all_fell = all_runs + runs, all_fell + runs - up
+    classes = [f"{'class':26}{'blocks':>10}{'seconds':>10}{'frames':>10}{'of time':>10}"]
+    for robot, mine in found["classes"].items():
+        whole = sum(amount["seconds"] for amount in mine.values())
+        for label, amount in sorted(mine.items(), key=lambda item: -item[1]["seconds"]):
+            seconds = amount["seconds"]
+            classes.append(
+                f"{robot:8} {label:17}{amount['blocks']:>10}{seconds:>10.1f}"
+                f"{amount['frames']:>10}{seconds / whole:>10.1%}"
+            )
+    costs = [f"{'processor time':26}{'seconds':>10}{'per simulated second':>22}"]
+    for robot, cost in found["cpu"].items():
+        each = f"{cost['seconds'] / cost['simulated']:.2f}" if cost["simulated"] else "-"
+        costs.append(f"{robot:26}{cost['seconds']:>10.0f}{each:>22}")
+    first = (
+        f"{all_runs} runs, {all_fell} of which fell and are left out;"
+        f" {found['motion'] / 3600:.2f} h of motion, {found['bytes'] / 1e6:.0f} MB"
+    )
+    return "\n\n".join((first, *("\n".join(lines) for lines in (upright, classes, costs))))

@@ -1,16 +1,11 @@
-"""Wide domains: the distribution, and what one run draws of it."""
+"""Wide domains: what one run draws of body, drives, control, logger and motion."""
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
-from math import isfinite
-from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.motions import (
     REACHES,
     Gesture,
@@ -22,10 +17,20 @@ from noiseclassifier.scenarios.motions import (
     Trot,
     Walk,
 )
-from noiseclassifier.scenarios.robots import Arm, Humanoid, Quadruped
+from noiseclassifier.scenarios.robots import Simulated, settings
 
-if TYPE_CHECKING:
-    pass
+Control: TypeAlias = Literal["pd", "computed-torque", "impedance", "policy"]
+Velocity: TypeAlias = Literal["measured", "filtered", "differentiated"]
+Desired: TypeAlias = Literal["commanded", "planned", "zero", "missing"]
+Effort: TypeAlias = Literal["missing", "torque", "current"]
+TARGET_CONTROL: Control = "impedance"  # control that is never learnt from
+TARGET_BITS = 13  # encoders of so many bits or fewer are never learnt from, in any kind of log
+TARGET_HOLD = 4  # logs whose samples are held so many times or more are never learnt from
+RESONANCES = 2  # most resonances of one robot
+PRESENT = 0.5  # share of the robots that have a given imperfection of gears at all
+CURRENTS = 0.5  # share of the logs with efforts whose efforts are currents
+RATES = (100.0, 125.0, 200.0, 250.0, 500.0, 1000.0, 1000.0, 1000.0, 2000.0, 5000.0, 10_000.0)
+"""Rates of loggers, in [Hz], each drawn as often as it is listed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,22 +45,9 @@ class Limits:
     flexibility: float = 0.0  # lowest natural frequency of rotors on elastic gears, in [Hz]
 
 
-Control: TypeAlias = Literal["pd", "computed-torque", "impedance", "policy"]
-Velocity: TypeAlias = Literal["measured", "filtered", "differentiated"]
-Desired: TypeAlias = Literal["commanded", "planned", "zero", "missing"]
-Effort: TypeAlias = Literal["missing", "torque", "current"]
-TARGET_CONTROL: Control = "impedance"  # control that is never learnt from
-TARGET_BITS = 13  # encoders of so many bits or fewer are never learnt from, in any kind of log
-TARGET_HOLD = 4  # logs whose samples are held so many times or more are never learnt from
-
-
 @dataclass(frozen=True, kw_only=True)
 class Domain:
-    """Body, drives and control of one run; scales multiply the robot's nominal values.
-
-    Attributes:
-        flexibility: Natural frequency of the rotors on their elastic gears, in [Hz]; 0 if rigid.
-    """
+    """Body, drives and control of one run; scales multiply the robot's nominal values."""
 
     wildness: float
     length: float
@@ -63,7 +55,7 @@ class Domain:
     payload: float
     gear: float
     ripple: float
-    flexibility: float
+    flexibility: float  # natural frequency of rotors on elastic gears, in [Hz]; 0 if rigid
     backlash: float  # free play of the gears, in [rad]
     cogging: float
     stiction: float
@@ -82,21 +74,50 @@ class Domain:
     encoder_bandwidth: float  # of the velocities in the loop, in [Hz]
 
     @property
-    def name(self) -> str:
-        """Name of the domain in evaluations: the simulator and the kind of control."""
-        return f"mujoco-{self.control}"
-
-    @property
     def target(self) -> bool:
         """Whether it lies in a part of the distribution that is never learnt from."""
         return self.control == TARGET_CONTROL
 
     def as_dict(self) -> dict[str, Any]:
-        """All values, with the name."""
-        return {"name": self.name, **asdict(self)}
+        """All values, with a name for evaluations: the simulator and the kind of control."""
+        return {"name": f"mujoco-{self.control}", **asdict(self)}
 
-    def __str__(self) -> str:
-        return _lines(self.as_dict())
+    @classmethod
+    def draw(cls, rng: np.random.Generator, limits: Limits) -> "Domain":
+        """Draw the domain of one run."""
+        draw = _Draw(rng, float(rng.uniform()))
+        control: Control = str(rng.choice(get_args(Control)))  # type: ignore[assignment]
+        stiffness = draw("stiffness")
+        if control == "impedance":  # soft by definition
+            stiffness = min(stiffness, draw.far("stiffness"))
+        stiffness = float(np.clip(stiffness, *limits.stiffness))
+        damping = float(np.clip(draw("damping") * np.sqrt(stiffness), *limits.damping))
+        elastic = draw.present()
+        return cls(
+            wildness=draw.wildness,
+            length=draw.either("length"),
+            mass=draw.either("mass"),
+            payload=draw("payload"),
+            gear=draw.far("gear"),
+            ripple=draw("ripple") if elastic else 0.0,
+            flexibility=max(draw("flexibility"), limits.flexibility) if elastic else 0.0,
+            backlash=draw("backlash") if elastic and draw.present() else 0.0,
+            cogging=draw("cogging") if draw.present() else 0.0,
+            stiction=draw("stiction") if draw.present() else 1.0,
+            friction=draw.either("friction"),
+            viscous=draw.either("viscous"),
+            rotor=draw.either("rotor"),
+            torque_limit=draw("torque_limit"),
+            torque_rise=draw("torque_rise"),
+            delay=min(draw("delay"), limits.delay),
+            control=control,
+            stiffness=stiffness,
+            damping=damping,
+            feedforward=max(draw("feedforward"), limits.feedforward) if control == "pd" else 1.0,
+            policy_rate=max(draw("policy_rate"), 1 / limits.hold) if control == "policy" else 0.0,
+            encoder_bits=round(draw("loop_bits")),
+            encoder_bandwidth=draw("loop_bandwidth"),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,100 +148,18 @@ class Logger:
         """Whether it lies in a part of the distribution that is never learnt from."""
         return self.bits <= TARGET_BITS or self.hold >= TARGET_HOLD
 
-    def as_dict(self) -> dict[str, Any]:
-        """All values."""
-        return asdict(self)
-
-    def __str__(self) -> str:
-        return _lines(self.as_dict())
-
-
-def _lines(values: dict[str, Any]) -> str:
-    def text(value: Any) -> str:
-        return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-    return "\n".join(f"{name:18}{text(value)}" for name, value in values.items())
-
-
-Ends: TypeAlias = tuple[float, float]  # mild end and wild end of a range
-RESONANCES = 2  # most resonances of one robot
-PRESENT = 0.5  # share of the robots that have a given imperfection of gears at all
-CURRENTS = 0.5  # share of the logs with efforts whose efforts are currents
-RATES = (100.0, 125.0, 200.0, 250.0, 500.0, 1000.0, 1000.0, 1000.0, 2000.0, 5000.0, 10_000.0)
-"""Rates of loggers, in [Hz], each drawn as often as it is listed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Distribution:
-    """Ranges of what domains and loggers draw, from mild to wild ends, as domains.toml has them."""
-
-    ends: Mapping[str, Ends]
-
-    def changed(self, **ends: Ends) -> "Distribution":
-        """The distribution with other ends of some ranges."""
-        for name, given in ends.items():
-            (least, most), unit = ABOUT[name]["within"], ABOUT[name].get("unit", "")
-            if not (isinstance(given, tuple) and len(given) == 2):
-                problem = "expected a mild and a wild end"
-            elif not all(isfinite(end) and least <= end <= most for end in given):
-                problem = f"expected within {least:g} to {most:g} {unit}".rstrip()
-            else:
-                continue
-            raise ScenarioError(f"distribution: {name} {given}: {problem}")
-        return Distribution({**self.ends, **ends})
-
-    def domain(self, rng: np.random.Generator, limits: Limits) -> Domain:
-        """Draw the domain of one run."""
-        draw = _Draw(self, rng, float(rng.uniform()))
-        control: Control = str(rng.choice(get_args(Control)))  # type: ignore[assignment]
-        stiffness = draw("stiffness")
-        if control == "impedance":  # soft by definition
-            stiffness = min(stiffness, draw.far("stiffness"))
-        stiffness = float(np.clip(stiffness, *limits.stiffness))
-        damping = float(np.clip(draw("damping") * np.sqrt(stiffness), *limits.damping))
-        elastic = draw.present()
-        return Domain(
-            wildness=draw.wildness,
-            length=draw.either("length"),
-            mass=draw.either("mass"),
-            payload=draw("payload"),
-            gear=draw.far("gear"),
-            ripple=draw("ripple") if elastic else 0.0,
-            flexibility=max(draw("flexibility"), limits.flexibility) if elastic else 0.0,
-            backlash=draw("backlash") if elastic and draw.present() else 0.0,
-            cogging=draw("cogging") if draw.present() else 0.0,
-            stiction=draw("stiction") if draw.present() else 1.0,
-            friction=draw.either("friction"),
-            viscous=draw.either("viscous"),
-            rotor=draw.either("rotor"),
-            torque_limit=draw("torque_limit"),
-            torque_rise=draw("torque_rise"),
-            delay=min(draw("delay"), limits.delay),
-            control=control,
-            stiffness=stiffness,
-            damping=damping,
-            feedforward=max(draw("feedforward"), limits.feedforward) if control == "pd" else 1.0,
-            policy_rate=max(draw("policy_rate"), 1 / limits.hold) if control == "policy" else 0.0,
-            encoder_bits=round(draw("loop_bits")),
-            encoder_bandwidth=draw("loop_bandwidth"),
-        )
-
-    def logger(
-        self,
-        rng: np.random.Generator,
-        domain: Domain,
-        *,
-        most: float,
-        rate: float | None = None,
-    ) -> Logger:
-        """Draw the logger of one run."""
-        draw = _Draw(self, rng, domain.wildness)
+    @classmethod
+    def draw(
+        cls, rng: np.random.Generator, domain: Domain, *, most: float, rate: float | None = None
+    ) -> "Logger":
+        """Draw the logger of a run with a highest rate, and with a given rate or any, in [Hz]."""
+        draw = _Draw(rng, domain.wildness)
         drawn = float(rng.choice([each for each in RATES if each <= most * (1 + 1e-6)]))
         rate = rate or drawn
         held = rng.uniform() < 0.1
         # Of another generator, so that it changes nothing else.
-        efforts = _Draw(self, rng.spawn(1)[0], domain.wildness)
-        return Logger(
+        efforts = _Draw(rng.spawn(1)[0], domain.wildness)
+        return cls(
             rate=rate,
             velocity=str(rng.choice(get_args(Velocity))),  # type: ignore[arg-type]
             bits=round(draw("bits")),
@@ -240,31 +179,12 @@ class Distribution:
             **efforts.effort(),
         )
 
-    def __str__(self) -> str:
-        head = ("setting", "mild", "wild", "unit", "what", "source")
-        rows = [
-            (name, *(f"{end:g}" for end in ends), *described(name))
-            for name, ends in self.ends.items()
-        ]
-        return "\n".join(
-            f"{name:16}{mild:>8}{wild:>8} {unit:6}{text:50}{source}"
-            for name, mild, wild, unit, text, source in (head, *rows)
-        )
-
-
-def described(name: str) -> tuple[str, str, str]:
-    """Unit, meaning and source of a setting of the distribution."""
-    about = ABOUT[name]
-    return about.get("unit", ""), about["text"], about["source"]
-
 
 class _Draw:
     """Values of one run."""
 
-    def __init__(
-        self, distribution: Distribution, rng: np.random.Generator, wildness: float
-    ) -> None:
-        self._distribution, self._rng, self.wildness = distribution, rng, wildness
+    def __init__(self, rng: np.random.Generator, wildness: float) -> None:
+        self._rng, self.wildness = rng, wildness
 
     def __call__(self, name: str) -> float:
         """A value between the mild end and the point on the way to the wild one."""
@@ -296,37 +216,54 @@ class _Draw:
         }
 
     def _between(self, name: str, share: float) -> float:
-        mild, wild = self._distribution.ends[name]
-        if ABOUT[name].get("log") and mild > 0 and wild > 0:
+        mild, wild = SETTINGS[name]["ends"]
+        if SETTINGS[name].get("log") and mild > 0 and wild > 0:
             return float(mild * (wild / mild) ** share)
         return float(mild + share * (wild - mild))
 
 
-ABOUT: Mapping[str, Any] = tomllib.loads(
-    Path(__file__).with_name("domains.toml").read_text(encoding="utf-8")
-)
-"""What domains.toml says of each setting."""
-DISTRIBUTION = Distribution({name: tuple(each["ends"]) for name, each in ABOUT.items()})
-"""The distribution of all wide runs."""
+_TABLE = settings("domains.toml")
+SETTINGS: dict[str, Any] = _TABLE["settings"]  # what domains and loggers draw, by name
+LIMITS = {family: Limits(**each) for family, each in _TABLE["limits"].items()}
+WALKS = {name: Walk(**each) for name, each in (_TABLE["mild"] | _TABLE["wild"]).items()}
+
+
+def listing() -> str:
+    """All settings with their ends, as a table."""
+    rows = [("setting", "mild", "wild", "unit", "what", "source")]
+    for name, each in SETTINGS.items():
+        mild, wild = (f"{end:g}" for end in each["ends"])
+        rows.append((name, mild, wild, each.get("unit", ""), each["text"], each["source"]))
+    return "\n".join(
+        f"{name:16}{mild:>8}{wild:>8} {unit:6}{text:50}{source}"
+        for name, mild, wild, unit, text, source in rows
+    )
+
+
 PICKS = 0.35  # share of motions that are picks
 SLOWEST = 0.05  # lowest peak speed of a joint in a movement, in [rad/s]
 FASTEST = (0.5, 2.5)  # highest peak speed, mild and wild, in [rad/s]
 STANDS = 0.3  # share of motions in the air that begin with standing for a while
 STANDING = (1.5, 4.0)  # how long they stand, in [s]
+STANDS_STILL = 0.3  # share of the runs in which a humanoid only stands
+WAYS = ("straight", "curve", "directions", "spot")
+
+
+def _mixed(span: Range, share: float) -> float:
+    return span[0] + share * (span[1] - span[0])
 
 
 def arm_motion(
-    rng: np.random.Generator, wildness: float, arm: Arm | None = None, *, soft: bool = False
+    rng: np.random.Generator, wildness: float, arm: Any, *, soft: bool = False
 ) -> Picks | Reach:
     """Motion of an arm."""
     picks, kind, way = rng.uniform(size=3).tolist()
     fast, hard, wide, stops, carries, pace, force = rng.uniform(size=7).tolist()
     stands, long = rng.uniform(size=2).tolist()
-    if picks < PICKS and (arm is None or arm.reach is not None):
-        ways = ("straight", "curve", "directions", "spot")
+    if picks < PICKS and arm.reach is not None:
         low = 10.0 + 10.0 * force
         return Picks(
-            way=ways[int(way * len(ways))],
+            way=WAYS[int(way * len(WAYS))],
             hover=(0.005, 0.01 + 0.02 * wildness),
             force=(low, low + 20.0),
         )
@@ -343,44 +280,10 @@ def arm_motion(
     )
 
 
-ARM_LIMITS = Limits(flexibility=12.0)  # an arm does not fall
-
-
-def _mixed(span: Range, share: float) -> float:
-    return span[0] + share * (span[1] - span[0])
-
-
-WALKS: Mapping[str, Walk] = MappingProxyType(
-    {
-        "walk": Walk(),
-        "slow": Walk(single=(0.7, 1.0), double=(0.5, 0.8)),
-        "brisk": Walk(single=(0.45, 0.6), double=(0.085, 0.1)),
-        "shuffle": Walk(height=(0.025, 0.035), single=(0.3, 0.4), double=(0.12, 0.18)),
-        "march": Walk(way="spot", height=(0.06, 0.09), single=(0.4, 0.8), double=(0.1, 0.3)),
-        "platform": Walk(drop=0.06, height=(0.07, 0.07), single=(0.75, 0.9)),
-    }
-)
-"""Gaits, by long and short times on both feet, on one, and lifts of the feet."""
-WAYS = ("straight", "curve", "directions", "spot")
-MILD, WILD = ("walk", "slow", "march"), ("brisk", "shuffle", "platform")
-"""Gaits for any wildness, and those that come with it."""
-STANDS_STILL = 0.3  # share of the runs in which it only stands
-HUMANOID_LIMITS = Limits(
-    stiffness=(0.05, 1.0), damping=(0.2, 0.5), delay=0.004, hold=0.01, feedforward=0.9,
-    flexibility=40.0,
-)  # fmt: skip
-"""Of 30 runs drawn within stiffness, damping, delay and hold, over all robots and motions, 29
-stayed upright, with velocity errors below 0.2 rad/s rms."""
-
-
 def humanoid_motion(
-    rng: np.random.Generator,
-    wildness: float,
-    robot: Humanoid | None = None,
-    *,
-    soft: bool = False,
+    rng: np.random.Generator, wildness: float, robot: Simulated, *, soft: bool = False
 ) -> Stroll | Stand:
-    """Draw a motion."""
+    """Motion of a humanoid."""
     upper = Gesture(
         way=str(rng.choice(("still", "sines", "reaches"))),
         size=(0.0, 0.2 + 0.8 * wildness),
@@ -394,43 +297,21 @@ def humanoid_motion(
             period=(2.5 - 1.2 * wildness, 4.0),
             upper=upper,
         )
-    gaits = MILD if rng.uniform() > wildness else MILD + WILD
-    walk = WALKS[str(rng.choice(gaits))]
+    walk = WALKS[str(rng.choice(list(_TABLE["mild"] if rng.uniform() > wildness else WALKS)))]
     way = walk.way if walk.way == "spot" or walk.drop else str(rng.choice(WAYS))
     walk = replace(walk, way=way, jitter=0.02 + 0.08 * wildness)
     return Stroll(walk=walk, stops=int(rng.integers(3)), pause=(0.8, 2.0), upper=upper)
 
 
-GAITS: Mapping[str, float] = MappingProxyType(
-    {"trot": 0.5, "walk": 0.25, "pace": 0.1, "stand": 0.15}
-)
-"""Probability of each gait; a bound is left out, long robots slip in it."""
-SPREAD: Mapping[str, tuple[Range, Range]] = MappingProxyType(
-    {
-        "period": ((0.9, 1.1), (0.72, 1.35)),
-        "height": ((0.9, 1.1), (0.5, 1.5)),
-        "speed": ((0.5, 1.0), (0.2, 1.4)),
-        "jitter": ((0.0, 0.05), (0.0, 0.2)),
-        "posing": ((0.0, 0.3), (0.2, 1.0)),
-    }
-)
-"""Range of each setting of `noiseclassifier.scenarios.motions.Trot`, mild and wild."""
-QUICK: Mapping[str, float] = MappingProxyType({"trot": 0.7, "walk": 0.8})
-"""Longest period of each gait on soft drives, as `scenarios.motions.Trot` has it."""
-
-
 def quadruped_motion(
-    rng: np.random.Generator,
-    wildness: float,
-    robot: Quadruped | None = None,
-    *,
-    soft: bool = False,
+    rng: np.random.Generator, wildness: float, robot: Simulated, *, soft: bool = False
 ) -> Trot:
-    """Random motion."""
-    gait = str(rng.choice(list(GAITS), p=list(GAITS.values())))
+    """Motion of a quadruped."""
+    gaits = _TABLE["gaits"]
+    gait = str(rng.choice(list(gaits), p=[each["share"] for each in gaits.values()]))
 
     def draw(name: str) -> float:
-        mild, wild = (np.array(span) for span in SPREAD[name])
+        mild, wild = (np.array(span) for span in _TABLE["spread"][name])
         return float(rng.uniform(*(mild + wildness * (wild - mild))))
 
     period, height, posing = draw("period"), draw("height"), draw("posing")
@@ -451,24 +332,13 @@ def quadruped_motion(
 
 
 def steady(motion: Trot) -> Trot:
-    """The motion on soft drives: quick steps, which catch the body in time.
-
-    A pace, in which feet rattle, becomes a trot; a stand stays.
-    """
-    gait = "trot" if motion.gait == "pace" else motion.gait
-    if gait not in QUICK:
-        return motion
-    shortest, longest = (min(period, QUICK[gait]) for period in motion.period)
+    """The motion on soft drives: quick steps, which catch the body in time; a stand stays."""
+    gait = "trot" if motion.gait == "pace" else motion.gait  # feet rattle in a pace
+    quick = _TABLE["gaits"][gait].get("quick", float("inf"))
+    shortest, longest = (min(period, quick) for period in motion.period)
     return replace(motion, gait=gait, period=(shortest, longest))
 
 
-QUADRUPED_LIMITS = Limits(
-    stiffness=(0.1, 1.5), damping=(0.15, 1.5), delay=0.01, hold=0.02, feedforward=0.6,
-    flexibility=40.0,
-)  # fmt: skip
-"""Common to all quadrupeds, with delays no longer than their gains bear."""
-
-LIMITS = {"arm": ARM_LIMITS, "humanoid": HUMANOID_LIMITS, "quadruped": QUADRUPED_LIMITS}
 MOTIONS: Mapping[str, Callable[..., Any]] = {
     "arm": arm_motion,
     "humanoid": humanoid_motion,

@@ -6,7 +6,7 @@ import numpy as np
 
 from noiseclassifier.scenarios.domains import Domain
 from noiseclassifier.scenarios.faults import NO_DRIVE_FAULT, DriveFault, Imperfections
-from noiseclassifier.scenarios.motions import RATE, STEP, TICK, times
+from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, times
 from noiseclassifier.scenarios.robots import Drivetrain
 from noisemodel.types import Array
 
@@ -39,12 +39,7 @@ class Drives:
     """
 
     def __init__(
-        self,
-        start: Array,
-        *,
-        drivetrain: Drivetrain,
-        offset: Array,
-        imperfections: Imperfections,
+        self, start: Array, drivetrain: Drivetrain, offset: Array, imperfections: Imperfections
     ) -> None:
         self._stiffness = np.array(drivetrain.stiffness) * imperfections.stiffness
         self._damping = np.array(drivetrain.damping) * imperfections.damping
@@ -58,15 +53,7 @@ class Drives:
         )
 
     def read(self, position: Array, error: Array) -> tuple[Array, Array]:
-        """Readings of all encoders.
-
-        Args:
-            position: True joint positions, shape (joints,), in [rad].
-            error: Error of the encoders, shape (joints,), in [rad].
-
-        Returns:
-            Positions, in [rad], and velocities, in [rad/s], as the drives report them.
-        """
+        """Positions and velocities that drives report at true positions, with encoders' errors."""
         reading = np.rint((position + error) / self._count) * self._count
         predicted = self._tracked + STEP * self._velocity
         innovation = reading - predicted
@@ -81,17 +68,10 @@ class Drives:
     def torque(
         self, position: Array, velocity: Array, desired: Array, rate: Array, feedforward: Array
     ) -> Array:
-        """Torques that act now, after the delay of the drives.
+        """Torques that act now, after the delay, in [N m].
 
-        Args:
-            position: Positions read, shape (joints,), in [rad].
-            velocity: Velocities reported, shape (joints,), in [rad/s].
-            desired: Positions to follow, shape (joints,), in [rad].
-            rate: Velocities to follow, shape (joints,), in [rad/s].
-            feedforward: Torques of the model, shape (joints,), in [N m].
-
-        Returns:
-            Torques that act now, shape (joints,), in [N m].
+        Demanded now are those of the model, of the positions that are read and desired, and of the
+        velocities that are reported and desired.
         """
         demanded = feedforward + self._stiffness * (desired - position)
         demanded += self._damping * (rate - velocity)
@@ -123,37 +103,38 @@ class DomainDrives(Drives):
     of the gear. Friction beyond Coulomb's is Stribeck's (Armstrong-Helouvry et al. 1994).
 
     Args:
-        start: Joint positions at rest, shape (joints,), in [rad].
-        offset: Encoder error at rest, shape (joints,), in [rad].
-        settling: Time before the recording, in [s].
+        settling: Ticks before the recording.
     """
 
     def __init__(
         self,
         start: Array,
+        drivetrain: Drivetrain,
+        offset: Array,
+        imperfections: Imperfections,
         *,
         domain: Domain,
-        drivetrain: Drivetrain,
-        imperfections: Imperfections,
         fault: DriveFault = NO_DRIVE_FAULT,
-        offset: Array,
-        settling: float,
+        settling: int,
         rng: np.random.Generator,
     ) -> None:
-        super().__init__(start, drivetrain=drivetrain, offset=offset, imperfections=imperfections)
+        super().__init__(start, drivetrain, offset, imperfections)
         joints, limit = len(start), self._limit
         self._domain, self._fault = domain, fault
         self._gains = self._stiffness, self._damping
-        self._sample = -round(settling * RATE)
-        self._begin, self._end = _samples(fault)
-        self._added = _torque(fault, self._begin, self._end, joints)
+        self._sample = -settling * STEPS
+        self._begin = self._end = 2**62  # never
+        if fault.event is not None:
+            self._begin = round((fault.event.start - fault.lead) * RATE)
+            self._end = round(fault.event.stop * RATE)
+        self._added = np.zeros((0, joints))
+        if fault.torque is not None:
+            self._added = fault.torque(times(self._end - self._begin, STEP))
         self._outside: Array | float = 0.0
         self._changed, self._worn = bool(np.any(fault.offset)), bool(np.any(fault.wear))
-        self._demands: deque[Array] = deque(
-            [np.zeros(joints)] * (1 + imperfections.torque_delay + round(fault.delay * RATE)),
-            1 + imperfections.torque_delay + round(fault.delay * RATE),
-        )
-        self._delay = imperfections.torque_delay
+        self._delay, self._further = imperfections.torque_delay, round(fault.delay * RATE)
+        longest = 1 + self._delay + self._further
+        self._demands: deque[Array] = deque([np.zeros(joints)] * longest, longest)
         self._acting = np.zeros(joints)
         self._slope = limit * (STEP / domain.torque_rise)
         self._period = round(1 / domain.policy_rate / TICK) if domain.policy_rate else 0
@@ -232,15 +213,14 @@ class DomainDrives(Drives):
         return np.asarray(self._through_gear(motor) + added)
 
     def measured(self, acting: Array) -> Array:
-        """Torques that sensors between gears and joints measure, without what acts from outside."""
+        """Torques between gears and joints, without what acts from outside."""
         return acting - self._outside
 
     def _delayed(self, demanded: Array) -> Array:
         """Torques demanded before the delay, within limits of torque and of its rate."""
         self._demands.appendleft(demanded)
-        late = self._delay
-        if self._fault.delay and self._begin <= self._sample < self._end:
-            late += round(self._fault.delay * RATE)
+        inside = self._begin <= self._sample < self._end
+        late = self._delay + self._further * inside
         wanted = np.clip(self._demands[late], self._least, self._limit)
         change = np.clip(wanted - self._acting, -self._slope, self._slope)
         self._acting = np.asarray(self._acting + change)
@@ -260,15 +240,3 @@ class DomainDrives(Drives):
         self._speed = self._speed + STEP * (motor - gear) / self._rotor
         self._angle = self._angle + STEP * self._speed
         return np.asarray(gear)
-
-
-def _samples(fault: DriveFault) -> tuple[int, int]:
-    if fault.event is None:
-        return 2**62, 2**62
-    return round((fault.event.start - fault.lead) * RATE), round(fault.event.stop * RATE)
-
-
-def _torque(fault: DriveFault, begin: int, end: int, joints: int) -> Array:
-    if fault.torque is None:
-        return np.zeros((0, joints))
-    return fault.torque(times(end - begin, STEP))

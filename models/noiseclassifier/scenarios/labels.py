@@ -84,8 +84,7 @@ class Trace:
 
     def record(self) -> dict[str, Any]:
         """The trace as plain data."""
-        event = asdict(self.event)
-        return event | {
+        return asdict(self.event) | {
             "labelled": round(self.labelled, 6),
             "peak": round(self.peak, 6),
             "acceleration": round(self.acceleration, 3),
@@ -94,12 +93,7 @@ class Trace:
 
 
 def deviation(
-    velocity: Array,
-    twin: Array,
-    *,
-    rate: float,
-    band: tuple[float, float] | None = None,
-    rule: Rule = RULE,
+    velocity: Array, twin: Array, *, rate: float, band: tuple[float, float] | None = None
 ) -> Array:
     """Fast part of the difference between a run and its twin.
 
@@ -118,14 +112,14 @@ def deviation(
     if band:
         sections = butter(1, band, "bandpass", fs=rate, output="sos")
     else:
-        sections = butter(1, rule.lowest, "highpass", fs=rate, output="sos")
+        sections = butter(1, RULE.lowest, "highpass", fs=rate, output="sos")
     return np.asarray(sosfilt(sections, velocity - twin, axis=0), dtype=np.float64)
 
 
 def annotate(
-    velocity: Array, twin: Array, events: Sequence[Event], *, rate: float, rule: Rule = RULE
+    velocity: Array, twin: Array, events: Sequence[Event], *, rate: float
 ) -> tuple[tuple[Block, ...], tuple[Trace, ...]]:
-    """Labels of a run by the rule of this module.
+    """Labels of a run by the rule of this module, and the effect of each event.
 
     Args:
         velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
@@ -133,57 +127,46 @@ def annotate(
         rate: Sample rate, in [Hz].
     """
     events = _independent(events)
-    fast = deviation(velocity, twin, rate=rate, rule=rule)
-    broadband = _level(fast, rate, rule)
+    fast = deviation(velocity, twin, rate=rate)
+    broadband = _level(fast, rate)
     samples, blocks, traces = len(fast), [], []
-    busy = np.zeros(samples, dtype=bool)
-    for first, end in _spans(broadband > rule.felt, round(rule.gap * rate)):
+    busy, acting = np.zeros((2, samples), dtype=bool)
+    for first, end in _spans(broadband > RULE.felt, round(RULE.gap * rate)):
         busy[first:end] = True
-    acting = np.zeros(samples, dtype=bool)
     starts = [round(event.start * rate) for event in events] + [samples]
     for event, first, following in zip(events, starts, starts[1:], strict=False):
-        end = min(round((event.stop + rule.tail) * rate), following, samples)
+        end = min(round((event.stop + RULE.tail) * rate), following, samples)
         filtered, level = fast, broadband
         if "band" in event.facts:
-            filtered = deviation(velocity, twin, rate=rate, band=event.facts["band"], rule=rule)
-            level = _level(filtered, rate, rule)
-        until = max(0, first - round(rule.smoothing * rate))  # the average is not causal
-        earlier = slice(max(0, until - round(rule.before * rate)), until)
+            filtered = deviation(velocity, twin, rate=rate, band=event.facts["band"])
+            level = _level(filtered, rate)
+        until = max(0, first - round(RULE.smoothing * rate))  # the average is not causal
+        earlier = slice(max(0, until - round(RULE.before * rate)), until)
         background = float(level[earlier][~acting[earlier]].max(initial=0.0))
-        least = max(rule.felt, background if event.label == "oscillations" else 0.0)
-        loud = level > least
+        loud = level > max(RULE.felt, background if event.label == "oscillations" else 0.0)
         if event.facts.get("throughout"):  # nothing came before it: what counts is what it adds
             loud &= _louder(velocity, twin, rate)
-        significant = _spans(loud, round(rule.gap * rate))
         change = np.abs(np.diff(filtered[first:end], axis=0, prepend=filtered[first : first + 1]))
         change = change.max(axis=1, initial=0.0) * rate
         own = [
             (a, b)
-            for a, b in _clipped(significant, first, end)
-            if level[a:b].max() > rule.contrast * background
-            and _confirms(
-                event.label, filtered[a:b], level[a:b], change[a - first : b - first], rule
-            )
+            for a, b in _clipped(_spans(loud, round(RULE.gap * rate)), first, end)
+            if level[a:b].max() > RULE.contrast * background
+            and _confirms(event.label, filtered[a:b], level[a:b], change[a - first : b - first])
         ]
         blocks += [Block(a / rate, b / rate, event.label) for a, b in own]
         for a, b in [*own, (first, round(event.stop * rate))]:
             busy[a:b] = True
         acting[until:end] = True
-        traces.append(
-            Trace(
-                event,
-                labelled=sum(b - a for a, b in own) / rate,
-                peak=float(level[first:end].max(initial=0.0)),
-                acceleration=float(change.max(initial=0.0)),
-                background=background,
-            )
-        )
-    margin = 2 * round(rule.margin * rate) + 1
+        labelled = sum(b - a for a, b in own) / rate
+        peak, fastest = float(level[first:end].max(initial=0.0)), float(change.max(initial=0.0))
+        traces.append(Trace(event, labelled, peak, fastest, background))
+    margin = 2 * round(RULE.margin * rate) + 1
     near = uniform_filter1d(busy.astype(float), margin, mode="constant") > 0.5 / margin
     blocks += [
         Block(a / rate, b / rate, "ok")
         for a, b in _spans(~near, 0)
-        if b - a >= rule.shortest * rate
+        if b - a >= RULE.shortest * rate
     ]
     return tuple(sorted(blocks)), tuple(traces)
 
@@ -206,26 +189,21 @@ def _independent(events: Sequence[Event]) -> list[Event]:
     return kept
 
 
-def _level(fast: Array, rate: float, rule: Rule) -> Array:
+def _level(fast: Array, rate: float) -> Array:
     """Moving root mean square of the norm of the deviation, shape (samples,)."""
-    power = uniform_filter1d(np.square(fast).sum(axis=1), round(rule.smoothing * rate))
+    power = uniform_filter1d(np.square(fast).sum(axis=1), round(RULE.smoothing * rate))
     return np.asarray(np.sqrt(np.maximum(power, 0)), dtype=np.float64)
 
 
-def _confirms(label: str, fast: Array, level: Array, change: Array, rule: Rule) -> bool:
+def _confirms(label: str, fast: Array, level: Array, change: Array) -> bool:
     """Whether a significant stretch meets the condition of its class."""
     if label == "impact":
-        return bool(level.max() >= rule.blow)
+        return bool(level.max() >= RULE.blow)
     if label == "highaccelerations":
-        return bool(change.max() >= rule.acceleration)
-    return _sign_changes(fast) >= 2 * rule.periods
-
-
-def _sign_changes(fast: Array) -> int:
-    """Number of sign changes of the joint that deviates most, small values left out."""
-    joint = fast[:, np.argmax(np.square(fast).sum(axis=0))]
+        return bool(change.max() >= RULE.acceleration)
+    joint = fast[:, np.argmax(np.square(fast).sum(axis=0))]  # the one that deviates most
     sign = np.sign(joint[np.abs(joint) > 0.3 * np.sqrt(np.mean(joint**2))])
-    return int(np.count_nonzero(np.diff(sign)))
+    return int(np.count_nonzero(np.diff(sign))) >= 2 * RULE.periods
 
 
 def _spans(mask: Mask, bridge: int) -> list[Span]:
@@ -250,11 +228,11 @@ IMPACT = 0.02  # time over which the impulse of a contact is integrated, in [s]
 
 
 def unplanned(force: Array, planned: Sequence[Contact]) -> tuple[Event, ...]:
-    """Unplanned contacts, as events."""
+    """Unplanned contacts, by the forces on the effectors, as events."""
     events = []
     for effector, measured in enumerate(force.T):
         own = [contact for contact in planned if contact.effector == effector]
-        for first, last in _touches(measured):
+        for first, end in _spans(measured > 0, round(APART / STEP) - 1):
             onset = first * STEP
             if any(contact.start <= onset < contact.stop for contact in own):
                 continue
@@ -265,22 +243,9 @@ def unplanned(force: Array, planned: Sequence[Contact]) -> tuple[Event, ...]:
                 "force": float(onset_force.max()),
             }
             # The impact is the cause; leaning on the obstacle afterwards is not.
-            stop = min(last * STEP, onset + IMPACT)
-            events.append(
-                Event("impact", "unplanned contact", onset, max(stop, onset + STEP), facts)
-            )
+            stop = max(min((end - 1) * STEP, onset + IMPACT), onset + STEP)
+            events.append(Event("impact", "unplanned contact", onset, stop, facts))
     return tuple(events)
-
-
-def _touches(force: Array) -> list[tuple[int, int]]:
-    """First and last sample of each contact."""
-    touching = np.flatnonzero(force > 0)
-    if not touching.size:
-        return []
-    pauses = np.flatnonzero(np.diff(touching) > APART / STEP)
-    firsts = touching[np.concatenate(([0], pauses + 1))]
-    lasts = touching[np.concatenate((pauses, [-1]))]
-    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
 def visible(

@@ -11,11 +11,10 @@ has a label while it can be seen in the efforts, even if velocities do not show 
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from noiseclassifier.scenarios.domains import Logger
 from noiseclassifier.scenarios.labels import AROUND, FRAME, HOP, visible
@@ -23,9 +22,7 @@ from noiseclassifier.scenarios.motions import PUSH
 from noisemodel import Block, Run
 from noisemodel.types import Array, Mask
 
-SLOWEST = 1.0
-"""That of efforts, in [Hz]: the lowest band of a frame has its first line, at 2.5 Hz, into which
-the window spreads what is slower."""
+SLOWEST = 1.0  # of efforts, in [Hz]: a frame's first line, at 2.5 Hz, has what is slower, too
 HARMONICS = (1, 2, 4)  # orders of the ripple, as multiples of the gear ratio
 SHARPNESS, GAIN = 8.0, 3.0  # quality and gain of the resonances that ripple excites
 
@@ -58,15 +55,13 @@ def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
                 lowest=SLOWEST,
                 centred=True,
             )
-            seen, pushed = seen | felt, _kept(_pushes(run), felt)
-        blocks = _joined((*_kept(run.blocks, seen), *pushed))
+            seen, pushed = seen | felt, kept(_pushes(run), felt)
+        blocks = _joined((*kept(run.blocks, seen), *pushed))
     end = len(found.velocity) / logger.rate
     blocks = tuple(replace(b, stop=min(b.stop, end)) for b in blocks if b.start < end)
-    events = [
-        {**event, "labelled": _overlap(event, blocks)} for event in run.meta.get("events", ())
-    ]
+    events = [{**event, "labelled": overlap(event, blocks)} for event in run.meta.get("events", ())]
     return replace(
-        found, blocks=blocks, meta={**run.meta, "events": events, "logger": logger.as_dict()}
+        found, blocks=blocks, meta={**run.meta, "events": events, "logger": asdict(logger)}
     )
 
 
@@ -83,33 +78,29 @@ def _louder(log: Run, twin: Run) -> Mask:
     return louder
 
 
-def _kept(blocks: Sequence[Block], seen: Mask) -> tuple[Block, ...]:
-    """Blocks without the parts of failures that cannot be seen."""
-    kept = []
+def kept(blocks: Sequence[Block], seen: Mask) -> tuple[Block, ...]:
+    """Blocks without the parts of failures that lie in no frame in which they can be seen."""
+    found: list[Block] = []
     for block in blocks:
         if block.label == "ok":
-            kept.append(block)
+            found.append(block)
             continue
         starts = HOP * np.arange(len(seen))
         frames = starts[seen & (starts < block.stop) & (starts + FRAME > block.start)]
         if block.stop - block.start <= FRAME:  # one frame holds all of it
             middle = (block.start + block.stop) / 2
             if np.any(np.abs(frames + FRAME / 2 - middle) <= FRAME / 2):
-                kept.append(block)
+                found.append(block)
             continue
-        start, stop = np.inf, -np.inf
-        for frame in frames.tolist():
-            if frame > stop:
-                kept += _piece(block, start, stop)
-                start = frame
-            stop = frame + FRAME
-        kept += _piece(block, start, stop)
-    return tuple(kept)
-
-
-def _piece(block: Block, start: float, stop: float) -> list[Block]:
-    first, last = max(block.start, start), min(block.stop, stop)
-    return [replace(block, start=first, stop=last)] if last > first else []
+        pieces: list[Block] = []
+        for start in frames.tolist():
+            first, last = max(block.start, start), min(block.stop, start + FRAME)
+            if pieces and start <= pieces[-1].stop:
+                pieces[-1] = replace(pieces[-1], stop=last)
+            elif last > first:
+                pieces.append(replace(block, start=first, stop=last))
+        found += pieces
+    return tuple(found)
 
 
 def _pushes(run: Run) -> tuple[Block, ...]:
@@ -133,7 +124,7 @@ def _joined(blocks: Sequence[Block]) -> tuple[Block, ...]:
     return tuple(joined)
 
 
-def _overlap(event: dict[str, Any], blocks: Sequence[Block]) -> float:
+def overlap(event: dict[str, Any], blocks: Sequence[Block]) -> float:
     """Time that the label of an event has, in [s]."""
     mine = (b for b in blocks if b.label == event["label"] and b.stop > event["start"])
     later = event["stop"] + 0.5
@@ -207,7 +198,8 @@ def _effort(run: Run, logger: Logger, stamps: Array, seed: int) -> Array | None:
 
 def _transmit(signal: Array, repeated: Mask, lost: Mask) -> None:
     """Repeat samples of a signal, shape (samples, joints), and interpolate lost ones, in place."""
-    signal[_again(repeated)] = signal[_before(repeated)]
+    again = np.flatnonzero(repeated[1:])
+    signal[again + 1] = signal[again]
     if lost.any() and not lost.all():
         known = np.flatnonzero(~lost)
         for joint in range(signal.shape[1]):
@@ -271,130 +263,3 @@ def _low_pass(signal: Array, cutoff: float, rate: float, *, order: int = 2) -> A
 
 def _held(signal: Array, samples: int) -> Array:
     return signal if samples == 1 else signal[np.arange(len(signal)) // samples * samples]
-
-
-def _again(repeated: Mask) -> NDArray[np.intp]:
-    """Samples that repeat the one before."""
-    return np.flatnonzero(repeated[1:]) + 1
-
-
-def _before(repeated: Mask) -> NDArray[np.intp]:
-    return np.flatnonzero(repeated[1:])
-
-
-ADDED = {"tone": "oscillations", "noise": "oscillations", "blow": "impact"}
-"""Class of each kind of fault."""
-LOWEST_ADDED = 15.0  # lowest frequency, in [Hz]; the highest is 0.45 of the sample rate
-LEVELS = 0.03, 10.0
-"""Least and most root mean square while it lasts, in [rad/s]: from what can be felt on."""
-LASTS = 0.4, 1.2  # shortest and longest tone or noise, in [s]
-BLOW = 0.1  # duration of a blow, in [s]
-APART = 2.5  # from the start of a fault to that of the next, in [s]
-UNLABELLED = 0.05  # time around a fault that has no label, in [s]
-PIECE = 1.0, 4.0  # shortest and longest piece of a log that begins anywhere, in [s]
-ALL = 0.3  # share of the faults that all joints have
-
-
-def with_faults(run: Run, *, seed: int) -> Run:
-    """A good log with faults added to its measured velocities."""
-    rng = np.random.default_rng(seed)
-    velocity = run.velocity.astype(np.float64)
-    end, blocks, events = len(velocity) / run.rate, list[Block](), list[dict[str, Any]]()
-    starts = np.arange(1.0, end - LASTS[1], APART) + rng.uniform(0.0, 0.3)
-    edge = 0.0
-    for start in starts.tolist():
-        kind = str(rng.choice(list(ADDED)))
-        stop = start + (BLOW if kind == "blow" else rng.uniform(*LASTS))
-        part = slice(round(start * run.rate), round(stop * run.rate))
-        frequency = LOWEST_ADDED * (0.45 * run.rate / LOWEST_ADDED) ** rng.uniform()
-        level = LEVELS[0] * (LEVELS[1] / LEVELS[0]) ** rng.uniform()
-        joints = np.arange(velocity.shape[1])
-        if rng.uniform() > ALL:
-            joints = rng.choice(joints, 1)
-        signal = fault(kind, part.stop - part.start, frequency, run.rate, rng)
-        added = np.zeros_like(velocity)
-        added[part, joints] = level * signal[:, None]
-        around = slice(max(0, part.start - round(run.rate / 2)), part.stop + round(run.rate / 2))
-        seen = visible(added[around], run.velocity[around], rate=run.rate).any()
-        velocity += added
-        label = ADDED[kind]
-        labelled = stop - start if seen else 0.0
-        events.append({"label": label, "start": start, "stop": stop, "labelled": labelled})
-        blocks.append(Block(edge, start - UNLABELLED, "ok"))
-        blocks += [Block(start, stop, label)] if seen else []
-        edge = stop + UNLABELLED
-    blocks.append(Block(edge, end, "ok"))
-    meta = {**run.meta, "scenario": "added", "events": events}
-    return replace(run, velocity=velocity.astype(np.float32), blocks=tuple(blocks), meta=meta)
-
-
-def fault(
-    kind: str, samples: int, frequency: float, rate: float, rng: np.random.Generator
-) -> Array:
-    """A fault of level 1."""
-    time = np.arange(samples) / rate
-    if kind == "noise":
-        white = np.fft.rfft(rng.standard_normal(samples))
-        place = np.fft.rfftfreq(samples, 1 / rate)
-        white[(place < frequency / np.sqrt(2)) | (place > frequency * np.sqrt(2))] = 0.0
-        signal = np.fft.irfft(white, samples)
-    else:
-        signal = np.sin(2 * np.pi * (frequency * time + rng.uniform()))
-        if kind == "blow":
-            signal *= np.exp(-time * frequency / 3.0)
-    return np.asarray(signal / max(np.sqrt(np.mean(signal**2)), 1e-9))
-
-
-def with_fault_throughout(run: Run, *, seed: int) -> Run:
-    """A good log with a tone or an octave of noise from its first sample to its last."""
-    rng = np.random.default_rng((seed, 1))
-    kind = str(rng.choice(("tone", "noise")))
-    frequency = LOWEST_ADDED * (0.45 * run.rate / LOWEST_ADDED) ** rng.uniform()
-    level = LEVELS[0] * (LEVELS[1] / LEVELS[0]) ** rng.uniform()
-    joints = np.arange(run.velocity.shape[1])
-    if rng.uniform() > ALL:
-        joints = rng.choice(joints, 1)
-    added = np.zeros(run.velocity.shape)
-    added[:, joints] = level * fault(kind, len(added), frequency, run.rate, rng)[:, None]
-    end = len(added) / run.rate
-    whole = Block(0.0, end, ADDED[kind])
-    blocks = _kept((whole,), visible(added, run.velocity, rate=run.rate))
-    labelled = sum(block.stop - block.start for block in blocks)
-    event = {"label": whole.label, "start": 0.0, "stop": end, "labelled": labelled}
-    return replace(
-        run,
-        velocity=(run.velocity + added).astype(np.float32),
-        blocks=blocks,
-        meta={**run.meta, "scenario": "added-throughout", "events": [event]},
-    )
-
-
-def beginning_anywhere(run: Run, *, seed: int) -> Run:
-    """A piece of a log: it begins in standing or in motion, or, one in two, in a failure."""
-    rng = np.random.default_rng((seed, 2))
-    end = len(run.velocity) / run.rate
-    last = max(end - PIECE[0], 0.0)
-    failures = [block for block in run.blocks if block.label != "ok" and block.start < last]
-    start = rng.uniform(0.0, last)
-    if failures and rng.uniform() < 0.5:
-        chosen = failures[int(rng.integers(len(failures)))]
-        start = min(rng.uniform(chosen.start, chosen.stop), last)
-    piece = run.cut(start, start + rng.uniform(*PIECE))
-    first = float(piece.time[0])
-    blocks = tuple(
-        replace(block, start=max(block.start - first, 0.0), stop=block.stop - first)
-        for block in piece.blocks
-    )
-    over = len(piece.time) / piece.rate
-    events = [
-        {
-            **event,
-            "start": max(event["start"] - first, 0.0),
-            "stop": min(event["stop"] - first, over),
-            "labelled": _overlap({**event, "start": event["start"] - first}, blocks),
-        }
-        for event in run.meta["events"]
-        if event["stop"] > first and event["start"] < first + over
-    ]
-    meta = {**run.meta, "events": events, "piece": [first, first + over]}
-    return replace(piece, time=piece.time - first, blocks=blocks, meta=meta)

@@ -1,8 +1,8 @@
-"""What plans are made of: clocks, smooth paths, shapes, contacts, loads; and motions as data."""
+"""What plans are made of: clocks, paths, shapes, contacts, loads, motions as data; and plans."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeAlias
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,7 @@ TICK = 1e-3  # time between two ticks of control, in [s]
 STEPS = 10  # samples per tick
 STEP = TICK / STEPS  # time between two samples, in [s]
 RATE = round(1 / STEP)  # samples per second, in [Hz]
+Signal: TypeAlias = Callable[[Array], Array]  # from times, in [s], to values, shape (times, ...)
 
 
 def times(count: int, step: float) -> Array:
@@ -30,6 +31,13 @@ def minimum_jerk(share: Array) -> Array:
 def bump(share: Array) -> Array:
     """Path away and back over time from 0 to 1, 1 in the middle, at rest at both ends."""
     return np.asarray(16 * share**2 * (1 - share) ** 2)
+
+
+def multiplied(value: Any, factor: float) -> Any:
+    """A value, or nested tuples of values, times a factor; None stays."""
+    if isinstance(value, tuple):
+        return tuple(multiplied(each, factor) for each in value)
+    return value if value is None else factor * value
 
 
 @dataclass(frozen=True)
@@ -53,12 +61,12 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Rod:
-    """A rod with round ends on the z axis of a robot's frame, from the frame's origin outwards."""
+class Tip:
+    """A rod with round ends on the z axis of a frame, from its origin on; a ball if length is 0."""
 
     frame: str
-    length: float  # from the origin to the outermost point, in [m]
-    radius: float  # radius of the rod and of its ends, in [m]
+    radius: float  # in [m]
+    length: float = 0.0  # from the origin to the outermost point, in [m]
 
     @property
     def point(self) -> tuple[float, float, float]:
@@ -73,38 +81,15 @@ class Rod:
 
 @dataclass(frozen=True)
 class Sole:
-    """A flat sole whose lower face has its middle at a point of a robot's frame.
-
-    Attributes:
-        point: Middle of the lower face, in the frame's axes, in [m].
-    """
+    """A flat sole whose lower face has its middle at a point of a robot's frame."""
 
     frame: str
     patch: tuple[float, float]  # half of its length and of its width, in [m]
-    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)  # that middle, in the frame's axes, in [m]
     thickness: float = 0.02  # in [m]
 
 
-@dataclass(frozen=True)
-class Ball:
-    """A ball around the origin of a robot's frame."""
-
-    frame: str
-    radius: float  # in [m]
-
-    @property
-    def point(self) -> tuple[float, float, float]:
-        """The point that the robot moves, in the frame's axes, in [m]."""
-        return (0.0, 0.0, 0.0)
-
-    @property
-    def patch(self) -> tuple[float, float]:
-        """Half of the extent of the contact area, in [m]."""
-        return (self.radius, self.radius)
-
-
-Effector: TypeAlias = Rod | Sole | Ball
-"""A part of a robot that may be in contact with the environment."""
+Effector: TypeAlias = Tip | Sole  # a part of a robot that may touch the environment
 
 
 @dataclass(frozen=True)
@@ -121,14 +106,12 @@ class Contact:
 
     def later(self, delay: float) -> "Contact":
         """The contact with all times later by a delay, in [s]."""
-        return Contact(
-            self.start + delay,
-            self.lift + delay,
-            self.stop + delay,
-            self.place,
-            self.effector,
-            self.yaw,
-            self.approach + delay,
+        return replace(
+            self,
+            start=self.start + delay,
+            lift=self.lift + delay,
+            stop=self.stop + delay,
+            approach=self.approach + delay,
         )
 
 
@@ -308,35 +291,38 @@ class Units:
     torque: float = 1.0  # in [N m]
 
 
-class Plan(Protocol):
-    """Plan of a motion, as far as defects depend on it."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Plan:
+    """Plan of a motion; its arrays have a row per tick."""
+
+    places: Array  # of the effectors, shape (ticks, effectors, 3), in [m]
+    effectors: tuple[Effector, ...]
+    contacts: tuple[Contact, ...] = ()
+    ground: tuple[Box, ...] = ()
+    payloads: tuple[Payload, ...] = ()
+    torques: tuple[float, ...] = ()  # limits of the drives, in [N m]
+    units: Units = Units()
 
     @property
     def time(self) -> Array:
         """Time of each tick, shape (ticks,), in [s]."""
-        ...
+        return times(len(self.places), TICK)
 
     @property
     def duration(self) -> float:
         """Duration, in [s]."""
-        ...
+        return len(self.places) * TICK
 
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """The planned contacts."""
-        ...
+    def after(self, ticks: int) -> Self:
+        """The plan after some ticks of rest."""
+        rested: dict[str, Any] = {
+            name: np.concatenate((np.repeat(signal[:1], ticks, axis=0), signal))
+            for name, signal in vars(self).items()
+            if isinstance(signal, np.ndarray)
+        }
+        contacts = tuple(contact.later(ticks * TICK) for contact in self.contacts)
+        return replace(self, contacts=contacts, **rested)
 
-    @property
-    def effectors(self) -> tuple[Effector, ...]:
-        """The effectors."""
-        ...
-
-    @property
-    def ground(self) -> tuple[Box, ...]:
-        """The ground."""
-        ...
-
-    @property
-    def units(self) -> Units:
-        """The units of the robot."""
-        ...
+    def shifted(self, shift: Signal | None) -> Self:
+        """The plan with something added to the places of its effectors."""
+        return self if shift is None else replace(self, places=self.places + shift(self.time))

@@ -10,21 +10,22 @@ from zlib import crc32
 
 import numpy as np
 
-from noiseclassifier.scenarios.domains import DISTRIBUTION, LIMITS, MOTIONS, Distribution, Domain
+from noiseclassifier.scenarios.domains import LIMITS, MOTIONS, Domain
 from noiseclassifier.scenarios.drives import LOAD_SHARE, DomainDrives, Drives
 from noiseclassifier.scenarios.errors import DivergedError, ScenarioError, SimulationError, unknown
-from noiseclassifier.scenarios.faults import (
-    NO_DEFECT,
-    THROUGHOUT,
-    Defect,
-    Faults,
-    Imperfections,
-    drawn,
-)
+from noiseclassifier.scenarios.faults import Defect, Faults, Imperfections, no_defect
 from noiseclassifier.scenarios.labels import RULE, annotate, unplanned
-from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, Event, Plan, times
-from noiseclassifier.scenarios.robots import ROBOTS, WIDE, Drivetrain, Simulated
-from noiseclassifier.scenarios.table import FAULTS, SCENARIOS, Scenario, suited
+from noiseclassifier.scenarios.motions import (
+    RATE,
+    STEP,
+    STEPS,
+    Event,
+    Plan,
+    multiplied,
+    times,
+)
+from noiseclassifier.scenarios.robots import ROBOTS, WIDE, Simulated
+from noiseclassifier.scenarios.table import FAULTS, SCENARIOS, THROUGHOUT, Scenario, suited
 from noisemodel import Run, decimated
 from noisemodel.types import Array
 
@@ -54,12 +55,11 @@ FAST, AUDIBLE = 40.0, 0.3  # lowest frequency of rattling, in [Hz], and its leas
 
 @dataclass(frozen=True)
 class Start:
-    """What runs with the same twin share: robot, seed, and a motion or a distribution to draw."""
+    """What runs with the same twin share: robot, seed, and motion; in wide domains it is drawn."""
 
     robot: str
     seed: int
     motion: Any = None
-    distribution: Distribution | None = None
 
     @property
     def nominal(self) -> Simulated:
@@ -94,13 +94,7 @@ class Trial:
 
 
 def simulate(
-    robot: str,
-    scenario: str | int,
-    seed: int,
-    *,
-    duration: float | None = None,
-    wide: bool = False,
-    distribution: Distribution = DISTRIBUTION,
+    robot: str, scenario: str | int, seed: int, *, duration: float | None = None, wide: bool = False
 ) -> Run:
     """Labelled run of a robot in a scenario, simulated at 10 kHz.
 
@@ -112,10 +106,9 @@ def simulate(
         scenario: Name or number of one of `SCENARIOS`; in wide domains "good" or a fault.
         seed: Draws motion, robot, sensors and fault, and in wide domains the domain.
         duration: Duration of the run, in [s]; by default that of the motion.
-        wide: Whether to draw body, drives, control and motion from a distribution. Such a run is
+        wide: Whether to draw body, drives, control and motion as domains.toml says. Such a run is
             kept at 2 kHz or at 10 kHz; ``effort`` is the torque of the drives after gears, limits
             and delays, before the friction of the joints, in [N m].
-        distribution: That distribution.
 
     Returns:
         The run, as the drives report it; stage ``planned`` is the velocity of the plan. ``meta``
@@ -125,23 +118,12 @@ def simulate(
         ScenarioError: If the names or numbers are unknown, or MuJoCo is not installed.
         SimulationError: If the run diverges, or the robot falls.
     """
-    name = str(scenario)
-    if wide:
-        start, defect, duration = _wide_start(robot, name, seed, duration, distribution)
-    else:
-        entry, simulated = look_up(robot, scenario)
-        case, name = entry.cases[simulated.family], entry.name
-        duration = case.motion.duration if duration is None else duration
-        if seed < 0:
-            raise ScenarioError(f"seed {seed}: expected an integer of at least 0")
-        if not SHORTEST <= duration < np.inf:
-            raise ScenarioError(f"duration {duration:g} s: expected at least {SHORTEST:g} s")
-        start = Start(robot, seed, case.motion)
-        defect = NO_DEFECT if entry.healthy else case.defect
+    find = _in_wide_domains if wide else _in_scenarios
+    start, name, defect, duration = find(robot, str(scenario), seed, duration)
     versions = software()
     try:
         twin = _twin(start, duration)
-        trial = twin if defect is NO_DEFECT else _trial(start, defect, duration)
+        trial = twin if defect is no_defect else _trial(start, defect, duration)
     except DivergedError as error:
         raise SimulationError(robot, name, seed, error.time, error.problem) from error
     events = (*trial.events, *trial.contacts)
@@ -157,23 +139,61 @@ def simulate(
         "defect": dict(trial.faults.facts),
         "events": [trace.record() for trace in traces],
         "labelling": asdict(RULE),
+        **(_facts_of_domain if wide else _facts_of_scenario)(start, name, trial),
     }
+    facts = {"robot": robot, "blocks": blocks, "meta": meta}
     if not wide:
-        facts = {"number": entry.number, "recipe": RECIPE, "motion": asdict(case.motion)}
-        facts["imperfections"] = asdict(trial.imperfections)
-        return _whole(trial.motion, simulated, robot=robot, blocks=blocks, meta={**meta, **facts})
+        return _whole(trial.motion, start.nominal, **facts)
+    rate = RATE if np.random.default_rng((seed, 1)).uniform() < FAST_SHARE else SLOW
+    return kept(trial.motion, rate, joint_names=start.nominal.drives.joints, **facts)
+
+
+Found = tuple[Start, str, Defect, float]  # start, name of the scenario, defect, duration
+
+
+def _in_scenarios(robot: str, scenario: str, seed: int, duration: float | None) -> Found:
+    entry, simulated = look_up(robot, scenario)
+    case = entry.cases[simulated.family]
+    duration = case.motion.duration if duration is None else duration
+    if seed < 0:
+        raise ScenarioError(f"seed {seed}: expected an integer of at least 0")
+    if not SHORTEST <= duration < np.inf:
+        raise ScenarioError(f"duration {duration:g} s: expected at least {SHORTEST:g} s")
+    defect = no_defect if entry.healthy else case.defect
+    return Start(robot, seed, case.motion), entry.name, defect, duration
+
+
+def _in_wide_domains(robot: str, fault: str, seed: int, duration: float | None) -> Found:
+    names = (GOOD, *faults_of(robot), *THROUGHOUT)
+    if fault not in names:
+        raise ScenarioError(
+            f"scenario {fault!r} does not exist for {robot!r}; it has {', '.join(names)}"
+        )
+    if seed < FIRST:
+        raise ScenarioError(f"seed {seed}: expected at least {FIRST}")
+    defect: Defect = {GOOD: no_defect, **THROUGHOUT, **FAULTS[WIDE[robot].family]}[fault]
+    return Start(robot, seed), fault, defect, DURATION if duration is None else duration
+
+
+def _facts_of_scenario(start: Start, name: str, trial: Trial) -> dict[str, Any]:
+    return {
+        "number": SCENARIOS[name].number,
+        "recipe": RECIPE,
+        "motion": asdict(start.motion),
+        "imperfections": asdict(trial.imperfections),
+    }
+
+
+def _facts_of_domain(start: Start, name: str, trial: Trial) -> dict[str, Any]:
     domain = trial.setup.domain
     assert domain is not None
-    meta |= {
+    return {
         "simulator": "mujoco",
         "recipe": f"domains {WIDE_RECIPE if name in THROUGHOUT else FIRST_WIDE_RECIPE}",
         "domain": domain.as_dict(),
         "motion": repr(trial.setup.motion),
         "effort_limit": [domain.torque_limit * one for one in start.nominal.drives.torque],
     }
-    rate = RATE if np.random.default_rng((seed, 1)).uniform() < FAST_SHARE else SLOW
-    joints = start.nominal.drives.joints
-    return kept(trial.motion, rate, joint_names=joints, robot=robot, blocks=blocks, meta=meta)
 
 
 def faults_of(robot: str, seed: int | None = None) -> tuple[str, ...]:
@@ -183,38 +203,32 @@ def faults_of(robot: str, seed: int | None = None) -> tuple[str, ...]:
     family = WIDE[robot].family
     if seed is None:
         return tuple(FAULTS[family])
-    return suited(family, _setup(Start(robot, seed, distribution=DISTRIBUTION)).motion)
+    return suited(family, _setup(Start(robot, seed)).motion)
 
 
-def _wide_start(
-    robot: str, fault: str, seed: int, duration: float | None, distribution: Distribution
-) -> tuple[Start, Defect, float]:
-    names = (GOOD, *faults_of(robot), *THROUGHOUT)
-    if fault not in names:
-        raise ScenarioError(
-            f"scenario {fault!r} does not exist for {robot!r}; it has {', '.join(names)}"
-        )
-    if seed < FIRST:
-        raise ScenarioError(f"seed {seed}: expected at least {FIRST}")
-    known = {GOOD: NO_DEFECT, **THROUGHOUT, **FAULTS[WIDE[robot].family]}
-    defect: Defect = known[fault]
-    start = Start(robot, seed, distribution=distribution)
-    return start, defect, DURATION if duration is None else duration
+def robot_of(name: str) -> Simulated:
+    """A robot of the scenarios."""
+    if name not in ROBOTS:
+        raise unknown(f"robot {name!r} cannot be simulated", name, ROBOTS)
+    return ROBOTS[name]
+
+
+def scenario_of(name: str) -> Scenario:
+    """A scenario by its name or number."""
+    numbers = {str(entry.number): entry for entry in SCENARIOS.values()}
+    entry = numbers.get(name) or SCENARIOS.get(name)
+    if entry is None:
+        raise unknown(f"no scenario {name!r}", name, SCENARIOS)
+    return entry
 
 
 def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:
-    """A scenario and a robot by their names."""
-    if robot not in ROBOTS:
-        raise unknown(f"robot {robot!r} cannot be simulated", robot, ROBOTS)
-    numbers = {str(entry.number): name for name, entry in SCENARIOS.items()}
-    name = numbers.get(str(scenario), str(scenario))
-    if name not in SCENARIOS:
-        raise unknown(f"no scenario {name!r}", name, SCENARIOS)
-    simulated, entry = ROBOTS[robot], SCENARIOS[name]
+    """A scenario and a robot that has it."""
+    simulated, entry = robot_of(robot), scenario_of(str(scenario))
     if simulated.family not in entry.cases:
         own = [name for name, other in SCENARIOS.items() if simulated.family in other.cases]
         raise ScenarioError(
-            f"scenario {name!r} does not exist for {robot!r}; it has {', '.join(own)}"
+            f"scenario {entry.name!r} does not exist for {robot!r}; it has {', '.join(own)}"
         )
     return entry, simulated
 
@@ -237,8 +251,8 @@ def software() -> dict[str, str]:
 @lru_cache(maxsize=1)
 def _twin(start: Start, duration: float) -> Trial:
     """Run without the fault; all runs of one start share it."""
-    twin = _trial(start, NO_DEFECT, duration)
-    if start.distribution is not None:
+    twin = _trial(start, no_defect, duration)
+    if start.motion is None:
         _refuse_rattling(twin.motion.velocity)
     return twin
 
@@ -261,27 +275,19 @@ def _trial(start: Start, defect: Defect, duration: float) -> Trial:
 
     family = import_module(f"noiseclassifier.scenarios.{start.nominal.family}")
     setup = _setup(start)
-    robot = setup.robot
-    joints = len(robot.drives.joints)
+    robot, domain = setup.robot, setup.domain
     plan: Plan = family.plan(robot, setup.motion, setup.planned, duration)
-    imperfections = _imperfections(setup, joints, reduced_model(robot).njoints - 1)
-    faults = drawn(defect, setup.faulty, plan, robot.drives)
-    scene = family.scene(robot, plan, faults, imperfections)
-    common: dict[str, Any] = {
-        "drivetrain": robot.drives,
-        "offset": faults.offsets(joints),
-        "imperfections": imperfections,
-    }
-    if setup.domain is None:
-        drives = Drives(scene.start[-joints:], **common)
+    bodies = reduced_model(robot).njoints - 1
+    imperfections = Imperfections.draw(setup.body, robot, bodies=bodies, domain=domain)
+    faults = defect(setup.faulty, plan)
+    scene: Scene = family.scene(robot, plan, faults, imperfections)
+    joints = len(robot.drives.joints)
+    at_rest = (scene.start[-joints:], robot.drives, faults.offsets(joints), imperfections)
+    if domain is None:
+        drives = Drives(*at_rest)
     else:
         drives = DomainDrives(
-            scene.start[-joints:],
-            domain=setup.domain,
-            fault=faults.drive,
-            settling=scene.settling * TICK,
-            rng=setup.gears,
-            **common,
+            *at_rest, domain=domain, fault=faults.drive, settling=scene.settling, rng=setup.gears
         )
     recording = recorded(scene, drives, plan, faults, imperfections, setup.sensors)
     contacts = unplanned(recording.contact, plan.contacts)
@@ -292,14 +298,12 @@ def _trial(start: Start, defect: Defect, duration: float) -> Trial:
 def _setup(start: Start) -> Setup:
     """What the seed of a run draws before its plan."""
     nominal = start.nominal
-    if start.distribution is None:
+    if start.motion is not None:
         seeds = np.random.SeedSequence(start.seed).spawn(5)
-        streams = map(np.random.default_rng, seeds)
-        return Setup(nominal, start.motion, None, *streams)
+        return Setup(nominal, start.motion, None, *map(np.random.default_rng, seeds))
     seeds = np.random.SeedSequence((start.seed, crc32(nominal.name.encode()))).spawn(7)
     domains, motions, planned, body, gears, sensors, faulty = map(np.random.default_rng, seeds)
-    drawn = start.distribution.domain(domains, LIMITS[nominal.family])
-    robot, domain = _changed(nominal, drawn)
+    robot, domain = _changed(nominal, Domain.draw(domains, LIMITS[nominal.family]))
     soft = domain.stiffness < SOFT or domain.policy_rate > 0
     motion = MOTIONS[nominal.family](motions, domain.wildness, nominal, soft=soft)
     scaled = robot.scaled(domain.length)
@@ -313,10 +317,6 @@ def _changed(robot: Simulated, domain: Domain) -> tuple[Simulated, Domain]:
     damping d: whoever builds a robot leaves a margin to both. The rotor alone is the least
     inertia that a loop can have. Where filters of the velocity leave no margin, gains are lower.
     """
-
-    def grown(values: tuple[float, ...], factor: float) -> tuple[float, ...]:
-        return tuple(factor * value for value in values)
-
     nominal = robot.drives
     inertia = np.array(nominal.armature) * domain.rotor
     lag = STEP + domain.torque_rise / 2 + 1 / (np.pi * domain.encoder_bandwidth)
@@ -326,43 +326,16 @@ def _changed(robot: Simulated, domain: Domain) -> tuple[Simulated, Domain]:
     bearable = np.minimum(LAG * inertia / damping, LOOP_MARGIN * damping / stiffness).min() - lag
     domain = replace(domain, delay=float(np.clip(domain.delay, 0.0, max(bearable, 0.0))))
     rotor = domain.rotor * (LOAD_SHARE if domain.flexibility else 1.0)
-    drives = Drivetrain(
-        joints=nominal.joints,
+    drives = replace(
+        nominal,
         stiffness=tuple(stiffness.tolist()),
         damping=tuple(damping.tolist()),
-        torque=grown(nominal.torque, domain.torque_limit),
-        armature=grown(nominal.armature, rotor),
-        friction=grown(nominal.friction, domain.friction),
-        viscous=grown(nominal.viscous, domain.viscous),
+        torque=multiplied(nominal.torque, domain.torque_limit),
+        armature=multiplied(nominal.armature, rotor),
+        friction=multiplied(nominal.friction, domain.friction),
+        viscous=multiplied(nominal.viscous, domain.viscous),
     )
     return replace(robot, drives=drives), domain
-
-
-def _imperfections(setup: Setup, joints: int, bodies: int) -> Imperfections:
-    """What differs from robot to robot, from joint to joint and from body to body."""
-    robot, domain, rng = setup.robot, setup.domain, setup.body
-    if domain is None:
-        return Imperfections.draw(
-            rng, joints, bodies=bodies, payload=robot.payload, force=robot.force_noise
-        )
-
-    def scales(spread: float, count: int = joints) -> tuple[float, ...]:
-        return tuple(rng.uniform(1 - spread, 1 + spread, count).tolist())
-
-    return Imperfections(
-        stiffness=scales(0.1),
-        damping=scales(0.1),
-        force_gain=float(rng.uniform(0.9, 1.1)),
-        mass=tuple((domain.mass * np.array(scales(0.05, bodies))).tolist()),
-        payload=domain.payload * robot.payload,
-        friction=scales(0.3),
-        viscous=scales(0.3),
-        encoder_bits=domain.encoder_bits,
-        encoder_noise=float(0.1 * 2 * np.pi / 2**domain.encoder_bits),
-        encoder_bandwidth=domain.encoder_bandwidth,
-        force_noise=float(rng.uniform(0.25, 1.0)) * robot.force_noise,
-        torque_delay=round(domain.delay * RATE),
-    )
 
 
 def recorded(
@@ -416,9 +389,9 @@ def _single(signal: Any) -> Any:
 
 def _whole(motion: "Motion", simulated: Simulated, **facts: Any) -> Run:
     """A recording as a run, with the joints that are held away from 0, in single precision."""
-    held = [joint for joint, angle in simulated.held.items() if angle]
+    held = {joint: angle for joint, angle in simulated.held.items() if angle}
     still = np.zeros((len(motion.velocity), len(held)))
-    posture = still + [simulated.held[joint] for joint in held]
+    posture = still + np.array([*held.values()])
 
     def whole(signal: Array, others: Array = still) -> Any:
         return _single(np.hstack((signal, others)))
@@ -445,29 +418,23 @@ def _whole(motion: "Motion", simulated: Simulated, **facts: Any) -> Run:
 
 def kept(motion: "Motion", rate: float, **facts: Any) -> Run:
     """What is kept of a recording: positions, velocities, torques, single precision, at a rate."""
+    others = {
+        "planned": motion.planned,
+        "position": motion.position,
+        "position_desired": motion.position_desired,
+        "effort": motion.torque,
+    }
     run = Run(
         time=times(len(motion.velocity), STEP),
         velocity=_single(motion.velocity),
         velocity_desired=_single(motion.velocity_desired),
-        stages={
-            "planned": _single(motion.planned),
-            "position": _single(motion.position),
-            "target": _single(motion.position_desired),
-            "torque": _single(motion.torque),
-        },
+        stages={name: _single(signal) for name, signal in others.items()},
         **facts,
     )
     run = decimated(run, rate)
-    stages = {name: _single(stage) for name, stage in run.stages.items()}
-    return replace(
-        run,
-        velocity=_single(run.velocity),
-        velocity_desired=_single(run.velocity_desired),
-        position=stages.pop("position"),
-        position_desired=stages.pop("target"),
-        effort=stages.pop("torque"),
-        stages=stages,
-    )
+    single = {name: _single(stage) for name, stage in run.stages.items()}
+    single |= {name: _single(getattr(run, name)) for name in ("velocity", "velocity_desired")}
+    return replace(run, stages={"planned": single.pop("planned")}, **single)
 
 
 def digest(run: Run) -> str:

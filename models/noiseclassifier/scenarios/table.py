@@ -1,15 +1,24 @@
 """The scenarios, and the faults of wide domains, as table.toml has them."""
 
-import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
 from noiseclassifier.scenarios import faults
-from noiseclassifier.scenarios.faults import NO_DEFECT, ON_DRIVES, Ahead, Defect, Scaled, Underfoot
-from noiseclassifier.scenarios.motions import Motion, Picks, Reach, Stand, Trot, Walk
+from noiseclassifier.scenarios.faults import Defect, Faults, Rng, no_defect
+from noiseclassifier.scenarios.motions import (
+    Motion,
+    Picks,
+    Plan,
+    Reach,
+    Stand,
+    Trot,
+    Walk,
+    multiplied,
+)
+from noiseclassifier.scenarios.robots import settings
 
 BANDS: tuple[tuple[int, int], ...] = (
     (20, 30), (30, 40), (40, 50), (50, 60), (60, 100), (100, 150), (150, 250), (250, 350),
@@ -25,7 +34,7 @@ class Case:
     """A scenario for one family of robots."""
 
     motion: Motion
-    defect: Defect = field(default=NO_DEFECT)
+    defect: Defect = no_defect
     description: str = ""
 
 
@@ -40,30 +49,30 @@ class Scenario:
     cases: Mapping[str, Case]
 
     @property
-    def families(self) -> tuple[str, ...]:
-        """The families of robots that have it."""
-        return tuple(self.cases)
-
-    @property
     def healthy(self) -> bool:
         """Whether it has no failure."""
         return self.labels == ("ok",)
 
 
-def _plain(value: Any) -> Any:
-    """A value of a TOML file, its lists as tuples."""
-    return tuple(map(_plain, value)) if isinstance(value, list) else value
+def _defect(given: Mapping[str, Any], band: tuple[int, int]) -> Defect:
+    """A kind of fault with its settings, of which some are in units of the robot."""
+    own = dict(given)
+    kind, units = getattr(faults, own.pop("kind")), own.pop("units", {})
+    if "bands" in own:
+        own["bands"] = BANDS if own["bands"] == "all" else (band,)
+
+    def scaled(rng: Rng, plan: Plan) -> Faults:
+        sizes = {
+            name: multiplied(own[name], getattr(plan.units, unit)) for name, unit in units.items()
+        }
+        found: Faults = kind(rng, plan, **own | sizes)
+        return found
+
+    return scaled if units else partial(kind, **own)
 
 
-def _defect(given: Mapping[str, Any], band: tuple[int, int]) -> Any:
-    settings = {name: _plain(value) for name, value in given.items()}
-    kind, units = settings.pop("kind"), settings.pop("units", None)
-    if "bands" in settings:
-        settings["bands"] = BANDS if settings["bands"] == "all" else (band,)
-    if "defect" in settings:
-        settings["defect"] = _defect(settings["defect"], band)
-    defect = getattr(faults, kind)(**settings)
-    return Scaled(defect, units) if units else defect
+def _defects(table: Mapping[str, Any]) -> dict[str, Defect]:
+    return {own: _defect(each, band) for name, each in table.items() for own, band in _named(name)}
 
 
 def _named(name: str) -> Iterator[tuple[str, tuple[int, int]]]:
@@ -76,8 +85,8 @@ def _scenarios(given: Mapping[str, Any]) -> Iterator[Scenario]:
     for number, (name, band) in enumerate(_named(given["name"]), start=given["number"]):
         cases = {
             family: Case(
-                MOTIONS[family](**{k: _plain(v) for k, v in each.get("motion", {}).items()}),
-                _defect(each["fault"], band) if "fault" in each else NO_DEFECT,
+                MOTIONS[family](**each.get("motion", {})),
+                _defect(each["fault"], band) if "fault" in each else no_defect,
                 each.get("description", ""),
             )
             for family, each in given.items()
@@ -88,24 +97,15 @@ def _scenarios(given: Mapping[str, Any]) -> Iterator[Scenario]:
         yield Scenario(number, name, description, labels, MappingProxyType(cases))
 
 
-_TABLE = tomllib.loads(Path(__file__).with_name("table.toml").read_text(encoding="utf-8"))
-
+_TABLE = settings("table.toml")
 SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
     {line.name: line for given in _TABLE["scenario"] for line in _scenarios(given)}
 )
 """All scenarios, by name."""
+ON_DRIVES, THROUGHOUT = _defects(_TABLE["drives"]), _defects(_TABLE["throughout"])
+"""Faults of drives of every family, for a while and from the first sample to the last, by name."""
 FAULTS: Mapping[str, Mapping[str, Defect]] = MappingProxyType(
-    {
-        family: MappingProxyType(
-            ON_DRIVES
-            | {
-                own: _defect(fault, band)
-                for name, fault in each.items()
-                for own, band in _named(name)
-            }
-        )
-        for family, each in _TABLE["wide"].items()
-    }
+    {family: ON_DRIVES | _defects(own) for family, own in _TABLE["wide"].items()}
 )
 """Faults of wide domains by family and name: of drives and commands, and the family's own."""
 
@@ -119,9 +119,8 @@ def suited(family: str, motion: Any) -> tuple[str, ...]:
     elif isinstance(motion, Picks):
         idle = ("joint-stop", *(on_contact if motion.way == "directions" else ()))
     elif isinstance(motion, Trot) and motion.gait == "stand":
-        idle = tuple(
-            name for name, each in FAULTS[family].items() if isinstance(each, Underfoot | Ahead)
-        )
+        steps = ("underfoot", "step_down")
+        idle = tuple(name for name, own in _TABLE["wide"][family].items() if own["kind"] in steps)
     elif isinstance(motion, Stand):
         idle = ("edge", *(name for name in FAULTS[family] if name.startswith("obstacle")))
     elif family == "humanoid" and not motion.walk.drop:

@@ -1,9 +1,8 @@
 """MuJoCo models made from Pinocchio models, and inverse kinematics of whole robots."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,35 +11,17 @@ from scipy.linalg import solve_banded
 
 from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Imperfections
-from noiseclassifier.scenarios.motions import STEP, TICK, Ball, Box, Effector, Rod, Sole
-from noiseclassifier.scenarios.robots import Drivetrain
+from noiseclassifier.scenarios.motions import STEP, TICK, Box, Effector, Sole
+from noiseclassifier.scenarios.robots import Simulated
 from noisemodel import Robot, RobotError
 from noisemodel.robot import Joint, table_of
 from noisemodel.types import Array
 
-
-class Reducible(Protocol):
-    """The joints of a robot; robots of every family have them."""
-
-    @property
-    def name(self) -> str:
-        """Name of the URDF, as `noisemodel.ROBOTS` lists it."""
-
-    @property
-    def drives(self) -> Drivetrain:
-        """The joints that move."""
-
-    @property
-    def length_scale(self) -> float:
-        """Scale of all lengths of the URDF."""
-
-    @property
-    def held(self) -> Mapping[str, float]:
-        """Positions of the locked joints that are not at 0, in [rad] or [m]."""
+GRAVITY = 9.81  # in [m/s²]
 
 
-def reduced_model(robot: Reducible) -> Any:
-    """Pinocchio model of a robot, with all other joints locked."""
+def reduced_model(robot: Simulated) -> Any:
+    """Pinocchio model of a robot, with all joints but its drives locked."""
     held = tuple(sorted(robot.held.items()))
     return _reduced(robot.name, robot.drives.joints, held, robot.length_scale)
 
@@ -86,66 +67,63 @@ def _reduced(
 
 def _scaled(model: Any, scale: float) -> Any:
     """A copy of a model with all lengths scaled, its masses unchanged."""
+
+    def moved(placement: Any) -> Any:
+        return pin.SE3(placement.rotation, scale * placement.translation)
+
     scaled = model.copy()
     for index in range(1, model.njoints):
-        scaled.jointPlacements[index] = _moved(model.jointPlacements[index], scale)
+        scaled.jointPlacements[index] = moved(model.jointPlacements[index])
         given = model.inertias[index]
         scaled.inertias[index] = pin.Inertia(
             given.mass, scale * given.lever, scale**2 * given.inertia
         )
     for index in range(model.nframes):
-        scaled.frames[index].placement = _moved(model.frames[index].placement, scale)
+        scaled.frames[index].placement = moved(model.frames[index].placement)
     return scaled
 
 
-def _moved(placement: Any, scale: float) -> Any:
-    return pin.SE3(placement.rotation, scale * placement.translation)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Physics:
-    """Physical properties that a URDF lacks."""
-
-    timestep: float  # in [s]
-    armature: Array  # inertia of each drive at its joint, shape (joints,), in [kg m²] or [kg]
-    damping: Array  # viscous friction of each joint, shape (joints,), in [N m s] or [N s/m]
-    friction: Array  # coulomb friction of each joint, shape (joints,), in [N m] or [N]
-    contact: float = 0.005  # time constant of a contact, in [s]
-    grip: float = 0.8
-
-
-SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
+TYPES = {
+    "revolute": mujoco.mjtJoint.mjJNT_HINGE,
+    "continuous": mujoco.mjtJoint.mjJNT_HINGE,
+    "prismatic": mujoco.mjtJoint.mjJNT_SLIDE,
+}
 ROBOT, WORLD = 1, 2  # contact groups: the robot collides with the world, never with itself
+GRIP = 0.8  # coefficient of friction
 
 
-def add_effector(
-    spec: Any, bodies: Sequence[Any], model: Any, effector: Effector, physics: Physics
-) -> None:
-    """Add the geom of an effector, and a site that encloses all of its contacts."""
-    if not model.existFrame(effector.frame):
-        known = ", ".join(frame.name for frame in model.frames)
-        raise ScenarioError(
-            f"the robot has no frame {effector.frame!r} for an effector; it has {known}"
-        )
-    frame = model.frames[model.getFrameId(effector.frame)]
-    body = bodies[frame.parentJoint]
-    geom, size, middle, around = _solid(effector)
-    pose = frame.placement
-    shape = {"quat": quaternion(pose.rotation), **_surface(ROBOT, WORLD, physics)}
-    if isinstance(effector, Ball):
-        shape["condim"] = 4  # a foot of rubber does not spin on the spot
-    body.add_geom(name=effector.frame, type=geom, size=size, pos=pose.act(middle), **shape)
-    body.add_site(
-        name=effector.frame,
-        type=mujoco.mjtGeom.mjGEOM_BOX if isinstance(effector, Sole) else SPHERE,
-        pos=pose.act(np.array(effector.point)),
-        quat=shape["quat"],
-        size=around,
-    )
+def build(
+    model: Any,
+    *,
+    armature: Array,
+    damping: Array,
+    friction: Array,
+    contact: float = 0.005,
+    effectors: Sequence[Effector] = (),
+    boxes: Sequence[Box] = (),
+) -> Any:
+    """MuJoCo model with one torque actuator per joint, and sensors.
 
-
-def add_boxes(spec: Any, boxes: Sequence[Box], physics: Physics) -> None:
-    """Add the boxes of the world, all of them present."""
+    Args:
+        armature: Inertia of each drive at its joint, shape (joints,), in [kg m²] or [kg].
+        damping: Viscous friction of each joint, shape (joints,), in [N m s] or [N s/m].
+        friction: Coulomb friction of each joint, shape (joints,), in [N m] or [N].
+        contact: Time constant of contacts, in [s].
+        effectors: Parts of the robot that collide with the boxes.
+    """
+    spec = mujoco.MjSpec()
+    spec.option.timestep = STEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10  # firm friction: tools do not creep
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must show
+    spec.compiler.degree = False
+    joints = _joints(model)
+    bodies = _add_bodies(spec, model, joints, armature, damping, friction)
+    surface = {"friction": [GRIP, 0.01, 0.001], "solref": [contact, 1.0]}
+    for effector in effectors:
+        _add_effector(bodies, model, effector, surface)
+    _add_sensors(spec, effectors, joints[0].name if joints[0].kind == "floating" else None)
     for number, box in enumerate(boxes):
         spec.worldbody.add_geom(
             name=_box(number),
@@ -153,8 +131,131 @@ def add_boxes(spec: Any, boxes: Sequence[Box], physics: Physics) -> None:
             pos=box.centre,
             size=box.half,
             quat=[np.cos(box.yaw / 2), 0, 0, np.sin(box.yaw / 2)],
-            **_surface(WORLD, ROBOT, physics),
+            contype=WORLD,
+            conaffinity=ROBOT,
+            **surface,
         )
+    try:
+        return spec.compile()
+    except ValueError as error:
+        problem = " ".join(str(error).split())
+        raise ScenarioError(f"MuJoCo refuses the robot: {problem}") from error
+
+
+def _joints(model: Any) -> tuple[Joint, ...]:
+    try:
+        joints = table_of(model)
+    except RobotError as error:
+        raise ScenarioError(str(error)) from error
+    for joint in joints:
+        if joint.kind not in TYPES and not (joint.kind == "floating" and joint is joints[0]):
+            raise ScenarioError(
+                f"joint {joint.name!r} is {joint.kind}; {', '.join(TYPES)} joints can be simulated"
+            )
+    return joints
+
+
+def _add_bodies(
+    spec: Any,
+    model: Any,
+    joints: Sequence[Joint],
+    armature: Array,
+    damping: Array,
+    friction: Array,
+) -> list[Any]:
+    """Add all bodies with their joints and drives; the world comes first."""
+    bodies = [spec.worldbody]
+    driven = 0
+    for index, joint in enumerate(joints, start=1):
+        placement, inertia = model.jointPlacements[index], model.inertias[index]
+        tensor = inertia.inertia
+        body = bodies[joint.parent].add_body(
+            name=joint.name,
+            pos=placement.translation,
+            quat=_quaternion(placement.rotation),
+            mass=inertia.mass,
+            ipos=inertia.lever,
+            fullinertia=[tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            explicitinertial=True,
+        )
+        bodies.append(body)
+        if joint.kind == "floating":
+            body.add_freejoint(name=joint.name)
+            continue
+        body.add_joint(
+            name=joint.name,
+            type=TYPES[joint.kind],
+            axis=(np.eye(3) if joint.turn is None else joint.turn)[joint.axis],
+            armature=armature[driven],
+            damping=[damping[driven], 0, 0],
+            frictionloss=friction[driven],
+        )
+        spec.add_actuator(
+            name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        ).set_to_motor()
+        driven += 1
+    return bodies
+
+
+def _add_effector(
+    bodies: Sequence[Any], model: Any, effector: Effector, surface: dict[str, Any]
+) -> None:
+    """Add the geom of an effector, and a site that encloses all of its contacts."""
+    frame = model.frames[_frame(model, effector, "for an effector")]
+    geoms, middle = mujoco.mjtGeom, np.zeros(3)
+    around, enclosing, further = geoms.mjGEOM_SPHERE, [], {}
+    if isinstance(effector, Sole):
+        half = effector.thickness / 2
+        geom, size = geoms.mjGEOM_BOX, [*effector.patch, half]
+        middle = np.add(effector.point, (0, 0, half))
+        around = geoms.mjGEOM_BOX
+        enclosing = [*(1.2 * extent for extent in effector.patch), effector.thickness]
+    elif effector.length:  # MuJoCo leaves the round ends out of a capsule's length
+        half = effector.length / 2
+        geom, size = geoms.mjGEOM_CAPSULE, [effector.radius, half - effector.radius, 0.0]
+        middle, enclosing = np.array([0, 0, half]), [2.5 * effector.radius] * 3
+    else:
+        geom, size = geoms.mjGEOM_SPHERE, [effector.radius, 0.0, 0.0]
+        enclosing = [1.5 * effector.radius] * 3
+        further = {"condim": 4}  # a foot of rubber does not spin on the spot
+    pose, body = frame.placement, bodies[frame.parentJoint]
+    turn = _quaternion(pose.rotation)
+    body.add_geom(
+        name=effector.frame,
+        type=geom,
+        size=size,
+        pos=pose.act(middle),
+        quat=turn,
+        contype=ROBOT,
+        conaffinity=WORLD,
+        **surface,
+        **further,
+    )
+    body.add_site(
+        name=effector.frame,
+        type=around,
+        pos=pose.act(np.array(effector.point)),
+        quat=turn,
+        size=enclosing,
+    )
+
+
+def _frame(model: Any, effector: Effector, what: str) -> int:
+    """Index of the frame of an effector."""
+    if not model.existFrame(effector.frame):
+        known = ", ".join(frame.name for frame in model.frames)
+        raise ScenarioError(f"the robot has no frame {effector.frame!r} {what}; it has {known}")
+    return int(model.getFrameId(effector.frame))
+
+
+def _quaternion(rotation: Array) -> list[float]:
+    """Quaternion of a rotation matrix in MuJoCo's order: w, x, y, z."""
+    q = pin.Quaternion(rotation)
+    return [q.w, q.x, q.y, q.z]
+
+
+def _box(number: int) -> str:
+    return f"box{number}"
 
 
 def set_collision(model: Any, geom: int, *, present: bool) -> None:
@@ -175,41 +276,6 @@ def box_changes(model: Any, boxes: Sequence[Box]) -> dict[int, list[tuple[int, b
     return changes
 
 
-def quaternion(rotation: Array) -> list[float]:
-    """Quaternion of a rotation matrix in MuJoCo's order: w, x, y, z."""
-    q = pin.Quaternion(rotation)
-    return [q.w, q.x, q.y, q.z]
-
-
-def _box(number: int) -> str:
-    return f"box{number}"
-
-
-def _surface(own: int, other: int, physics: Physics) -> dict[str, Any]:
-    return {
-        "contype": own,
-        "conaffinity": other,
-        "friction": [physics.grip, 0.01, 0.001],
-        "solref": [physics.contact, 1.0],
-    }
-
-
-def _solid(effector: Effector) -> tuple[Any, list[float], Array, list[float]]:
-    """Geometry of an effector: type, size and centre of its geom, and the size of its site."""
-    if isinstance(effector, Rod):  # MuJoCo leaves the round ends out of a capsule's length
-        half = effector.length / 2
-        size = [effector.radius, half - effector.radius, 0.0]
-        capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
-        return capsule, size, np.array([0, 0, half]), [2.5 * effector.radius] * 3
-    if isinstance(effector, Ball):
-        ball = [effector.radius, 0.0, 0.0]
-        return SPHERE, ball, np.zeros(3), [1.5 * effector.radius] * 3
-    half = effector.thickness / 2
-    size = [*effector.patch, half]
-    around = [*(1.2 * extent for extent in effector.patch), effector.thickness]
-    return mujoco.mjtGeom.mjGEOM_BOX, size, np.add(effector.point, (0, 0, half)), around
-
-
 BASE_SENSORS = {
     "base.place": "FRAMEPOS",
     "base.turn": "FRAMEQUAT",
@@ -222,130 +288,45 @@ BASE_SENSORS = {
 in [m], the quaternion (w, x, y, z), velocities in [m/s], the angular velocity in [rad/s]."""
 
 
-def add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> None:
+def _add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> None:
     """Add the sensors that `sensors_of` describes, the contact forces of the effectors first."""
-    for effector in effectors:
-        _add(spec, f"{effector.frame}.touch", "TOUCH", "SITE", effector.frame)
-    for effector in effectors:
-        if isinstance(effector, Sole):
-            _add(spec, f"{effector.frame}.force", "FORCE", "SITE", effector.frame)
-            _add(spec, f"{effector.frame}.torque", "TORQUE", "SITE", effector.frame)
+
+    def add(name: str, kind: str, sort: str, place: str) -> None:
+        spec.add_sensor(
+            name=name,
+            type=getattr(mujoco.mjtSensor, f"mjSENS_{kind}"),
+            objtype=getattr(mujoco.mjtObj, f"mjOBJ_{sort}"),
+            objname=place,
+        )
+
+    frames = [effector.frame for effector in effectors]
+    soles = [effector.frame for effector in effectors if isinstance(effector, Sole)]
+    for frame in frames:
+        add(f"{frame}.touch", "TOUCH", "SITE", frame)
+    for frame in soles:
+        add(f"{frame}.force", "FORCE", "SITE", frame)
+        add(f"{frame}.torque", "TORQUE", "SITE", frame)
     if root is None:
         return
-    for effector in effectors:
-        _add(spec, f"{effector.frame}.place", "FRAMEPOS", "SITE", effector.frame)
+    for frame in frames:
+        add(f"{frame}.place", "FRAMEPOS", "SITE", frame)
     for name, kind in BASE_SENSORS.items():
-        _add(spec, name, kind, "BODY" if "centre" in name else "XBODY", root)
+        add(name, kind, "BODY" if "centre" in name else "XBODY", root)
 
 
 def sensors_of(model: Any) -> dict[str, slice]:
-    """Slices of the sensors of a model from `noiseclassifier.scenarios.mujoco_model.build`.
+    """Slice of each sensor of a model in the vector of all, by name.
 
-    Returns:
-        Slice of each sensor in the vector of all, by name: ``<frame>.touch`` of each effector, its
-        contact force in [N]; ``<frame>.force`` and ``<frame>.torque`` of each sole, the load of the
-        sole in [N] and [N m], in the sole's axes, with MuJoCo's sign: negate them for the force of
-        the ground on the foot. Floating robots have
-        ``<frame>.place`` of each effector in [m], and those of ``BASE_SENSORS``.
+    ``<frame>.touch`` is the contact force of an effector, in [N]; ``<frame>.force`` and
+    ``<frame>.torque`` are the load of a sole, in [N] and [N m], in the sole's axes: negate them for
+    the force of the ground on the foot. Floating robots have ``<frame>.place`` of each effector, in
+    [m], and `BASE_SENSORS`.
     """
+    starts, widths = model.sensor_adr.tolist(), model.sensor_dim.tolist()
     return {
-        model.sensor(number).name: slice(
-            int(model.sensor_adr[number]), int(model.sensor_adr[number] + model.sensor_dim[number])
-        )
-        for number in range(model.nsensor)
+        model.sensor(number).name: slice(start, start + width)
+        for number, (start, width) in enumerate(zip(starts, widths, strict=True))
     }
-
-
-def _add(spec: Any, name: str, kind: str, sort: str, place: str) -> None:
-    spec.add_sensor(
-        name=name,
-        type=getattr(mujoco.mjtSensor, f"mjSENS_{kind}"),
-        objtype=getattr(mujoco.mjtObj, f"mjOBJ_{sort}"),
-        objname=place,
-    )
-
-
-TYPES = {
-    "revolute": mujoco.mjtJoint.mjJNT_HINGE,
-    "continuous": mujoco.mjtJoint.mjJNT_HINGE,
-    "prismatic": mujoco.mjtJoint.mjJNT_SLIDE,
-}
-
-
-def build(
-    model: Any, physics: Physics, *, effectors: Sequence[Effector] = (), boxes: Sequence[Box] = ()
-) -> Any:
-    """MuJoCo model with one torque actuator per joint."""
-    spec = mujoco.MjSpec()
-    spec.option.timestep = physics.timestep
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = 10  # firm friction: tools do not creep
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must show
-    spec.compiler.degree = False
-    joints = _joints(model)
-    bodies = _add_bodies(spec, model, joints, physics)
-    for effector in effectors:
-        add_effector(spec, bodies, model, effector, physics)
-    add_sensors(spec, effectors, joints[0].name if joints[0].kind == "floating" else None)
-    add_boxes(spec, boxes, physics)
-    try:
-        return spec.compile()
-    except ValueError as error:
-        problem = " ".join(str(error).split())
-        raise ScenarioError(f"MuJoCo refuses the robot: {problem}") from error
-
-
-def _add_bodies(spec: Any, model: Any, joints: Sequence[Joint], physics: Physics) -> list[Any]:
-    """Add all bodies with their joints and drives; the world comes first."""
-    bodies = [spec.worldbody]
-    driven = 0
-    for index, joint in enumerate(joints):
-        body = bodies[joint.parent].add_body(name=joint.name, **_pose(model, index + 1))
-        _give_inertia(body, model.inertias[index + 1])
-        bodies.append(body)
-        if joint.kind == "floating":
-            body.add_freejoint(name=joint.name)
-            continue
-        body.add_joint(
-            name=joint.name,
-            type=TYPES[joint.kind],
-            axis=(np.eye(3) if joint.turn is None else joint.turn)[joint.axis],
-            armature=physics.armature[driven],
-            damping=[physics.damping[driven], 0, 0],
-            frictionloss=physics.friction[driven],
-        )
-        spec.add_actuator(
-            name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
-        ).set_to_motor()
-        driven += 1
-    return bodies
-
-
-def _joints(model: Any) -> tuple[Joint, ...]:
-    try:
-        joints = table_of(model)
-    except RobotError as error:
-        raise ScenarioError(str(error)) from error
-    for joint in joints:
-        if joint.kind not in TYPES and not (joint.kind == "floating" and joint is joints[0]):
-            raise ScenarioError(
-                f"joint {joint.name!r} is {joint.kind}; {', '.join(TYPES)} joints can be simulated"
-            )
-    return joints
-
-
-def _pose(model: Any, index: int) -> dict[str, Any]:
-    placement = model.jointPlacements[index]
-    return {"pos": placement.translation, "quat": quaternion(placement.rotation)}
-
-
-def _give_inertia(body: Any, inertia: Any) -> None:
-    tensor = inertia.inertia
-    body.mass = inertia.mass
-    body.ipos = inertia.lever
-    body.fullinertia = [tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    body.explicitinertial = True
 
 
 class WholeBody:
@@ -398,14 +379,10 @@ class WholeBody:
 
         Args:
             places: Of the effectors' points, shape (effectors, 3), in [m].
-            turns: Rotation matrix of each sole, shape (3, 3); those of balls are ignored.
+            turns: Rotation matrix of each sole.
             centre: Of mass, shape (3,), in [m].
-            base: Rotation matrix of the base, shape (3, 3).
-            upper: Positions of the upper body's joints, shape (upper,), in [rad]; by default they
-                stay.
-
-        Returns:
-            The new configuration, shape (nq,).
+            base: Rotation matrix of the base.
+            upper: Positions of the upper body's joints, in [rad]; by default they stay.
         """
         model, data = self._model, self._data
         jacobian, error = self._jacobian, self._error
@@ -436,9 +413,6 @@ class WholeBody:
         Args:
             bearing: Ground force on each effector's point, in the order of the equations: force, in
                 [N], and, for a sole, torque, in [N m].
-
-        Returns:
-            Torques of the joints, shape (joints,), in [N m].
         """
         gravity = pin.computeGeneralizedGravity(self._model, self._data, self.configuration)
         legs = self._jacobian[: self._centre.start, 6:]
@@ -463,12 +437,7 @@ class WholeBody:
 
 def _add_point(model: Any, effector: Effector) -> int:
     """Add the point of an effector as a frame; its index."""
-    if not model.existFrame(effector.frame):
-        known = ", ".join(frame.name for frame in model.frames)
-        raise ScenarioError(
-            f"the robot has no frame {effector.frame!r} to stand on; it has {known}"
-        )
-    parent = model.getFrameId(effector.frame)
+    parent = _frame(model, effector, "to stand on")
     frame = model.frames[parent]
     pose = frame.placement * pin.SE3(np.eye(3), np.array(effector.point))
     kind = pin.FrameType.OP_FRAME
@@ -513,7 +482,7 @@ def real_model(model: Any, frame: str, point: Array, imperfections: Imperfection
 
 
 def real_world(
-    robot: Any,
+    robot: Simulated,
     boxes: Sequence[Box],
     imperfections: Imperfections,
     *,
@@ -522,19 +491,16 @@ def real_world(
     contact: float = 0.005,
 ) -> Any:
     """MuJoCo model of a real robot, with its load at a point of a frame, and of its world."""
-    drives, model = robot.drives, reduced_model(robot)
-    physics = Physics(
-        timestep=STEP,
+    drives = robot.drives
+    return build(
+        real_model(reduced_model(robot), frame, point, imperfections),
         armature=np.array(drives.armature),
         damping=np.array(drives.viscous) * imperfections.viscous,
         friction=np.array(drives.friction) * imperfections.friction,
         contact=contact,
+        effectors=robot.effectors,
+        boxes=boxes,
     )
-    real = real_model(model, frame, point, imperfections)
-    return build(real, physics, effectors=robot.effectors, boxes=boxes)
-
-
-GRAVITY = 9.81  # in [m/s²]
 
 
 def centre_of_mass(zmp: Array, rate: float) -> Array:

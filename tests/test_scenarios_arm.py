@@ -1,27 +1,17 @@
-"""Arms move in the air within their limits, and forces from outside act where and when they say."""
+"""Arms pick and move in the air within their limits, and forces act where and when they say."""
 
-from dataclasses import replace
 from functools import lru_cache
 from itertools import cycle
 
 import numpy as np
 import pytest
 
+from noiseclassifier.scenarios import faults
 from noiseclassifier.scenarios.arm import plan
-from noiseclassifier.scenarios.arm_reaching import KINDS, ReachPlan
+from noiseclassifier.scenarios.arm_reaching import KINDS, ReachPlan, Tool
 from noiseclassifier.scenarios.domains import arm_motion
 from noiseclassifier.scenarios.errors import ScenarioError
-from noiseclassifier.scenarios.faults import (
-    ON_DRIVES,
-    SLOW,
-    Collisions,
-    Defect,
-    Faults,
-    JointStops,
-    NoDefect,
-    Obstacles,
-    Pushes,
-)
+from noiseclassifier.scenarios.faults import SLOW, Defect, Faults, no_defect
 from noiseclassifier.scenarios.labels import deviation
 from noiseclassifier.scenarios.motions import (
     TICK,
@@ -31,30 +21,31 @@ from noiseclassifier.scenarios.motions import (
     Picks,
     Push,
     Reach,
+    bump,
+    minimum_jerk,
 )
 from noiseclassifier.scenarios.robots import WIDE, Arm
 from noiseclassifier.scenarios.simulation import Start, Trial, _trial
-from noiseclassifier.scenarios.table import FAULTS, suited
+from noiseclassifier.scenarios.table import FAULTS, ON_DRIVES, suited
 from noiseclassifier.scenarios.world import reduced_model
 
 OWN = {n: each for n, each in FAULTS["arm"].items() if n not in ON_DRIVES}
+WAYS = ("straight", "curve", "directions", "spot")
 
 ARMS = tuple(robot for robot in WIDE.values() if robot.family == "arm")
 PANDA = WIDE["panda"]
 SO101 = WIDE["so101"]
 
 RNG = np.random.default_rng
-BY_NAME = {arm.name: arm for arm in ARMS}
 
 
-class Given:
-    """A defect with given faults."""
+def given(*loads) -> Defect:
+    """A defect with given loads."""
+    return lambda rng, plan: Faults(loads=loads)
 
-    def __init__(self, faults: Faults) -> None:
-        self.faults = faults
 
-    def draw(self, rng: np.random.Generator, plan: object) -> Faults:
-        return self.faults
+def pick(seed: int, duration: float, way: str = "straight"):
+    return plan(PANDA, Picks(way=way), RNG(seed), duration)
 
 
 def reach(arm: Arm = PANDA, seed: int = 1, duration: float = 4.0, **settings) -> ReachPlan:
@@ -62,8 +53,61 @@ def reach(arm: Arm = PANDA, seed: int = 1, duration: float = 4.0, **settings) ->
 
 
 @lru_cache
-def trial(arm: str, motion: Picks | Reach, defect: Defect = NoDefect()) -> Trial:  # noqa: B008
+def trial(arm: str, motion: Picks | Reach, defect: Defect = no_defect) -> Trial:
     return _trial(Start(arm, 1, motion), defect, 2.0)
+
+
+def test_paths_start_and_end_at_rest_and_a_bend_returns():
+    share = np.linspace(0, 1, 1001)
+    assert minimum_jerk(share)[[0, -1]] == pytest.approx([0, 1])
+    assert bump(share)[[0, 500, -1]] == pytest.approx([0, 1, 0])
+    for path in (minimum_jerk, bump):
+        assert np.diff(path(share))[[0, -1]] == pytest.approx(0, abs=2e-5)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_picks_never_jump(way):
+    for seed in range(3):
+        one = pick(seed, 8.0, way)
+        speed = np.linalg.norm(np.diff(one.places[:, 0], axis=0), axis=1) / TICK
+        assert speed.max() < 1.5
+        assert np.abs(np.diff(speed)).max() / TICK < 16.0
+        assert np.abs(np.diff(one.yaw)).max() / TICK < 2.5
+
+
+def test_picks_stay_in_reach_and_above_the_table_and_press_where_a_contact_is_planned():
+    for seed in range(5):
+        one = pick(seed, 8.0)
+        x, y, z = one.places[2000:, 0].T
+        (x0, x1), (y0, y1) = PANDA.reach
+        assert (z > 0.1).all()
+        assert ((x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)).all()
+        planned = np.zeros(len(one.time), dtype=bool)
+        for contact in one.contacts:
+            planned |= (one.time > contact.start - TICK / 2) & (one.time < contact.lift - TICK)
+        assert np.mean(planned != np.isfinite(one.force)) < 1e-3
+        assert np.nanmax(one.force) >= 15
+
+
+def test_short_picks_are_the_beginning_of_long_ones_and_press_for_half_a_second():
+    short, long = pick(2, 3.0), pick(2, 9.0)
+    np.testing.assert_array_equal(short.places, long.places[: len(short.time)])
+    assert short.contacts == long.contacts[: len(short.contacts)]
+    assert all(pick(seed, 3.0).contacts[0].start <= 2.5 for seed in range(100))
+
+
+def test_a_plan_that_begins_later_rests_before():
+    one = pick(3, 3.0)
+    later = one.after(100)
+    assert later.duration == pytest.approx(one.duration + 0.1)
+    np.testing.assert_array_equal(later.places[:101], np.tile(one.places[0], (101, 1, 1)))
+    assert later.contacts[0].start == pytest.approx(one.contacts[0].start + 0.1)
+
+
+def test_on_the_spot_all_contacts_are_at_one_place_and_in_all_directions_there_are_none():
+    assert len({contact.place for contact in pick(4, 12.0, "spot").contacts}) == 1
+    assert len({contact.place for contact in pick(4, 12.0).contacts}) > 1
+    assert pick(4, 12.0, "directions").contacts == ()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -128,7 +172,7 @@ def follows(one: Trial, arm: Arm) -> None:
     assert np.abs(motion.velocity).max() > 0.05
 
 
-@pytest.mark.parametrize("arm", [SO101, BY_NAME["baxter"]], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("arm", [SO101, WIDE["baxter"]], ids=lambda arm: arm.name)
 def test_an_arm_follows_what_is_planned(arm):
     follows(trial(arm.name, Reach(kind="spline")), arm)
 
@@ -136,14 +180,14 @@ def test_an_arm_follows_what_is_planned(arm):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arm", "kind"),
-    [*zip(ARMS, cycle(KINDS), strict=False), (PANDA, "picks"), (BY_NAME["ur3"], "picks")],
+    [*zip(ARMS[::2], cycle(KINDS), strict=False), (PANDA, "picks")],
     ids=lambda each: getattr(each, "name", each),
 )
-def test_every_arm_and_every_motion_are_followed(arm, kind):
+def test_every_kind_of_motion_is_followed(arm, kind):
     follows(trial(arm.name, Picks() if kind == "picks" else Reach(kind=kind)), arm)
 
 
-@pytest.mark.parametrize("arm", ARMS[-4:], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("arm", ARMS[-2:], ids=lambda arm: arm.name)
 def test_gains_suit_the_inertia_that_joints_move(arm):
     import pinocchio as pin
 
@@ -158,57 +202,35 @@ def test_a_held_payload_loads_the_arm_with_its_weight():
     still = Reach(speed=(0.001, 0.001), spread=0.001)
     held = Payload(frame=PANDA.tool.frame, start=0.2, stop=1.2, mass=1.5)
     bare = trial("panda", still).motion.torque
-    loaded = trial("panda", still, Given(Faults(loads=(held,)))).motion.torque
+    loaded = trial("panda", still, given(held)).motion.torque
     before, during, after = (slice(a, b) for a, b in ((0, 2000), (9000, 12000), (17000, 20000)))
     np.testing.assert_array_equal(loaded[before], bare[before])
-    import pinocchio as pin
-
-    model = reduced_model(PANDA)
-    jacobian = pin.computeFrameJacobian(
-        model,
-        model.createData(),
-        np.array(PANDA.rest),
-        model.getFrameId(PANDA.tool.frame),
-        pin.LOCAL_WORLD_ALIGNED,
-    )
-    expected = jacobian[2] * 1.5 * 9.81  # the tool points down: its tip is below the frame
+    *_, jacobian = Tool(PANDA).jacobian(np.array(PANDA.rest))
+    expected = jacobian[2] * 1.5 * 9.81
     friction = 2 * 1.5 * np.array(PANDA.drives.friction)
     assert (np.abs((loaded - bare)[during].mean(axis=0) - expected) < friction + 0.02).all()
     assert (np.abs((loaded - bare)[after].mean(axis=0)) < friction).all()
 
 
-@pytest.mark.parametrize("stiffness", [1e3, 1e5])
-def test_a_collision_starts_when_it_says_and_is_no_stronger_than_its_limit(stiffness):
+def test_a_collision_starts_when_it_says_is_within_its_limit_and_louder_if_hard():
     motion = Reach(speed=(1.0, 1.0))
-    obstacle = Collision(
-        frame=PANDA.tool.frame, start=0.5, hold=0.3, stiffness=stiffness, limit=50.0
+    soft, hard = (
+        Collision(frame=PANDA.tool.frame, start=0.5, hold=0.3, stiffness=k, limit=50.0)
+        for k in (1e3, 1e5)
     )
-    healthy, hit = (
-        trial("panda", motion, defect) for defect in (NoDefect(), Given(Faults(loads=(obstacle,))))
+    healthy, touched, hit = (
+        trial("panda", motion, defect) for defect in (no_defect, given(soft), given(hard))
     )
     (event,) = hit.events
     assert event.label == "impact"
     assert 0.5 <= event.start < 0.55
-    assert 0 < event.facts["force"] <= 50.0
+    assert 2 * touched.events[0].facts["force"] < event.facts["force"] <= 50.0
     onset = round(event.start * 10_000)
     velocity, twin = hit.motion.velocity, healthy.motion.velocity
     np.testing.assert_array_equal(velocity[:onset], twin[:onset])
     loudness = np.linalg.norm(deviation(velocity, twin, rate=10_000), axis=1)
     assert loudness[onset : onset + 1700].max() > 0.02
     assert loudness[onset + 1700 :].max() < loudness[onset : onset + 1700].max()
-
-
-def test_a_hard_collision_is_louder_than_a_soft_one():
-    motion = Reach(speed=(1.0, 1.0))
-    soft, hard = (
-        Collision(frame=PANDA.tool.frame, start=0.5, hold=0.3, stiffness=k, limit=50.0)
-        for k in (1e3, 1e5)
-    )
-    forces = [
-        trial("panda", motion, Given(Faults(loads=(load,)))).events[0].facts["force"]
-        for load in (soft, hard)
-    ]
-    assert forces[1] > 2 * forces[0]
 
 
 def test_an_end_stop_holds_its_joint():
@@ -220,7 +242,7 @@ def test_an_end_stop_holds_its_joint():
     side = 1 if way.max() > -way.min() else -1
     angle = float(joints[0, joint] + 0.5 * side * np.abs(way).max())
     stop = JointStop(joint=joint, angle=angle, side=side, stiffness=2e4)
-    held = trial("panda", motion, Given(Faults(loads=(stop,))))
+    held = trial("panda", motion, given(stop))
     assert (side * (held.motion.position[:, joint] - angle)).max() < 0.01
     event = held.events[0]
     assert (event.label, event.cause) == ("impact", "end stop of a joint")
@@ -235,32 +257,32 @@ def test_an_end_stop_holds_its_joint():
 def test_every_fault_suits_every_motion(name):
     for one in (Picks(), Picks(way="directions"), *(Reach(kind=kind) for kind in KINDS)):
         drawn = plan(PANDA, one, RNG(0), 3.0)
-        faults = OWN[name].draw(RNG(1), drawn)
-        assert all(0 <= event.start < event.stop for event in faults.events)
-        acts = bool(faults.events or faults.loads or faults.boxes)
+        found = OWN[name](RNG(1), drawn)
+        assert all(0 <= event.start < event.stop for event in found.events)
+        acts = bool(found.events or found.loads or found.boxes)
         assert acts == (name in suited("arm", one))
 
 
 def test_a_collision_is_drawn_while_the_tool_moves():
     one = reach(duration=6.0)
-    speed = np.linalg.norm(np.gradient(one.position, TICK, axis=0), axis=1)
+    speed = np.linalg.norm(np.gradient(one.places[:, 0], TICK, axis=0), axis=1)
     for seed in range(10):
-        for load in Collisions().draw(RNG(seed), one).loads:
+        for load in faults.collisions(RNG(seed), one).loads:
             assert speed[round(load.start / TICK)] > 0.05
 
 
 def test_pushes_are_drawn_while_the_tool_stands_or_is_slow():
     for seed in range(10):
         one = reach(seed=seed, duration=6.0, stand=3.0)
-        speed = np.linalg.norm(np.gradient(one.position, TICK, axis=0), axis=1)
-        faults = Pushes().draw(RNG(seed), one)
-        for load in faults.loads:
+        speed = np.linalg.norm(np.gradient(one.places[:, 0], TICK, axis=0), axis=1)
+        found = faults.pushes(RNG(seed), one)
+        for load in found.loads:
             now = slice(round(load.start / TICK), round(load.stop / TICK))
             assert speed[now].max() <= SLOW
             assert 3.0 <= np.linalg.norm(load.force) <= 40.0
             assert 0.6 <= load.start < load.start + load.rise + load.fall <= load.stop <= 5.4
-        assert [(event.start, event.stop) for event in faults.events] == [
-            (load.start, load.stop) for load in faults.loads
+        assert [(event.start, event.stop) for event in found.events] == [
+            (load.start, load.stop) for load in found.loads
         ]
 
 
@@ -268,7 +290,7 @@ def test_a_push_begins_and_ends_when_it_says():
     still = Reach(speed=(0.001, 0.001), spread=0.001)
     push = Push(along=1.0, start=0.4, stop=1.2, rise=0.2, fall=0.3, force=(0.0, 20.0, 0.0))
     bare = trial("panda", still).motion.torque
-    held = trial("panda", still, Given(Faults(loads=(push,)))).motion.torque
+    held = trial("panda", still, given(push)).motion.torque
     first, last = round(push.start * 10_000), round(push.stop * 10_000)
     np.testing.assert_array_equal(held[:first], bare[:first])
     change = np.abs(held - bare).max(axis=1)
@@ -280,21 +302,22 @@ def test_an_arm_stands_for_as_long_as_it_says():
     one = reach(stand=2.0, duration=4.0)
     moves = np.flatnonzero(np.abs(one.joints - one.joints[0]).max(axis=1) > 1e-9)
     assert moves[0] * TICK == pytest.approx(2.0, abs=0.05)
-    drawn = [arm_motion(RNG(seed), 0.5) for seed in range(300)]
+    drawn = [arm_motion(RNG(seed), 0.5, PANDA) for seed in range(300)]
     stands = [one.stand > 1.0 for one in drawn if isinstance(one, Reach)]
     assert np.mean(stands) == pytest.approx(0.3, abs=0.08)
 
 
 def test_nothing_is_drawn_for_an_arm_that_stands():
     still = reach(speed=(0.001, 0.001), spread=0.001)
-    for defect in (Collisions(), JointStops(), Obstacles((0.01, 0.02), (0.05, 0.05))):
-        faults = defect.draw(RNG(0), still)
-        assert (faults.loads, faults.boxes, faults.events) == ((), (), ())
+    for name in ("collision-hard", "joint-stop", "obstacle"):
+        found = OWN[name](RNG(0), still)
+        assert (found.loads, found.boxes, found.events) == ((), (), ())
 
 
 def test_wild_motions_are_faster_than_mild_ones_and_one_third_are_picks():
     drawn = {
-        wildness: [arm_motion(RNG(seed), wildness) for seed in range(300)] for wildness in (0, 1)
+        wildness: [arm_motion(RNG(seed), wildness, PANDA) for seed in range(300)]
+        for wildness in (0, 1)
     }
     tops = [
         max(one.speed[1] for one in drawn[wildness] if isinstance(one, Reach))
@@ -313,4 +336,4 @@ def test_a_scaled_arm_has_all_lengths_scaled():
     assert large.table == pytest.approx(1.1 * PANDA.table)
     assert large.reach[0][1] == pytest.approx(1.1 * PANDA.reach[0][1])
     assert large.length_scale == 1.1
-    assert replace(PANDA.scaled(1.0), reach=PANDA.reach) == PANDA
+    assert PANDA.scaled(1.0) == PANDA

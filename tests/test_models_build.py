@@ -1,19 +1,18 @@
-"""Faults that are added to good logs."""
+"""Faults that models/build.py adds to good logs."""
+
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.logs import (
-    ADDED,
-    APART,
-    LEVELS,
-    PIECE,
-    beginning_anywhere,
-    fault,
-    with_fault_throughout,
-    with_faults,
-)
 from noisemodel import Block, Run
+
+SPEC = spec_from_file_location("build_models", Path(__file__).parents[1] / "models" / "build.py")
+build = module_from_spec(SPEC)
+SPEC.loader.exec_module(build)
+ADDED, LEVELS = build.ADDED, build.LEVELS
+with_faults, with_fault_throughout = build.with_faults, build.with_fault_throughout
 
 
 def log(rate=500.0, seconds=7.0, noise=1e-4):
@@ -30,12 +29,12 @@ def log(rate=500.0, seconds=7.0, noise=1e-4):
 @pytest.mark.parametrize("kind", ADDED)
 @pytest.mark.parametrize("rate", [80.0, 1000.0])
 def test_a_fault_has_level_one(kind, rate):
-    signal = fault(kind, round(rate), 30.0, rate, np.random.default_rng(1))
+    signal = build.fault(kind, round(rate), 30.0, rate, np.random.default_rng(1))
     assert np.sqrt(np.mean(signal**2)) == pytest.approx(1.0)
 
 
 def test_a_tone_has_its_frequency():
-    signal = fault("tone", 1000, 90.0, 1000.0, np.random.default_rng(0))
+    signal = build.fault("tone", 1000, 90.0, 1000.0, np.random.default_rng(0))
     assert np.abs(np.fft.rfft(signal)).argmax() == 90
 
 
@@ -54,7 +53,7 @@ def test_each_fault_that_can_be_seen_has_its_label_and_class():
     bad = [block for block in found.blocks if block.label != "ok"]
     events = found.meta["events"]
     assert len(events) == 2  # one every APART, away from the ends
-    assert events[1]["start"] - events[0]["start"] == pytest.approx(APART)
+    assert events[1]["start"] - events[0]["start"] == pytest.approx(build.APART)
     assert [(b.start, b.label) for b in bad] == [(e["start"], e["label"]) for e in events]
 
 
@@ -88,10 +87,10 @@ def test_a_fault_throughout_is_there_from_the_first_sample_to_the_last():
 def test_a_piece_of_a_log_begins_at_zero_with_what_it_has_of_labels_and_events():
     faulty, begun = with_faults(log(), seed=5), 0
     for seed in range(30):
-        piece = beginning_anywhere(faulty, seed=seed)
+        piece = build.beginning_anywhere(faulty, seed=seed)
         first, last = piece.meta["piece"]
         assert piece.time[0] == 0.0
-        assert last - first <= PIECE[1] + 0.01
+        assert last - first <= build.PIECE[1] + 0.01
         where = round(first * faulty.rate)
         part = faulty.velocity[where : where + len(piece.time)]
         np.testing.assert_array_equal(piece.velocity, part)
