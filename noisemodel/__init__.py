@@ -5,7 +5,7 @@ base's own axes, linear, then angular, as Pinocchio has it. Source of the noise 
 and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robots", Sec. II-A.
 """
 
-from noisemodel.compare import Comparison, Comparisons, LeftOut, RobotComparison, compare
+from noisemodel.compare import Comparison, Comparisons, LeftOut, compare
 from noisemodel.errors import (
     ClusterError,
     GeometryError,
@@ -21,7 +21,7 @@ from noisemodel.errors import (
     UnknownKindError,
     UnknownRobotError,
 )
-from noisemodel.extended import KINDS, extended, extended_chunks, surface_speed
+from noisemodel.extended import KINDS, extended, surface_speed
 from noisemodel.noise import Noise, by_joint, norms, simplified
 from noisemodel.recorder import Recorder
 from noisemodel.robot import ROBOTS, Robot, link_twists
@@ -45,7 +45,6 @@ __all__ = [
     "OutputError",
     "Recorder",
     "Robot",
-    "RobotComparison",
     "RobotError",
     "Run",
     "RunError",
@@ -58,7 +57,6 @@ __all__ = [
     "compare",
     "decimated",
     "extended",
-    "extended_chunks",
     "link_twists",
     "norms",
     "resample",

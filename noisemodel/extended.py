@@ -1,9 +1,8 @@
 """The extended noise estimate: the sound power of every link, by its surface and its speed."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
@@ -12,21 +11,15 @@ from numpy.typing import NDArray
 from noisemodel.errors import MotionError, NoiseModelError, UnknownKindError
 from noisemodel.noise import CHUNK, DENSITY, SOUND_SPEED, Noise, check_positive, sound_power
 from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
-from noisemodel.run import Run, stretches
+from noisemodel.run import Run, rows_of, stretches
 from noisemodel.runfile import AT_ONCE, pieces
-from noisemodel.surface import (
-    LinkSurface,
-    Surface,
-    check_surface,
-    point_speeds,
-    turning_speed,
-)
+from noisemodel.surface import LinkSurface, Surface, check_surface, point_speeds, turning_speed
 from noisemodel.types import Array, Mask, Real
 
 Index: TypeAlias = NDArray[np.intp]
 
-Weighing: TypeAlias = Callable[[int, Array], Array]
-"""Takes a link and signals of its motion that are linear in velocities, and returns as many."""
+KINDS = ("paper", "A", "B", "C", "mean", "rms", "normal")
+"""The kinds of mean speed."""
 
 QUADRATIC = ("rms", "normal")
 """The kinds whose square is a quadratic form of a link's twist."""
@@ -77,14 +70,9 @@ def surface_speed(robot: Robot, surface: Surface, q: Real, v: Real, kind: str = 
 
 
 def chunk_speeds(
-    robot: Robot,
-    surface: Surface,
-    q: Real,
-    v: Real,
-    kind: str,
-    weighing: Weighing | None = None,
+    robot: Robot, surface: Surface, q: Real, v: Real, kind: str, dipole: "Dipole | None" = None
 ) -> Array:
-    """Compute the mean speeds of all links in a few thousand samples."""
+    """Mean speeds of all links in a few thousand samples, shape (links, samples)."""
     twists = np.empty((len(robot.joints) + 1, 6, len(q)))
     chunk_twists(robot.joints, q, v, out=twists)
     velocities = np.ascontiguousarray(v.T, dtype=np.float64)
@@ -93,65 +81,34 @@ def chunk_speeds(
         if link.area:
             joint, twist = robot.joints[index - 1], twists[index]
             velocity = velocities[joint.first_v : joint.first_v + joint.nv]
-            if weighing is not None:
-                weighed = weighing(place, np.vstack((twist, velocity)))
-                twist, velocity = weighed[:6], weighed[6:]
-            speeds[place] = KINDS[kind](link, joint, twist, velocity)
+            if dipole is not None:
+                radiating = dipole(place, np.vstack((twist, velocity)))
+                twist, velocity = radiating[:6], radiating[6:]
+            speeds[place] = _link_speed(kind, link, joint, twist, velocity)
     return speeds
 
 
-# Each of these takes the surface of a link, its joint, its twist, shape (6, samples), and the
-# velocity of its joint, shape (nv, samples), and returns a mean speed, shape (samples,).
-
-
-def _paper(link: LinkSurface, joint: Joint, twist: Array, velocity: Array) -> Array:
-    own = joint.own_twist(velocity)
+def _link_speed(kind: str, link: LinkSurface, joint: Joint, twist: Array, velocity: Array) -> Array:
+    """Mean speed of a link by its twist, shape (6, samples), and its joint's, (nv, samples)."""
+    if kind == "mean":
+        starts = range(0, twist.shape[1], BLOCK_OF_POINTS)
+        blocks = (twist[:, start : start + BLOCK_OF_POINTS] for start in starts)
+        points, weights = link.points.points, link.points.weights
+        return np.concatenate([weights @ point_speeds(points, block) for block in blocks])
+    if kind in QUADRATIC:
+        form = link.mean_square if kind == "rms" else link.mean_square_normal
+        squares = np.einsum("is,is->s", form @ twist, twist)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))  # rounding, where nothing moves out
+    own = joint.subspace @ velocity
     carried = twist - own
-    return _length(carried[:3]) + _turning(link, carried) + _driven(link, own)
-
-
-def _a(_link: LinkSurface, joint: Joint, twist: Array, velocity: Array) -> Array:
-    return _length((twist - joint.own_twist(velocity))[:3])  # A = |v_O|, Sec. II-A
-
-
-def _b(link: LinkSurface, joint: Joint, twist: Array, velocity: Array) -> Array:
-    return _turning(link, twist - joint.own_twist(velocity))  # B = <|w_parent x r|>
-
-
-def _c(link: LinkSurface, joint: Joint, _twist: Array, velocity: Array) -> Array:
-    return _driven(link, joint.own_twist(velocity))
-
-
-def _mean(link: LinkSurface, _joint: Joint, twist: Array, _velocity: Array) -> Array:
-    weights, points = link.points.weights, link.points.points
-    return np.concatenate(
-        [
-            weights @ point_speeds(points, twist[:, start : start + BLOCK_OF_POINTS])
-            for start in range(0, twist.shape[1], BLOCK_OF_POINTS)
-        ]
-    )
-
-
-def _rms(link: LinkSurface, _joint: Joint, twist: Array, _velocity: Array) -> Array:
-    return _root(link.mean_square, twist)
-
-
-def _normal(link: LinkSurface, _joint: Joint, twist: Array, _velocity: Array) -> Array:
-    return _root(link.mean_square_normal, twist)
-
-
-KINDS: Mapping[str, Callable[[LinkSurface, Joint, Array, Array], Array]] = MappingProxyType(
-    {
-        "paper": _paper,
-        "A": _a,
-        "B": _b,
-        "C": _c,
-        "mean": _mean,
-        "rms": _rms,
-        "normal": _normal,
+    terms: dict[str, Callable[[], Array]] = {  # Sec. II-A
+        "A": lambda: _length(carried[:3]),  # |v_O|
+        "B": lambda: _turning(link, carried),  # <|w_parent x r|>
+        "C": lambda: _driven(link, own),
     }
-)
-"""The kinds of mean speed, and how each is computed."""
+    if kind == "paper":
+        return terms["A"]() + terms["B"]() + terms["C"]()
+    return terms[kind]()
 
 
 def _driven(link: LinkSurface, own: Array) -> Array:
@@ -169,16 +126,10 @@ def _length(vectors: Array) -> Array:
     return length
 
 
-def _root(form: Array, twist: Array) -> Array:
-    squares = np.einsum("is,is->s", form @ twist, twist)
-    root: Array = np.sqrt(np.maximum(squares, 0.0))  # rounding, where nothing moves outwards
-    return root
-
-
 def check_kind(kind: str) -> None:
     """Refuse an unknown kind."""
     if kind not in KINDS:
-        raise UnknownKindError(kind, tuple(KINDS))
+        raise UnknownKindError(kind, KINDS)
 
 
 def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q", "v")) -> None:
@@ -195,7 +146,7 @@ def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q
 
 
 def corner_frequencies(surface: Surface, *, sound_speed: float) -> Array:
-    """Find the frequency above which each link radiates fully."""
+    """Frequency above which each link radiates fully, shape (links,), in [Hz]."""
     radius = np.sqrt(surface.area / (4.0 * np.pi))
     with np.errstate(divide="ignore"):
         corners: Array = np.sqrt(2.0) * sound_speed / (2.0 * np.pi * radius)
@@ -290,120 +241,63 @@ def extended(
         NoiseModelError: If a number is not positive, lengths differ, or a link is too small for
             "dipole" at this rate.
     """
-    chunks = extended_chunks(
-        robot,
-        surface,
-        q,
-        v,
-        kind,
-        density=density,
-        sound_speed=sound_speed,
-        efficiency=efficiency,
-        rate=rate,
-        q_desired=q_desired,
-        v_desired=v_desired,
-    )
-    power, stop = np.empty((len(surface.links), len(q))), 0
-    for chunk in chunks:
-        start, stop = stop, stop + len(chunk.power)
-        power[:, start:stop] = chunk.power.T
-    return Noise(power.T, surface.names, density, sound_speed)
-
-
-def extended_chunks(
-    robot: Robot,
-    surface: Surface,
-    q: Real,
-    v: Real,
-    kind: str = "paper",
-    *,
-    density: float = DENSITY,
-    sound_speed: float = SOUND_SPEED,
-    efficiency: float | Sequence[float] | Real | str = 1.0,
-    rate: float | None = None,
-    q_desired: Real | None = None,
-    v_desired: Real | None = None,
-    chunk: int = CHUNK,
-) -> Iterator[Noise]:
-    """Estimate the sound power that each link radiates chunk by chunk, in little memory.
-
-    Chunks of so many samples, put together, are what ``extended`` returns, whatever their length;
-    each is computed when it is taken. All else is as in ``extended``.
-    """
     check_kind(kind)
     check_surface(surface, robot)
     check_motion(robot, q, v)
     check_positive("density", density, "kg/m³")
     check_positive("sound_speed", sound_speed, "m/s")
-    check_positive("chunk", chunk, "samples")
+    if isinstance(efficiency, str) and efficiency != "dipole":
+        raise NoiseModelError(f"efficiency is {efficiency!r}, expected numbers or 'dipole'")
 
-    def motion(q: Real, v: Real, *, base_stationary: bool = False) -> _Motion:
-        if not isinstance(efficiency, str):
-            return _Motion(q, v, None, base_stationary)
-        if efficiency != "dipole":
-            raise NoiseModelError(f"efficiency is {efficiency!r}, expected numbers or 'dipole'")
-        if rate is None:
-            raise NoiseModelError("efficiency 'dipole' needs the rate of the samples, in Hz")
-        check_positive("rate", rate, "Hz")
-        return _Motion(q, v, Dipole(surface, rate=rate, sound_speed=sound_speed), base_stationary)
-
-    motions = [motion(q, v)]
+    motions = [(q, v)]
     if v_desired is not None:
         wanted = q if q_desired is None else q_desired
         check_motion(robot, wanted, v_desired, names=("q_desired", "v_desired"))
         if len(v_desired) != len(v):
             raise NoiseModelError(f"v has {len(v)} samples, v_desired {len(v_desired)}")
-        motions.append(motion(wanted, v_desired, base_stationary=robot.floating_base))
+        if robot.floating_base:
+            v_desired = np.hstack((np.zeros((len(v), 6)), v_desired[:, 6:]))
+        motions.append((wanted, v_desired))
     elif q_desired is not None:
         raise NoiseModelError(
             "q_desired is given and v_desired is not; positions alone radiate nothing"
         )
-    efficiencies = _efficiencies(efficiency, surface)
-
-    def chunks() -> Iterator[Noise]:
-        for start in range(0, len(q), chunk):
-            part = slice(start, start + chunk)
-            first, *more = (one.speeds(robot, surface, part, kind) ** 2 for one in motions)
-            power = sound_power(
-                sum(more, first),
-                surface.area[:, None],
-                efficiency=efficiencies[:, None],
-                density=density,
-                sound_speed=sound_speed,
-            )
-            yield Noise(power.T, surface.names, density, sound_speed)
-
-    return chunks()
+    dipoles: list[Dipole | None] = [None] * len(motions)
+    if isinstance(efficiency, str):
+        if rate is None:
+            raise NoiseModelError("efficiency 'dipole' needs the rate of the samples, in Hz")
+        check_positive("rate", rate, "Hz")
+        dipoles = [Dipole(surface, rate=rate, sound_speed=sound_speed) for _ in motions]
+    each = _efficiencies(efficiency, surface)[:, None]
+    air = {"density": density, "sound_speed": sound_speed}
+    power, stop = np.empty((len(surface.links), len(q))), 0
+    for squares in _squares(robot, surface, motions, kind, CHUNK, dipoles):
+        start, stop = stop, stop + squares.shape[1]
+        power[:, start:stop] = sound_power(squares, surface.area[:, None], efficiency=each, **air)
+    return Noise(power.T, surface.names, density, sound_speed)
 
 
-@dataclass(frozen=True, eq=False)
-class _Motion:
-    """A motion that makes noise.
-
-    Attributes:
-        q: Configurations, shape (samples, nq).
-        v: Velocities, shape (samples, nv).
-        dipole: The filter that it passes, or None.
-        base_stationary: Whether the velocities of the floating base count as 0.
-    """
-
-    q: Real
-    v: Real
-    dipole: Dipole | None
-    base_stationary: bool
-
-    def speeds(self, robot: Robot, surface: Surface, part: slice, kind: str) -> Array:
-        v = self.v[part]
-        if self.base_stationary:
-            v = np.hstack((np.zeros((len(v), 6)), v[:, 6:]))
-        return chunk_speeds(robot, surface, self.q[part], v, kind, self.dipole)
+def _squares(
+    robot: Robot,
+    surface: Surface,
+    motions: Sequence[tuple[Real, Real]],
+    kind: str,
+    chunk: int,
+    dipoles: "Sequence[Dipole | None]" = (None, None),
+) -> Iterator[Array]:
+    """Squared mean speeds of links, summed over motions, chunk by chunk: (links, samples)."""
+    for start in range(0, len(motions[0][0]), chunk):
+        rows = slice(start, start + chunk)
+        first, *more = (
+            chunk_speeds(robot, surface, q[rows], v[rows], kind, dipole) ** 2
+            for (q, v), dipole in zip(motions, dipoles, strict=False)
+        )
+        yield sum(more, first)
 
 
 def _efficiencies(efficiency: float | Sequence[float] | Real | str, surface: Surface) -> Array:
-    """Spell out the efficiency of each link, shape (links,); that of "dipole" is in the motion."""
-    if isinstance(efficiency, str):
-        return np.ones(len(surface.links))
-    each = np.asarray(efficiency, dtype=np.float64)
+    """Efficiency of each link, shape (links,); "dipole" is in the motion instead."""
+    each = np.asarray(1.0 if isinstance(efficiency, str) else efficiency, dtype=np.float64)
     if each.shape not in ((), (len(surface.links),)):
         raise NoiseModelError(
             f"efficiency has shape {each.shape}, expected one number or ({len(surface.links)},)"
@@ -573,21 +467,8 @@ def _middles(run: Run, bins: Index) -> Run:
         if len(valid):
             samples[index] = valid[len(valid) // 2]
 
-    def at(signal: Real | None) -> Real | None:
-        return None if signal is None else signal[samples]
-
-    return Run(
-        time=np.arange(len(samples)) * int(bins[1]) / run.rate,
-        velocity=run.velocity[samples],
-        joint_names=run.joint_names,
-        position=at(run.position),
-        velocity_desired=at(run.velocity_desired),
-        position_desired=at(run.position_desired),
-        desired_joint_names=run.desired_joint_names,
-        valid=run.mask[samples],
-        base_pose=at(run.base_pose),
-        robot=run.robot,
-    )
+    time = np.arange(len(samples)) * int(bins[1]) / run.rate
+    return rows_of(run, samples, time=time, stages={}, effort=None)
 
 
 def _moments(
@@ -645,21 +526,16 @@ def _remarks(run: Run, robot: Robot, surface: Surface) -> Iterator[str]:
 def by_samples(robot: Robot, surface: Surface, run: Run, kind: str, bins: Index) -> Array:
     """Average the power of each link over bins, of any kind; gaps do not count."""
     size = int(bins[1])
-    q_desired, v_desired = robot.desired(run) or (None, None)
-    chunks = extended_chunks(
-        robot,
-        surface,
-        *robot.configuration(run),
-        kind,
-        q_desired=q_desired,
-        v_desired=v_desired,
-        chunk=size * max(1, CHUNK // size),
-    )
+    motions = [robot.configuration(run)]
+    if (wanted := robot.desired(run)) is not None:
+        motions.append(wanted)
     means, start = [], 0
-    for chunk in chunks:
-        counted = run.mask[start : start + len(chunk.power), None]
+    chunk = size * max(1, CHUNK // size)
+    for squares in _squares(robot, surface, motions, kind, chunk):
+        power = sound_power(squares, surface.area[:, None]).T
+        counted = run.mask[start : start + len(power), None]
         firsts = np.arange(0, len(counted), size)
-        energy = np.add.reduceat(chunk.power * counted, firsts, axis=0)
+        energy = np.add.reduceat(power * counted, firsts, axis=0)
         means.append(energy / np.maximum(np.add.reduceat(counted.astype(float), firsts), 1.0))
         start += len(counted)
     return np.concatenate(means)

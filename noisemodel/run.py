@@ -273,17 +273,22 @@ class Run:
 
 
 def part(run: Run, first: int, stop: int, **changes: Any) -> Run:
-    """Samples of a run from a first one to the one after the last, without its blocks.
+    """Samples of a run from a first one to the one after the last, see `rows_of`."""
+    return rows_of(run, slice(first, stop), **changes)
 
-    ``changes`` are other fields of the part, as ``dataclasses.replace`` takes them.
+
+def rows_of(run: Run, rows: slice | NDArray[np.intp], **changes: Any) -> Run:
+    """Some samples of a run, without its blocks.
+
+    ``changes`` are other fields of the result, as ``dataclasses.replace`` takes them.
     """
-    samples = slice(first, stop)
+    signals = {name: getattr(run, name) for name in SAMPLED if name not in changes}
     fields: dict[str, Any] = {
-        name: None if getattr(run, name) is None else getattr(run, name)[samples]
-        for name in SAMPLED
+        name: None if signal is None else signal[rows] for name, signal in signals.items()
     }
-    stages = {name: stage[samples] for name, stage in run.stages.items()}
-    return replace(run, **(fields | {"stages": stages, "blocks": ()} | changes))
+    if "stages" not in changes:
+        fields["stages"] = {name: stage[rows] for name, stage in run.stages.items()}
+    return replace(run, **({"blocks": ()} | fields | changes))
 
 
 def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:

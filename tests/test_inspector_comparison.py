@@ -43,9 +43,7 @@ def test_the_csv_has_a_row_per_robot_and_kind(found, tmp_path):
         rows = list(csv.DictReader(file))
     assert [row["kind"] for row in rows] == [*KINDS, *KINDS]
     assert {row["reference"] for row in rows} == {"normal"}
-    assert float(rows[0]["correlation"]) == pytest.approx(
-        found[0].comparison.correlation[0, 2], abs=1e-4
-    )
+    assert float(rows[0]["correlation"]) == pytest.approx(found[0].correlation[0, 2], abs=1e-4)
     assert sum(float(rows[0][f"share_{term}"]) for term in "ABC") == pytest.approx(1.0, abs=2e-4)
     assert [event.label for event in found[0].events][2] == "jerk"
     assert float(rows[1]["contrast_jerk_db"]) == pytest.approx(found[0].contrast[1, 2], abs=1e-4)

@@ -16,7 +16,6 @@ from noisemodel import (
     Surface,
     UnknownKindError,
     extended,
-    extended_chunks,
     link_twists,
     noise,
     surface_speed,
@@ -107,17 +106,6 @@ def test_desired_motion_adds_its_own_power_with_a_resting_base(solo):
     )
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 40, 1000])
-def test_chunks_put_together_are_the_whole(solo, chunk):
-    robot, surface = solo
-    q, v = motion(robot)
-    whole = extended(robot, surface, q, v, v_desired=v[::-1])
-    chunks = list(extended_chunks(robot, surface, q, v, v_desired=v[::-1], chunk=chunk))
-    assert len(chunks[0].power) == min(chunk, len(q))
-    together = np.concatenate([part.power for part in chunks])
-    assert np.allclose(together, whole.power, rtol=1e-12, atol=1e-15)
-
-
 def test_shares_add_up_link_by_link_and_stretch_by_stretch(solo):
     robot, surface = solo
     noise = extended(robot, surface, *motion(robot))
@@ -147,14 +135,6 @@ def test_a_link_without_geometry_radiates_nothing(tmp_path):
     assert noise.power[:, 1].all()
 
 
-def test_noise_prints_its_level_and_its_loudest_links(solo):
-    robot, surface = solo
-    text = str(extended(robot, surface, *motion(robot)))
-    assert "40 samples, mean sound power" in text
-    assert "dB re 1 pW" in text
-    assert surface.names[0] in text
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -181,14 +161,6 @@ def test_numbers_and_motions_that_cannot_be_are_refused(solo, options, message):
     robot, surface = solo
     with pytest.raises(NoiseModelError, match=message):
         extended(robot, surface, *motion(robot), **options)
-
-
-def test_unknown_kinds_and_chunks_of_nothing_are_refused_before_the_first_chunk(solo):
-    robot, surface = solo
-    with pytest.raises(UnknownKindError, match="no kind 'ABC'"):
-        extended_chunks(robot, surface, *motion(robot), "ABC")
-    with pytest.raises(NoiseModelError, match="chunk is 0 samples, expected a positive number"):
-        extended_chunks(robot, surface, *motion(robot), chunk=0)
 
 
 @pytest.mark.parametrize("distance", [0.0, -1.0, np.nan, np.inf])
@@ -441,14 +413,14 @@ def test_uniform_motion_is_silent_from_the_first_sample_on(tmp_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_chunks_carry_on_with_the_filters_of_the_chunk_before(tmp_path, kind):
+def test_chunks_carry_on_with_the_filters_of_the_chunk_before(tmp_path, kind, monkeypatch):
     robot, surface = slider(tmp_path, SPHERE, BAR)
     q, v = shaking(robot, 130.0, samples=300)
     options = {"efficiency": "dipole", "rate": RATE, "v_desired": v[::-1] ** 3}
     whole = extended(robot, surface, q, v, kind, **options).power
     for chunk in (1, 64):
-        parts = extended_chunks(robot, surface, q, v, kind, chunk=chunk, **options)
-        together = np.concatenate([part.power for part in parts])
+        monkeypatch.setattr(sys.modules["noisemodel.extended"], "CHUNK", chunk)
+        together = extended(robot, surface, q, v, kind, **options).power
         assert np.allclose(together, whole, rtol=1e-9, atol=1e-12 * whole.max())
 
 
@@ -583,29 +555,8 @@ def test_each_link_names_the_joints_that_move_it():
     assert movers["wrist_3_link"] == set(Robot.load("ur5").joint_names)
 
 
-def test_slow_motion_is_no_vibration_and_fast_motion_is():
-    time = np.arange(4000) / 1000
-    valid = np.ones(4000, dtype=bool)
-    slow = np.sin(2 * np.pi * 0.5 * time)[:, None]
-    assert np.abs(vibrating(slow, valid, 1000.0))[100:-100].max() < 0.02
-    fast = np.sin(2 * np.pi * 100 * time)[:, None]
-    np.testing.assert_allclose(vibrating(fast, valid, 1000.0)[100:-100], fast[100:-100], atol=0.02)
-
-
 def test_a_long_run_has_no_more_bins_than_a_short_one():
     assert len(link_noise(arm_run(rate=100.0, seconds=120.0)).time) <= 4001
-
-
-def test_joints_that_are_not_in_the_log_are_assumed_stationary():
-    run = arm_run()
-    part = Run(
-        time=run.time,
-        velocity=run.velocity[:, :5],
-        position=run.position[:, :5],
-        joint_names=run.joint_names[:5],
-        robot="ur5",
-    )
-    assert "Not in the log, assumed stationary: wrist_3_joint" in link_noise(part).remarks[0]
 
 
 SIZE = 20

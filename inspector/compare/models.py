@@ -21,7 +21,7 @@ from inspector.recording.run import writing
 from inspector.recording.unstable import Part
 from inspector.spectrogram import spectrogram
 from inspector.text import cell
-from noisemodel import Comparisons, RobotComparison
+from noisemodel import Comparison, Comparisons
 from noisemodel.extended import vibrating
 from noisemodel.files import refuse_existing, replacing
 from noisemodel.noise import decibel
@@ -69,7 +69,7 @@ def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
         recording.send_recording_name(f"noise models: {', '.join(one.name for one in found)}")
 
 
-def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:
+def levels(one: Comparison, pressure: Array) -> tuple[Array, Array]:
     """Level of each estimate every 10 ms, relative to its own root mean square.
 
     Args:
@@ -89,7 +89,7 @@ def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:
 
 def layout(found: Comparisons) -> Blueprint:
     """Lay out a recording: heat maps and table first, then one tab per robot."""
-    reference = found[0].kinds[found[0].comparison.reference]
+    reference = found[0].kinds[found[0].reference]
     columns, rows = len(found[0].kinds), len(found)
     across, down = (-NAMED[0], CELL[0] * columns), (-NAMED[1], CELL[1] * rows)
     maps: list[tuple[Part, float]] = [
@@ -117,7 +117,7 @@ def cells(found: Comparisons, name: str) -> Array:
     Args:
         name: "correlation" of the envelopes or "distance" of the spectra in [dB], to the reference.
     """
-    return np.stack([getattr(one.comparison, name)[:, one.comparison.reference] for one in found])
+    return np.stack([getattr(one, name)[:, one.reference] for one in found])
 
 
 def shades(numbers: Array, name: str) -> NDArray[np.uint8]:
@@ -172,7 +172,7 @@ def _short(name: str) -> str:
     return stem if len(stem) <= 18 else f"\u2026{stem[-17:]}"
 
 
-def _log(recording: rr.RecordingStream, one: RobotComparison) -> None:
+def _log(recording: rr.RecordingStream, one: Comparison) -> None:
     whole = np.ones(len(one.time), dtype=bool)
     pressures = {"vibration": vibrating(one.pressure.T, whole, one.rate).T, "level": one.pressure}
     shown = dict(zip(one.kinds, colors.of_series(len(one.kinds)), strict=True))
@@ -211,7 +211,7 @@ def _log(recording: rr.RecordingStream, one: RobotComparison) -> None:
     axes.log_right(recording, panel, [Label(0.5, "events")])
 
 
-def _panel(one: RobotComparison, part: str) -> Panel:
+def _panel(one: Comparison, part: str) -> Panel:
     """A panel of a robot, by what lies below the robot's entity."""
     labels = len(dict.fromkeys(event.label for event in one.events))
     events = 20.0 * max(labels, 2) + axes.AXIS
@@ -220,7 +220,7 @@ def _panel(one: RobotComparison, part: str) -> Panel:
     return Panel(f"{_root(one)[1:]}/{part}", height.get(part, HEIGHT))
 
 
-def _robot(one: RobotComparison) -> Part:
+def _robot(one: Comparison) -> Part:
     parts = []
     for part, between in (
         ("events", (0.0, axes.TOP)),
@@ -236,13 +236,13 @@ def _robot(one: RobotComparison) -> Part:
     return unstable.above(*parts, (unstable.tabs(*spectrograms), height), name=_short(one.name))
 
 
-def _spectrogram(one: RobotComparison, kind: str) -> Part:
+def _spectrogram(one: Comparison, kind: str) -> Part:
     panel = _panel(one, f"spectrogram/{kind}")
     plot = unstable.plot("", f"/{panel.name}", between=(0.0, axes.TOP), fixed=True, titled=False)
     return axes.part(panel, plot, name=kind)
 
 
-def _root(one: RobotComparison) -> str:
+def _root(one: Comparison) -> str:
     return f"/{rr.escape_entity_path_part(one.name)}"
 
 

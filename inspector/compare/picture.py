@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inspector.errors import InspectorError
-from noisemodel import Comparisons, RobotComparison
+from noisemodel import Comparison, Comparisons
 from noisemodel.compare import TERMS, medians
 from noisemodel.files import replacing
 from noisemodel.types import Array
@@ -58,7 +58,7 @@ def draw(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
         figure.savefig(temporary, format="png")
 
 
-def _shares(axes: "Axes", found: Sequence[RobotComparison]) -> None:
+def _shares(axes: "Axes", found: Sequence[Comparison]) -> None:
     terms = np.array([_terms(one) for one in found])
     starts = np.cumsum(terms, axis=1) - terms
     for index, (term, color) in enumerate(zip(TERMS, TERM_COLORS, strict=True)):
@@ -79,11 +79,11 @@ def _shares(axes: "Axes", found: Sequence[RobotComparison]) -> None:
     _legend(axes)
 
 
-def _correlations(axes: "Axes", found: Sequence[RobotComparison]) -> None:
-    kinds, reference = found[0].kinds, found[0].comparison.reference
+def _correlations(axes: "Axes", found: Sequence[Comparison]) -> None:
+    kinds, reference = found[0].kinds, found[0].reference
     for number, index in enumerate(_others(found)):
         axes.plot(
-            [one.comparison.correlation[index, reference] for one in found],
+            [one.correlation[index, reference] for one in found],
             np.arange(len(found)),
             MARKERS[number],
             color=COLORS[number],
@@ -97,12 +97,12 @@ def _correlations(axes: "Axes", found: Sequence[RobotComparison]) -> None:
     _legend(axes)
 
 
-def _spectra(figure: "Figure", found: Sequence[RobotComparison]) -> None:
+def _spectra(figure: "Figure", found: Sequence[Comparison]) -> None:
     """Draw distance over frequency, fixed and floating bases side by side where there are both."""
     groups = [[one for one in found if one.floating_base == floating] for floating in (False, True)]
     groups = [group for group in groups if group]
     panels = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
-    kinds, reference = found[0].kinds, found[0].comparison.reference
+    kinds, reference = found[0].kinds, found[0].reference
     for axes, group in zip(panels, groups, strict=True):
         for number, index in enumerate(_others(found)):
             distance = medians([_by_third(one, index) for one in group])
@@ -131,17 +131,17 @@ def _legend(axes: "Axes") -> None:
     )
 
 
-def _by_third(one: RobotComparison, kind: int) -> Array:
+def _by_third(one: Comparison, kind: int) -> Array:
     """Distance to the reference in each third of an octave, in [dB]; nan where there is none."""
-    squares = one.comparison.distance_by_frequency[kind, one.comparison.reference] ** 2
-    third = np.rint(3.0 * np.log2(np.maximum(one.comparison.frequency, 1.0) / THIRDS[0]))
+    squares = one.distance_by_frequency[kind, one.reference] ** 2
+    third = np.rint(3.0 * np.log2(np.maximum(one.frequency, 1.0) / THIRDS[0]))
     inside = [third == index for index in range(len(THIRDS))]
     return np.array([np.sqrt(squares[at].mean()) if at.any() else np.nan for at in inside])
 
 
-def _others(found: Sequence[RobotComparison]) -> list[int]:
-    return [index for index in range(len(found[0].kinds)) if index != found[0].comparison.reference]
+def _others(found: Sequence[Comparison]) -> list[int]:
+    return [index for index in range(len(found[0].kinds)) if index != found[0].reference]
 
 
-def _terms(one: RobotComparison) -> Array:
-    return np.asarray(one.comparison.terms.sum(axis=0))
+def _terms(one: Comparison) -> Array:
+    return np.asarray(one.terms.sum(axis=0))
