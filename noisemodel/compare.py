@@ -11,18 +11,17 @@ import numpy as np
 
 from noisemodel.errors import (
     GeometryError,
-    MotionError,
     NoiseModelError,
     RobotError,
     RunError,
     UnknownKindError,
 )
-from noisemodel.extended import KINDS, check_motion, chunk_speeds, vibrating
-from noisemodel.noise import CHUNK, check_positive, decibel, simplified, sound_power
+from noisemodel.extended import KINDS, chunk_speeds, vibrating
+from noisemodel.noise import CHUNK, decibel, simplified, sound_power
 from noisemodel.parallel import DIED, Jobs, in_order
 from noisemodel.robot import Robot, is_name, limits_of
 from noisemodel.run import Block, Run, is_robot_file, part, stretches
-from noisemodel.surface import GEOMETRIES, TINY, Surface, check_surface
+from noisemodel.surface import GEOMETRIES, TINY, Surface
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
@@ -61,7 +60,6 @@ GROUP = 3
 NAME = 26
 """Width of a robot's name in print."""
 
-EXCITATION = "excitation"
 SECONDS = 6.0
 RATE = 4000.0
 """Sample rate of the excitation unless another is given, in [Hz]."""
@@ -87,9 +85,6 @@ JERK_DECAY = 0.03
 
 Source: TypeAlias = Robot | Run | Path | str
 """A robot, its listed name or the path of its URDF or MJCF; or a run, or the path of a run file."""
-
-Motion: TypeAlias = Run | tuple[Real, Real] | str
-"""A run, a pair of q and v, or "excitation"."""
 
 Progress: TypeAlias = Callable[..., "Iterable[Comparison | LeftOut]"]
 """Takes an iterable and its length (``total``), and yields its items, as tqdm does."""
@@ -534,7 +529,7 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
         joint_names=robot.joint_names,
         robot=robot.name if is_name(robot.name) else str(robot.path),
         blocks=tuple(blocks),
-        meta={"scenario": EXCITATION, "seed": seed},
+        meta={"scenario": "excitation", "seed": seed},
     )
 
 
@@ -575,76 +570,23 @@ def _motion(time: Array, axes: int, random: "np.random.Generator", rate: float) 
     return velocity
 
 
-@dataclass(frozen=True, eq=False)
-class Moving:
-    """A robot and its motion.
-
-    Attributes:
-        robot: The robot.
-        joints: How many joints the motion has.
-        q: Configurations, shape (samples, nq).
-        v: Velocities, shape (samples, nv).
-        time: Of the samples, shape (samples,), in [s].
-        rate: Sample rate, in [Hz].
-        events: What should stand out.
-        remarks: What is left out or assumed, a sentence each.
-    """
-
-    robot: Robot
-    joints: int
-    q: Real
-    v: Real
-    time: Array
-    rate: float
-    events: tuple[Block, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-
-def moving(source: Source, motion: Motion, *, rate: float | None = None, seed: int = 0) -> Moving:
-    """Read a robot and move it; a run brings its own motion."""
-    if _is_run(source):
-        motion = source if isinstance(source, Run) else Run.load(str(source))
-    if isinstance(motion, Run):
-        return _measured(source, motion)
-    if isinstance(motion, str):
-        remarks: tuple[str, ...] = ()
+def moving(source: Source, seed: int = 0) -> tuple[Robot, Run, tuple[str, ...]]:
+    """A robot, its motion, and what that leaves out, a sentence each."""
+    remarks = []
+    if not _is_run(source):
         try:
-            robot = _robot(source, mimic=True)
+            robot = source if isinstance(source, Robot) else Robot.load(str(source), mimic=True)
         except RobotError:  # a mimic joint may name one that the URDF does not have
-            robot = _robot(source)
-            remarks = ("Its mimic joints cannot be coupled: they move independently.",)
-        run = excitation(robot, seed=seed, rate=RATE if rate is None else rate)
-        return _of_run(robot, run, remarks)
-    robot, (q, v) = _robot(source), motion
-    check_motion(robot, q, v)
-    assert rate is not None
-    return Moving(robot, len(robot.joint_names), q, v, np.arange(len(q)) / rate, rate)
-
-
-def _is_run(source: Source) -> bool:
-    """Whether a source is a run or a run file."""
-    if isinstance(source, Path):
-        return not is_robot_file(source.name)
-    return isinstance(source, Run) or (isinstance(source, str) and source.endswith(".npz"))
-
-
-def _robot(source: Source, *, floating_base: bool | None = None, mimic: bool = False) -> Robot:
-    if isinstance(source, Robot):
-        return source
-    return Robot.load(str(source), floating_base=floating_base, mimic=mimic)
-
-
-def _measured(source: Source, run: Run) -> Moving:
-    """Move a robot as a run did in its longest stretch without gaps."""
-    if _is_run(source) and run.robot is None:
+            robot = Robot.load(str(source))
+            remarks.append("Its mimic joints cannot be coupled: they move independently.")
+        return robot, excitation(robot, seed=seed), tuple(remarks)
+    run = source if isinstance(source, Run) else Run.load(str(source))
+    if run.robot is None:
         raise RunError("the run names no robot; `inspector import --robot` adds one")
     if run.position is None:
         raise RunError("the run has no positions, which the extended noise needs")
     floating = run.base_pose is not None or run.base_velocity is not None
-    robot = _robot(
-        run.robot or "" if _is_run(source) else source, floating_base=True if floating else None
-    )
-    remarks = []
+    robot = Robot.load(run.robot, floating_base=True if floating else None)
     if not run.mask.all():
         parts = stretches(run.mask, len(run.time))
         longest = max(parts, key=lambda each: each.stop - each.start, default=slice(0, 1))
@@ -655,22 +597,21 @@ def _measured(source: Source, run: Run) -> Moving:
     missing = [joint for joint in robot.joint_names if joint not in run.joint_names]
     if missing:
         remarks.append(f"Not in the log, assumed stationary: {', '.join(missing)}.")
-    return _of_run(robot, run, tuple(remarks))
+    return robot, run, tuple(remarks)
 
 
-def _of_run(robot: Robot, run: Run, remarks: tuple[str, ...]) -> Moving:
-    q, v = robot.configuration(run)
-    events = tuple(block for block in run.blocks if block.label != "ok")
-    return Moving(robot, len(run.joint_names), q, v, run.time, run.rate, events, remarks)
+def _is_run(source: Source) -> bool:
+    """Whether a source is a run or a run file."""
+    if isinstance(source, Path):
+        return not is_robot_file(source.name)
+    return isinstance(source, Run) or (isinstance(source, str) and source.endswith(".npz"))
 
 
 def compare(
     robots: Source | Iterable[Source],
     *,
-    motion: Motion = EXCITATION,
     kinds: Sequence[str] = COMPARED,
-    rate: float | None = None,
-    surface: Surface | str = "auto",
+    surface: str = "auto",
     seed: int = 0,
     jobs: Jobs = 1,
     progress: Progress | None = None,
@@ -689,15 +630,10 @@ def compare(
         robots: One or many: a ``Robot``, a name, or the path of a URDF or an MJCF; or a
             ``Run``, or the path of a run file (a ``Path``, or text that ends in ``.npz``), for the
             robot that it names and the motion that it holds. Of a run with gaps the longest stretch
-            without one is compared.
-        motion: What moves the robots that are no runs: a ``Run``; configurations and velocities
-            ``(q, v)`` as Pinocchio has them, shape (samples, nq) and (samples, nv); or
-            "excitation", see `excitation`, for which mimic joints of named robots are coupled.
+            without one is compared. What is no run moves by the `excitation`, for which mimic
+            joints of named robots are coupled.
         kinds: "simplified", or kinds of ``surface_speed``.
-        rate: Sample rate of ``(q, v)``, or of the excitation, where it is 4000 Hz unless given,
-            in [Hz]. A run has its own.
-        surface: The surface of the robot, or the geometry that surfaces are taken from: "visual",
-            "collision", "hull" or "auto".
+        surface: The geometry that surfaces are taken from: "visual", "collision", "hull" or "auto".
         seed: Random seed of the excitation.
         jobs: How many robots to compare at once, or the address of a Dask scheduler.
         progress: Shows the progress; takes an iterable and its length ``total``, and yields the
@@ -708,17 +644,15 @@ def compare(
 
     Raises:
         UnknownKindError: If a kind does not exist.
-        MotionError: If ``q`` or ``v`` are of another shape than the robot's, or not finite.
-        GeometryError: If a geometry does not exist, or one surface is given for many robots.
-        NoiseModelError: If fewer than two kinds are given or one repeats, the motion is none, or
-            a rate is missing or superfluous.
+        GeometryError: If the geometry does not exist.
+        NoiseModelError: If there are no robots, or fewer than two different kinds.
     """
     sources = [robots] if isinstance(robots, Source) else list(robots)
     kinds = (kinds,) if isinstance(kinds, str) else tuple(kinds)
-    _check(sources, motion, kinds, rate, surface, seed)
+    _check(sources, kinds, surface, seed)
     if isinstance(jobs, int) and jobs < 1:
         raise NoiseModelError(f"jobs is {jobs}, expected 1 or more")
-    one = partial(_attempt, motion=motion, rate=rate, seed=seed, kinds=kinds, surface=surface)
+    one = partial(_attempt, seed=seed, kinds=kinds, geometry=surface)
     results: Iterable[Comparison | LeftOut]
     results = in_order(one, sources, jobs=jobs, died=_died)
     found = list(results if progress is None else progress(results, total=len(sources)))
@@ -728,14 +662,7 @@ def compare(
     )
 
 
-def _check(
-    sources: Sequence[Source],
-    motion: Motion,
-    kinds: Sequence[str],
-    rate: float | None,
-    surface: Surface | str,
-    seed: int,
-) -> None:
+def _check(sources: Sequence[Source], kinds: Sequence[str], geometry: str, seed: int) -> None:
     """Refuse what cannot be compared before any work is done."""
     known = (SIMPLIFIED, *KINDS)
     for kind in kinds:
@@ -753,34 +680,11 @@ def _check(
                 f"a robot is of type {type(source).__name__}, expected a Robot, a listed name, the"
                 " path of a URDF, or a run"
             )
-    pair = isinstance(motion, list | tuple) and [np.ndarray] * 2 == [*map(type, motion)]
-    if isinstance(motion, str) and motion != EXCITATION:
-        raise NoiseModelError(
-            f"no built-in motion {motion!r}; there is {EXCITATION};"
-            " expected such a name, a Run, or a pair (q, v)"
-        )
-    if not isinstance(motion, str | Run) and not pair:
-        raise NoiseModelError(
-            f"a motion is of type {type(motion).__name__}, expected a Run, a pair (q, v), or the"
-            f" name of a built-in one: {EXCITATION}"
-        )
-    if rate is not None:
-        check_positive("rate", rate, "Hz")
-        if isinstance(motion, Run) or all(map(_is_run, sources)):
-            raise NoiseModelError(f"a rate of {rate:g} Hz is given, but runs have their own")
-    elif pair:
-        raise NoiseModelError("a motion of q and v needs the rate of its samples, in Hz")
     if seed < 0:
         raise NoiseModelError(f"seed is {seed}, expected 0 or more")
-    if isinstance(surface, Surface):
-        if len(sources) > 1:
-            raise GeometryError(
-                f"one surface for {len(sources)} robots, expected a geometry's name"
-            )
-    elif surface not in GEOMETRIES:
-        raise GeometryError(
-            f"geometry {surface!r} is not known, expected one of {', '.join(GEOMETRIES)}"
-        )
+    if geometry not in GEOMETRIES:
+        listed = ", ".join(GEOMETRIES)
+        raise GeometryError(f"geometry {geometry!r} is not known, expected one of {listed}")
 
 
 def _name(source: Source) -> str:
@@ -794,42 +698,40 @@ def _died(source: Source) -> LeftOut:
 
 
 def _attempt(
-    source: Source,
-    motion: Motion,
-    rate: float | None,
-    seed: int,
-    kinds: Sequence[str],
-    surface: Surface | str,
+    source: Source, seed: int, kinds: Sequence[str], geometry: str
 ) -> Comparison | LeftOut:
     name = _name(source)
     try:
-        return _compare(name, moving(source, motion, rate=rate, seed=seed), kinds, surface)
-    except MotionError as error:  # of a pair, which the caller made
-        raise MotionError(f"{name}: {error}") from error
+        return _compare(name, *moving(source, seed), kinds, geometry)
     except NoiseModelError as error:
         return LeftOut(name, str(error).removeprefix(f"{name}: "))
 
 
 def _compare(
-    name: str, moving: Moving, kinds: Sequence[str], geometry: Surface | str
+    name: str,
+    robot: Robot,
+    run: Run,
+    remarks: tuple[str, ...],
+    kinds: Sequence[str],
+    geometry: str,
 ) -> Comparison:
-    robot, rate = moving.robot, moving.rate
-    check_length(len(moving.q), rate)
-    surface = Surface.of(robot, geometry) if isinstance(geometry, str) else geometry
-    check_surface(surface, robot)
+    rate = run.rate
+    check_length(len(run.time), rate)
+    surface = Surface.of(robot, geometry)
     if not surface.area.any():
         raise GeometryError(f"no link has a surface by geometry {geometry!r}")
-    pressure, power, energy, terms = _estimates(robot, surface, moving.q, moving.v, kinds)
+    pressure, power, energy, terms = _estimates(robot, surface, *robot.configuration(run), kinds)
+    events = tuple(block for block in run.blocks if block.label != "ok")
     window = round(WINDOW * rate)
     squares = spectral_distances([log_spectra(np.sqrt(each), window) for each in power])
     rms = np.sqrt(np.mean(pressure**2, axis=1, keepdims=True))
     return Comparison(
         name=name,
         floating_base=robot.floating_base,
-        joints=moving.joints,
-        time=moving.time,
+        joints=len(run.joint_names),
+        time=run.time,
         rate=rate,
-        events=moving.events,
+        events=events,
         kinds=tuple(kinds),
         links=surface.names,
         links_with_surface=len(surface.names) - len(surface.without_geometry),
@@ -838,8 +740,8 @@ def _compare(
         distance=np.sqrt(squares.mean(axis=2)),
         frequency=np.arange(window // 2 + 1) * rate / window,
         distance_by_frequency=np.sqrt(squares),
-        contrast=contrasts(pressure, moving.time, rate, moving.events),
+        contrast=contrasts(pressure, run.time, rate, events),
         shares=energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY),
         terms=terms,
-        remarks=moving.remarks,
+        remarks=remarks,
     )

@@ -57,14 +57,6 @@ class MeshError(GeometryError):
         super().__init__(f"mesh {mesh}: {problem}")
 
 
-class MissingMeshError(MeshError):
-    """A mesh that the URDF names and that does not exist."""
-
-    def __init__(self, mesh: str | Path, problem: str) -> None:
-        super().__init__(mesh, problem)
-        self.args = (f"{self}; `missing='skip'` leaves it out",)
-
-
 class UnknownRobotError(RobotError):
     """A name that is no listed robot, and no file of one either."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel.errors import MotionError, NoiseModelError, UnknownKindError
-from noisemodel.noise import CHUNK, DENSITY, SOUND_SPEED, Noise, check_positive, sound_power
+from noisemodel.noise import CHUNK, SOUND_SPEED, Noise, check_positive, sound_power
 from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
 from noisemodel.run import Run, rows_of, stretches
 from noisemodel.runfile import AT_ONCE, pieces
@@ -145,14 +145,6 @@ def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q
             )
 
 
-def corner_frequencies(surface: Surface, *, sound_speed: float) -> Array:
-    """Frequency above which each link radiates fully, shape (links,), in [Hz]."""
-    radius = np.sqrt(surface.area / (4.0 * np.pi))
-    with np.errstate(divide="ignore"):
-        corners: Array = np.sqrt(2.0) * sound_speed / (2.0 * np.pi * radius)
-    return corners
-
-
 class Dipole:
     """The radiation of small bodies that oscillate: the lower the frequency, the less.
 
@@ -163,17 +155,15 @@ class Dipole:
     The filter of every link keeps its state from one chunk to the next.
 
     Before its first sample the robot counts as having moved as it does then.
-
-    Args:
-        rate: Sample rate, in [Hz].
-        sound_speed: In [m/s].
     """
 
-    def __init__(self, surface: Surface, *, rate: float, sound_speed: float) -> None:
+    def __init__(self, surface: Surface, rate: float) -> None:
         from scipy.signal import butter
 
-        corners = corner_frequencies(surface, sound_speed=sound_speed)
         sources = np.flatnonzero(surface.area)
+        corners = np.full(len(surface.area), np.inf)
+        radius = np.sqrt(surface.area[sources] / (4.0 * np.pi))
+        corners[sources] = np.sqrt(2.0) * SOUND_SPEED / (2.0 * np.pi * radius)
         small = [link for link in sources if corners[link] >= 0.5 * rate]
         if small:
             named = ", ".join(f"{surface.names[i]} ({corners[i]:.0f} Hz)" for i in small)
@@ -205,8 +195,6 @@ def extended(
     v: Real,
     kind: str = "paper",
     *,
-    density: float = DENSITY,
-    sound_speed: float = SOUND_SPEED,
     efficiency: float | Sequence[float] | Real | str = 1.0,
     rate: float | None = None,
     q_desired: Real | None = None,
@@ -220,8 +208,6 @@ def extended(
         q: Configurations as Pinocchio has them, shape (samples, nq).
         v: Velocities as Pinocchio has them, shape (samples, nv).
         kind: How the mean speed of a surface is taken, see ``surface_speed``.
-        density: Of the air, in [kg/m³].
-        sound_speed: In [m/s].
         efficiency: Radiation efficiency: one for all links, one for each, shape (links,), or
             "dipole", that of a small body that oscillates, by its frequency (see
             `Dipole`). With the kind "normal" that is the physics; the motion that
@@ -244,37 +230,41 @@ def extended(
     check_kind(kind)
     check_surface(surface, robot)
     check_motion(robot, q, v)
-    check_positive("density", density, "kg/m³")
-    check_positive("sound_speed", sound_speed, "m/s")
     if isinstance(efficiency, str) and efficiency != "dipole":
         raise NoiseModelError(f"efficiency is {efficiency!r}, expected numbers or 'dipole'")
 
-    motions = [(q, v)]
-    if v_desired is not None:
-        wanted = q if q_desired is None else q_desired
-        check_motion(robot, wanted, v_desired, names=("q_desired", "v_desired"))
-        if len(v_desired) != len(v):
-            raise NoiseModelError(f"v has {len(v)} samples, v_desired {len(v_desired)}")
-        if robot.floating_base:
-            v_desired = np.hstack((np.zeros((len(v), 6)), v_desired[:, 6:]))
-        motions.append((wanted, v_desired))
-    elif q_desired is not None:
-        raise NoiseModelError(
-            "q_desired is given and v_desired is not; positions alone radiate nothing"
-        )
+    motions = _motions(robot, q, v, q_desired, v_desired)
     dipoles: list[Dipole | None] = [None] * len(motions)
     if isinstance(efficiency, str):
         if rate is None:
             raise NoiseModelError("efficiency 'dipole' needs the rate of the samples, in Hz")
         check_positive("rate", rate, "Hz")
-        dipoles = [Dipole(surface, rate=rate, sound_speed=sound_speed) for _ in motions]
+        dipoles = [Dipole(surface, rate) for _ in motions]
     each = _efficiencies(efficiency, surface)[:, None]
-    air = {"density": density, "sound_speed": sound_speed}
     power, stop = np.empty((len(surface.links), len(q))), 0
     for squares in _squares(robot, surface, motions, kind, CHUNK, dipoles):
         start, stop = stop, stop + squares.shape[1]
-        power[:, start:stop] = sound_power(squares, surface.area[:, None], efficiency=each, **air)
-    return Noise(power.T, surface.names, density, sound_speed)
+        power[:, start:stop] = sound_power(squares, surface.area[:, None], each)
+    return Noise(power.T, surface.names)
+
+
+def _motions(
+    robot: Robot, q: Real, v: Real, q_desired: Real | None, v_desired: Real | None
+) -> list[tuple[Real, Real]]:
+    """The measured motion, and the desired one if there is one, whose base is stationary."""
+    if v_desired is None:
+        if q_desired is not None:
+            raise NoiseModelError(
+                "q_desired is given and v_desired is not; positions alone radiate nothing"
+            )
+        return [(q, v)]
+    wanted = q if q_desired is None else q_desired
+    check_motion(robot, wanted, v_desired, names=("q_desired", "v_desired"))
+    if len(v_desired) != len(v):
+        raise NoiseModelError(f"v has {len(v)} samples, v_desired {len(v_desired)}")
+    if robot.floating_base:
+        v_desired = np.hstack((np.zeros((len(v), 6)), v_desired[:, 6:]))
+    return [(q, v), (wanted, v_desired)]
 
 
 def _squares(
@@ -350,14 +340,9 @@ class LinkNoise:
 def link_noise(
     run: Run, kind: str = "normal", *, geometry: str = "auto", terms: bool = False
 ) -> LinkNoise:
-    """Compute the extended noise of a run.
+    """The extended noise of a run of a known robot, with positions, in bins.
 
-    Args:
-        run: A run of a robot that is known, with positions.
-        kind: "paper", "A", "B", "C", "mean", "rms" or "normal", as ``noisemodel.extended`` has
-            them.
-        geometry: "visual", "collision", "hull" or "auto".
-        terms: Whether to add up the paper's terms A, B and C, one by one.
+    ``kind`` is one of ``KINDS``, ``geometry`` as in `Surface.of`. ``terms`` adds the paper's terms.
     """
     assert run.robot is not None
     floating = True if run.base_pose is not None else None
@@ -404,12 +389,8 @@ def link_noise(
 def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
     """The fast part of a motion: without its running mean over a tenth of a second.
 
-    Args:
-        valid: False in gaps, shape (samples,); no mean reaches over one.
-        rate: Samples per second, in [Hz].
-
-    Returns:
-        What vibrates at 10 Hz and above, and little of what is slower, shape (samples, nv).
+    It holds what vibrates at 10 Hz and above, shape (samples, nv), and little of what is slower.
+    ``valid`` is False in gaps, which no mean reaches over.
     """
     fast = np.zeros(velocity.shape[::-1])
     half = _half(rate)
@@ -548,14 +529,8 @@ def by_moments(
 
     Within a bin of some ten milliseconds the robot hardly moves. With a link's Jacobian J as it
     is in the middle of the bin, < nu' M nu > = < v' J' M J v > = sum_jk (J' M J)_jk < v_j v_k >.
-
-    Args:
-        q: Configuration in the middle of each bin, shape (bins, nq).
-        motions: The motions that take place there: one of ``QUADRATIC``, and mean products of
-            velocities over each bin, shape (bins, nv, nv).
-
-    Returns:
-        For each motion, shape (bins, links), in [W].
+    ``q`` are these configurations, shape (bins, nq). Each motion is one of ``QUADRATIC`` with mean
+    products of velocities, shape (bins, nv, nv), and gets powers, shape (bins, links), in [W].
     """
     jacobians = _jacobians(robot, q)
     # Bins lie next to each other in memory: all of them are worked on at once.
@@ -566,20 +541,15 @@ def by_moments(
             continue
         entries, jacobian = jacobians(int(joint))
         forms = {"normal": link.mean_square_normal, "rms": link.mean_square}
-        projected = {
-            kind: _projected(forms[kind], jacobian) for kind in {kind for kind, _ in motions}
-        }
+        projected = {}  # J' M J, shape (entries, entries, bins)
+        for kind in {kind for kind, _ in motions}:
+            pushed = (forms[kind] @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
+            projected[kind] = np.einsum("ajb,akb->jkb", pushed, jacobian)
         for total, (kind, _), product in zip(power, motions, products, strict=True):
             square = np.einsum("jkb,jkb->b", projected[kind], product[entries[:, None], entries])
             # Rounding may make a square negative.
             total[:, place] = sound_power(np.maximum(square, 0.0), link.area)
     return power
-
-
-def _projected(form: Array, jacobian: Array) -> Array:
-    """J' M J, shape (entries, entries, bins)."""
-    pushed = (form @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
-    return np.asarray(np.einsum("ajb,akb->jkb", pushed, jacobian))
 
 
 def second_moments(velocity: Real, valid: Mask, *, size: int) -> Array:

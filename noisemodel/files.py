@@ -22,7 +22,7 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel.errors import NoiseModelError, OutputError
+from noisemodel.errors import NoiseModelError, OutputError, RobotError
 
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 
@@ -40,6 +40,9 @@ MJCF."""
 
 PREFIX = "NOISE_LIMIT_"
 """Of the environment variables with other limits: ``NOISE_LIMIT_JOINTS=2000``."""
+
+MAX_BYTES = 64 * 2**20
+"""Most bytes of a URDF or an MJCF."""
 
 MAX_DEPTH = 500
 """Most elements of XML within each other, as MuJoCo has it too; parsers that recurse crash on
@@ -211,6 +214,24 @@ def beyond(name: str) -> str:
     return f"the limit is {limit(name)} (--limit {name}=N raises it)"
 
 
+def read_xml(path: Path, kind: str) -> ET.Element:
+    """Root element of a robot's file, a ``kind`` of description."""
+    try:
+        if not path.is_file():
+            raise RobotError(f"{path}: there is no such {kind} file")
+        if path.stat().st_size > MAX_BYTES:
+            raise RobotError(f"{path}: larger than {MAX_BYTES} bytes, no {kind} is")
+        text = path.read_bytes()
+    except OSError as error:
+        raise RobotError(f"{path}: cannot be read ({error.strerror})") from error
+    if not text.strip():
+        raise RobotError(f"{path}: the {kind} is empty")
+    try:
+        return parsed_xml(text)
+    except ValueError as error:
+        raise RobotError(f"{path}: {error}") from error
+
+
 def parsed_xml(text: bytes) -> ET.Element:
     """Root element of XML in any encoding."""
     parser = expat.ParserCreate()
@@ -244,13 +265,9 @@ def parsed_xml(text: bytes) -> ET.Element:
 def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
     """Arrays by a key: from the user's cache if it has them, or else made and kept.
 
-    A cache is a convenience: a file that is damaged, or comes from elsewhere, is made anew, a
-    folder that cannot be written to is left alone. It may be deleted at any time.
-
-    Args:
-        key: All that the arrays depend on, the version of the code that makes them included; also
-            the file's name. Letters, digits and hyphens.
-        make: Makes the arrays; what it raises is passed on, and nothing is kept.
+    The key holds all that the arrays depend on, also the version of the code, in letters, digits
+    and hyphens. A file that is damaged, or comes from elsewhere, is made anew; a folder that cannot
+    be written to is left alone. The cache may be deleted at any time.
     """
     try:
         file = cache_folder() / f"{key}.npz"

@@ -48,13 +48,9 @@ WITHOUT_SURFACE = {"source", "vertices", "lines", "linestrips", "extra"}
 
 
 def read(path: Path) -> Array:
-    """Read a mesh, in the file's own numbers: its unit and its upward axis are ignored.
+    """Triangles of all parts of an STL, OBJ or COLLADA file, shape (triangles, 3 corners, 3).
 
-    Args:
-        path: An STL (binary or ASCII), OBJ or COLLADA (DAE) file. All of its parts are read.
-
-    Returns:
-        Its triangles, shape (triangles, 3 corners, 3). Polygons are cut into fans.
+    They are in the file's own numbers: its unit and its upward axis are ignored.
     """
     data = _content(path)
     if path.suffix.lower() == ".stl":  # as fast as what would be kept of it

@@ -27,11 +27,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from noisemodel.errors import RobotError
-from noisemodel.files import beyond, limit, parsed_xml
+from noisemodel.files import beyond, limit, read_xml
 from noisemodel.types import Array
 from noisemodel.urdf import (
     HINT,
-    MAX_BYTES,
     LinkShape,
     Mimic,
     box,
@@ -96,12 +95,9 @@ def is_mjcf(path: Path) -> bool:
 
 
 def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -> Mjcf:
-    """Read an MJCF.
+    """Read an MJCF; the files that it names have to lie in the folders ``roots``.
 
-    Args:
-        roots: Folders that the files it names have to lie in.
-        floating_base: Whether the base moves freely; None as in the file, where a free joint that
-            comes first says so.
+    The base floats by ``floating_base``, or where a free joint comes first if that is None.
     """
     folders = _check(path, roots)
     try:
@@ -117,10 +113,11 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
     for name in ("qpos0", "body_pos", "body_quat", "jnt_pos", "jnt_axis", "geom_pos", "geom_size"):
         if not np.isfinite(getattr(compiled, name)).all():
             raise RobotError(f"{path}: {name} of the compiled model is not finite")
-    drawn, triangles = [], 0
+    drawn = {}
+    triangles = 0
     for geom in range(compiled.ngeom):
         if (shape := _shape(compiled, geom, meshes.get(geom))) is not None:
-            drawn.append((geom, shape))
+            drawn[geom] = shape
             triangles += 0 if isinstance(shape.body, str) else len(shape.body)
             if triangles > limit("triangles"):
                 raise RobotError(
@@ -132,8 +129,8 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
         model=model,
         floating_base=floating,
         mimics=dict(_mimics(compiled)),
-        visual=tuple(shape for geom, shape in drawn if geom in visual),
-        collision=tuple(shape for geom, shape in drawn if _collides(compiled, geom)),
+        visual=tuple(shape for geom, shape in drawn.items() if geom in visual),
+        collision=tuple(shape for geom, shape in drawn.items() if _collides(compiled, geom)),
     )
 
 
@@ -162,7 +159,7 @@ def _parts(path: Path, roots: Sequence[Path]) -> Iterator[tuple[Path, ET.Element
     waiting, known = [path], {path.resolve()}
     while waiting:
         part = waiting.pop()
-        root = _parsed(part)
+        root = read_xml(part, "MJCF")
         if part == path and root.tag != "mujoco":
             raise RobotError(f"{path}: not an MJCF, its root is <{root.tag}>, expected <mujoco>")
         yield part, root
@@ -177,23 +174,6 @@ def _parts(path: Path, roots: Sequence[Path]) -> Iterator[tuple[Path, ET.Element
                 waiting.append(found[0])
         if len(known) > MAX_INCLUDED:
             raise RobotError(f"{path}: includes more than {MAX_INCLUDED} files")
-
-
-def _parsed(path: Path) -> ET.Element:
-    try:
-        if not path.is_file():
-            raise RobotError(f"{path}: there is no such MJCF file")
-        if path.stat().st_size > MAX_BYTES:
-            raise RobotError(f"{path}: larger than {MAX_BYTES} bytes, no MJCF is")
-        text = path.read_bytes()
-    except OSError as error:
-        raise RobotError(f"{path}: cannot be read ({error.strerror})") from error
-    if not text.strip():
-        raise RobotError(f"{path}: the MJCF is empty")
-    try:
-        return parsed_xml(text)
-    except ValueError as error:
-        raise RobotError(f"{path}: {error}") from error
 
 
 def _inside(path: Path, named: str, file: Path, roots: Sequence[Path]) -> None:
@@ -244,11 +224,7 @@ def _compiled(path: Path, folders: Sequence[Path]) -> tuple[Any, Meshes]:
 
 
 def compile_here(names: Sequence[str]) -> None:
-    """What the process of `_compiled` does: limit itself, compile, write the result beside it.
-
-    Args:
-        names: The MJCF, and the folders of its files.
-    """
+    """What the process of `_compiled` does with the names of an MJCF and of its files' folders."""
     import resource
 
     import mujoco
@@ -430,24 +406,30 @@ def _shape(compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None) -> L
     body = int(compiled.geom_bodyid[geom])
     x, y, z = compiled.geom_size[geom].tolist()
     matrix, shift = np.eye(3), np.zeros(3)
-    drawn: str | Array | None = None
-    kind = compiled.geom_type[geom]
-    if mesh is not None:
-        drawn, matrix, shift = mesh
-    elif kind == mjtGeom.mjGEOM_MESH:  # written in the file itself
-        drawn = _mesh(compiled, int(compiled.geom_dataid[geom]))
-    elif kind == mjtGeom.mjGEOM_SPHERE:
-        drawn = sphere(x)
-    elif kind == mjtGeom.mjGEOM_ELLIPSOID:
-        drawn = sphere(1.0) * (x, y, z)
-    elif kind == mjtGeom.mjGEOM_CAPSULE:
-        drawn = capsule(x, 2 * y)
-    elif kind == mjtGeom.mjGEOM_CYLINDER:
-        drawn = cylinder(x, 2 * y)
-    elif kind == mjtGeom.mjGEOM_BOX:
-        drawn = box(2 * x, 2 * y, 2 * z)
-    if body == 0 or drawn is None:
-        return None
+    drawn: str | Array
+    match mjtGeom(compiled.geom_type[geom]):
+        case _ if body == 0:
+            return None
+        case _ if mesh is not None:
+            drawn, matrix, shift = mesh
+        case mjtGeom.mjGEOM_MESH:  # written in the file itself
+            index = int(compiled.geom_dataid[geom])
+            first, count = compiled.mesh_vertadr[index], compiled.mesh_vertnum[index]
+            points = compiled.mesh_vert[first : first + count].astype(np.float64)
+            first, count = compiled.mesh_faceadr[index], compiled.mesh_facenum[index]
+            drawn = points[compiled.mesh_face[first : first + count]]
+        case mjtGeom.mjGEOM_SPHERE:
+            drawn = sphere(x)
+        case mjtGeom.mjGEOM_ELLIPSOID:
+            drawn = sphere(1.0) * (x, y, z)
+        case mjtGeom.mjGEOM_CAPSULE:
+            drawn = capsule(x, 2 * y)
+        case mjtGeom.mjGEOM_CYLINDER:
+            drawn = cylinder(x, 2 * y)
+        case mjtGeom.mjGEOM_BOX:
+            drawn = box(2 * x, 2 * y, 2 * z)
+        case _:
+            return None
     turn = _rotation(compiled.geom_quat[geom])
     return LinkShape(
         link=_body_name(compiled, body),
@@ -456,14 +438,6 @@ def _shape(compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None) -> L
         body=drawn,
         colour=_colour(compiled, geom),
     )
-
-
-def _mesh(compiled: Any, mesh: int) -> Array:
-    first, count = compiled.mesh_vertadr[mesh], compiled.mesh_vertnum[mesh]
-    points = compiled.mesh_vert[first : first + count].astype(np.float64)
-    first, count = compiled.mesh_faceadr[mesh], compiled.mesh_facenum[mesh]
-    triangles: Array = points[compiled.mesh_face[first : first + count]]
-    return triangles
 
 
 def _colour(compiled: Any, geom: int) -> tuple[float, ...]:

@@ -18,14 +18,8 @@ SOUND_SPEED = 343.2
 REFERENCE_POWER = 1e-12
 """0 dB of sound power, in [W]."""
 
-REFERENCE_PRESSURE = 20e-6
-"""0 dB of sound pressure, in [Pa]."""
-
 LOUDEST = 5
 """Links that are printed by name."""
-
-NORMS = ("noise", "measured", "desired", "error")
-"""What `norms` can give."""
 
 CHUNK = 4096
 """Samples that are worked on at once: few enough for the cache, with little overhead of Python."""
@@ -140,14 +134,10 @@ class Noise:
     Attributes:
         power: Sound power of each link, shape (samples, links), in [W].
         names: The links.
-        density: Of the air, in [kg/m³].
-        sound_speed: In [m/s].
     """
 
     power: Array
     names: tuple[str, ...]
-    density: float = DENSITY
-    sound_speed: float = SOUND_SPEED
 
     @property
     def total(self) -> Array:
@@ -172,21 +162,10 @@ class Noise:
             NoiseModelError: If ``distance`` is not positive.
         """
         check_positive("distance", distance, "m")
-        impedance = self.density * self.sound_speed
+        impedance = DENSITY * SOUND_SPEED
         # p = sqrt(P rho c / (4 pi d²)), Sygulla & Rixen, Sec. II-A
         pressure: Array = np.sqrt(self.total * impedance / (4.0 * np.pi * distance**2))
         return pressure
-
-    def pressure_level(self, distance: float) -> Array:
-        """Level of the sound pressure, shape (samples,), in [dB re 20 µPa]; -inf in silence.
-
-        Args:
-            distance: From the robot, in [m].
-
-        Raises:
-            NoiseModelError: If ``distance`` is not positive.
-        """
-        return 2.0 * decibel(self.pressure(distance) / REFERENCE_PRESSURE)
 
     def shares(self, stretches: Sequence[tuple[int, int]] | None = None) -> Array:
         """Share of each link in the energy that the robot radiates in stretches of time.
@@ -201,7 +180,12 @@ class Noise:
             NoiseModelError: If a stretch is empty or outside of the samples.
         """
         stretches = [(0, len(self.power))] if stretches is None else stretches
-        check_stretches(stretches, len(self.power))
+        for start, stop in stretches:
+            if not 0 <= start < stop <= len(self.power):
+                raise NoiseModelError(
+                    f"a stretch from sample {start} to {stop}, expected one within 0 to"
+                    f" {len(self.power)}"
+                )
         parts = [self.power[start:stop].sum(axis=0) for start, stop in stretches]
         energy = np.array(parts).reshape(len(stretches), len(self.names))
         whole = energy.sum(axis=1, keepdims=True)
@@ -216,39 +200,19 @@ class Noise:
         return "\n".join([*lines, *(f"{self.names[i]:28} {share[i]:6.1%}" for i in loudest)])
 
 
-def sound_power(
-    mean_square: Array,
-    area: Array | float,
-    *,
-    efficiency: Array | float = 1.0,
-    density: float = DENSITY,
-    sound_speed: float = SOUND_SPEED,
-) -> Array:
+def sound_power(mean_square: Array, area: Array | float, efficiency: Array | float = 1.0) -> Array:
     """Sound power that surfaces radiate, in [W], of shapes that broadcast.
 
-    Args:
-        mean_square: Mean-square speed of each surface, in [m²/s²].
-        area: Of each surface, in [m²].
-        density: Of the air, in [kg/m³].
-        sound_speed: In [m/s].
+    ``mean_square`` speeds are in [m²/s²], areas in [m²].
     """
     # P_i = rho c sigma_i S_i v_i², Sygulla & Rixen, Sec. II-A
-    return np.asarray(density * sound_speed * efficiency * area * mean_square)
+    return np.asarray(DENSITY * SOUND_SPEED * efficiency * area * mean_square)
 
 
 def decibel(ratio: Array) -> Array:
     """Express ratios of powers in [dB]; 0 is -inf."""
     with np.errstate(divide="ignore"):
         return np.asarray(10.0 * np.log10(ratio))
-
-
-def check_stretches(stretches: Sequence[tuple[int, int]], samples: int) -> None:
-    """Refuse stretches of time that are empty or outside of the samples."""
-    for start, stop in stretches:
-        if not 0 <= start < stop <= samples:
-            raise NoiseModelError(
-                f"a stretch from sample {start} to {stop}, expected one within 0 to {samples}"
-            )
 
 
 def check_positive(name: str, value: float, unit: str) -> None:

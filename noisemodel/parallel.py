@@ -67,11 +67,9 @@ def as_done(
 ) -> Iterator[tuple[int, Result]]:
     """Results of a function as they are ready.
 
-    Args:
-        jobs: Number of processes; 1 is this one, which nothing survives. Or the address of a Dask
-            scheduler, ``tcp://HOST:PORT``.
-        died: The result of an item with which a process died; it may raise.
-        work: About how long all items take one after the other, in [s].
+    ``jobs`` is the number of processes, of which 1 is this one, or the address of a Dask scheduler,
+    ``tcp://HOST:PORT``. ``died`` makes the result of an item with which a process died, or raises.
+    ``work`` is about how long all items take one after the other, in [s].
     """
     if isinstance(jobs, str):
         if items:

@@ -1,5 +1,6 @@
 """A recorder for a loop of one's own: samples are pushed one by one and become a run."""
 
+from array import array
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -25,9 +26,6 @@ from noisemodel.types import Array, Mask
 Values: TypeAlias = ArrayLike | Mapping[str, float]
 
 WIDTHS = {"base_pose": 7, "base_velocity": 6, "time": 1}
-FIRST_SAMPLES = 1024
-"""Samples that there is room for at first; the room doubles when it is full."""
-
 GAP = 5.0
 """Length of a step, in median ones, above which it is a gap."""
 
@@ -73,8 +71,8 @@ class Recorder:
         desired_joint_names: Sequence[str] = (),
         meta: Mapping[str, Any] | None = None,
     ) -> None:
-        if not 1 / LONGEST <= rate <= 1 / SHORTEST:
-            low, high = 1 / LONGEST, 1 / SHORTEST
+        low, high = 1 / LONGEST, 1 / SHORTEST
+        if not low <= rate <= high:
             raise RunError(f"rate: {rate:g} Hz, expected {low:g} Hz to {high:g} Hz")
         known: tuple[str, ...] = ()
         self._robot: str | None = None
@@ -88,7 +86,7 @@ class Recorder:
         self._rate, self._path, self._meta = float(rate), path, dict(meta or {})
         self._joints = tuple(joint_names) or known
         self._desired = tuple(desired_joint_names) or self._joints
-        self._buffers: dict[str, Array] = {}
+        self._values: dict[str, array[float]] = {}  # row after row
         self._count = 0
 
     def __len__(self) -> int:
@@ -137,17 +135,8 @@ class Recorder:
             name: self._row(name, values) for name, values in given.items() if values is not None
         }
         self._check(rows)
-        if self._count == 0:
-            self._buffers = {
-                name: np.empty((FIRST_SAMPLES, len(row))) for name, row in rows.items()
-            }
-        elif self._count == len(next(iter(self._buffers.values()))):
-            self._buffers = {
-                name: np.concatenate((each, np.empty_like(each)))
-                for name, each in self._buffers.items()
-            }
         for name, row in rows.items():
-            self._buffers[name][self._count] = row
+            self._values.setdefault(name, array("d")).frombytes(row.tobytes())
         self._count += 1
 
     def run(self) -> Run:
@@ -162,7 +151,9 @@ class Recorder:
         if self._count < 2:
             samples = f"{self._count or 'no'} sample{'' if self._count == 1 else 's'}"
             raise RunError(f"the recorder has {samples}, a run needs at least 2: push some first")
-        signals = {name: each[: self._count].copy() for name, each in self._buffers.items()}
+        signals = {
+            name: np.array(each).reshape(self._count, -1) for name, each in self._values.items()
+        }
         valid = np.logical_and.reduce([np.isfinite(each).all(axis=1) for each in signals.values()])
         if not valid.any():
             raise RunError("every sample of the recorder has a value that is not finite")
@@ -225,22 +216,18 @@ class Recorder:
         names = known = self._desired if name.endswith("_desired") else known
         if isinstance(values, Mapping):
             names = known or tuple(values)
-            for joint in values:
-                if joint not in names:
-                    raise RunError(
-                        f"{name}: no joint {joint!r}{hint(joint, names)};"
-                        f" expected {', '.join(names)}"
-                    )
+            if unknown := [joint for joint in values if joint not in names]:
+                close, listed = hint(unknown[0], names), ", ".join(names)
+                raise RunError(f"{name}: no joint {unknown[0]!r}{close}; expected {listed}")
             if missing := [joint for joint in names if joint not in values]:
                 raise RunError(
                     f"{name}: missing for {', '.join(missing)}; joint_names=… names fewer"
                 )
-            row = np.array([values[joint] for joint in names], dtype=np.float64)
-        else:
-            try:
-                row = np.asarray(values, dtype=np.float64)
-            except (TypeError, ValueError) as error:
-                raise RunError(f"{name}: {values!r}, expected a number for each joint") from error
+            values = [values[joint] for joint in names]
+        try:
+            row = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise RunError(f"{name}: {values!r}, expected a number for each joint") from error
         width = WIDTHS.get(name, len(names))
         if row.ndim != 1 or (width and len(row) != width):
             what = f"({', '.join(names[:10])}{', …' if len(names) > 10 else ''})" if names else ""
@@ -262,12 +249,11 @@ class Recorder:
             has = ", ".join(rows) or "nothing"
             raise RunError(f"velocity: missing, and position too; the sample has {has}")
         if self._count:
-            for name in self._buffers.keys() - rows.keys():
-                raise RunError(f"{name}: missing in sample {sample}; push it each time or never")
-            for name in rows.keys() - self._buffers.keys():
-                raise RunError(f"{name}: new in sample {sample}; push it each time or never")
+            for name in sorted(self._values.keys() ^ rows.keys()):
+                how = "missing" if name in self._values else "new"
+                raise RunError(f"{name}: {how} in sample {sample}; push it each time or never")
             if "time" in rows:
-                before, now = self._buffers["time"][self._count - 1, 0], rows["time"][0]
+                before, now = self._values["time"][-1], rows["time"][0]
                 if now <= before:
                     how = "stands still" if now == before else "runs backwards"
                     raise RunError(
@@ -290,21 +276,16 @@ class Recorder:
         known = stamps[valid]
         edges = [0, *(np.flatnonzero(np.diff(known) > GAP * step) + 1), len(known)]
         between = [slice(*each) for each in pairwise(edges)]
-        found = {}
-        reached = np.zeros(len(time), dtype=bool)
+        found, reached = {}, valid
         for name, each in signals.items():
-            kept = _continuous(name, each[valid], between)
-            found[name], reached = resample(known, kept, time, between=between)
+            values = each[valid]
+            for stretch in between:  # angles without turns, quaternions without flips
+                if name.startswith("position"):
+                    values[stretch] = np.unwrap(values[stretch], axis=0)
+                elif name == "base_pose":
+                    values[stretch, 3:] = continuous_quaternions(values[stretch, 3:])
+            found[name], reached = resample(known, values, time, between=between)
         if "base_pose" in found:
             norm = np.linalg.norm(found["base_pose"][:, 3:], axis=1, keepdims=True)
             found["base_pose"][:, 3:] /= np.where(norm > 0, norm, 1.0)
         return time, reached, found
-
-
-def _continuous(name: str, values: Array, between: Sequence[slice]) -> Array:
-    """Angles without turns, and quaternions without flips, stretch by stretch."""
-    for part in between if name.startswith("position") else ():
-        values[part] = np.unwrap(values[part], axis=0)
-    for part in between if name == "base_pose" else ():
-        values[part, 3:] = continuous_quaternions(values[part, 3:])
-    return values

@@ -3,6 +3,7 @@
 import os
 import re
 import tempfile
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -12,7 +13,6 @@ from math import inf, isfinite
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
-from xml.etree import ElementTree as ET
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from noisemodel.errors import (
     UnknownJointError,
     UnknownRobotError,
 )
+from noisemodel.files import MAX_BYTES
 from noisemodel.mjcf import Mjcf
 from noisemodel.run import Run, is_robot_file
 from noisemodel.types import Array, Real
@@ -70,90 +71,18 @@ class Listed:
     floating_base: bool = False
 
 
-FLOATING = {
-    "a1": "a1_description/urdf/a1.urdf",
-    "alexander": "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf",
-    "anymal": "anymal_b_simple_description/robots/anymal.urdf",
-    "anymal_c": "anymal_c_simple_description/urdf/anymal.urdf",
-    "anymal_kinova": "anymal_b_simple_description/robots/anymal-kinova.urdf",
-    "b1": "b1_description/urdf/b1.urdf",
-    "b1_z1": "b1_description/urdf/b1-z1.urdf",
-    "bolt": "bolt_description/robots/bolt.urdf",
-    "borinot": "borinot_description/urdf/borinot_flying_arm_2.urdf",
-    "centauro": "centauro_description/urdf/centauro.urdf",
-    "g1": "g1_description/urdf/g1_29dof_rev_1_0.urdf",
-    "g1_with_hands": "g1_description/urdf/g1_29dof_with_hand_rev_1_0.urdf",
-    "go1": "go1_description/urdf/go1.urdf",
-    "go2": "go2_description/urdf/go2.urdf",
-    "hector": "hector_description/robots/quadrotor_base.urdf",
-    "hextilt": "hextilt_description/urdf/hextilt_flying_arm_5.urdf",
-    "human": "human_description/robots/human.urdf",
-    "hyq": "hyq_description/robots/hyq_no_sensors.urdf",
-    "icub": "icub_description/robots/icub.urdf",
-    "icub_reduced": "icub_description/robots/icub_reduced.urdf",
-    "iris": "iris_description/robots/iris_simple.urdf",
-    "iris_rotors": "iris_description/robots/iris.urdf",
-    "laikago": "laikago_description/urdf/laikago.urdf",
-    "pr2": "pr2_description/urdf/pr2.urdf",
-    "quadruped": "quadruped_description/urdf/quadruped.urdf",
-    "romeo": "romeo_description/urdf/romeo.urdf",
-    "romeo_laas_small": "romeo_description/urdf/romeo_laas_small.urdf",
-    "romeo_small": "romeo_description/urdf/romeo_small.urdf",
-    "simple_humanoid": "simple_humanoid_description/urdf/simple_humanoid.urdf",
-    "simple_humanoid_classical": "simple_humanoid_description/urdf/simple_humanoid_classical.urdf",
-    "solo8": "solo_description/robots/solo.urdf",
-    "solo12": "solo_description/robots/solo12.urdf",
-    "talos": "talos_data/robots/talos_reduced.urdf",
-    "talos_box": "talos_data/robots/talos_reduced_box.urdf",
-    "talos_corrected": "talos_data/robots/talos_reduced_corrected.urdf",
-    "talos_full": "talos_data/robots/talos_full_v2.urdf",
-    "talos_full_box": "talos_data/robots/talos_full_v2_box.urdf",
-}
-FIXED = {
-    "alex_nub_hands": "alex_description/urdf/alex_nub_hands.urdf",
-    "alex_psyonic_hands": "alex_description/urdf/alex_psyonic_hands.urdf",
-    "alex_sake_hands": "alex_description/urdf/alex_sake_hands.urdf",
-    "allegro_left_hand": "allegro_hand_description/urdf/allegro_left_hand.urdf",
-    "allegro_right_hand": "allegro_hand_description/urdf/allegro_right_hand.urdf",
-    "asr_twodof": "asr_twodof_description/urdf/TwoDofs.urdf",
-    "baxter": "baxter_description/urdf/baxter.urdf",
-    "double_pendulum": "double_pendulum_description/urdf/double_pendulum.urdf",
-    "double_pendulum_continuous": (
-        "double_pendulum_description/urdf/double_pendulum_continuous.urdf"
-    ),
-    "double_pendulum_simple": "double_pendulum_description/urdf/double_pendulum_simple.urdf",
-    "finger_edu": "finger_edu_description/robots/finger_edu.urdf",
-    "kinova": "kinova_description/robots/kinova.urdf",
-    "panda": "panda_description/urdf/panda.urdf",
-    "panda_collision": "panda_description/urdf/panda_collision.urdf",
-    "so100": "so_arm_description/urdf/so100.urdf",
-    "so101": "so_arm_description/urdf/so101.urdf",
-    "talos_arm": "talos_data/robots/talos_left_arm.urdf",
-    "tiago": "tiago_description/robots/tiago.urdf",
-    "tiago_dual": "tiago_description/robots/tiago_dual.urdf",
-    "tiago_no_hand": "tiago_description/robots/tiago_no_hand.urdf",
-    "tiago_pro": "tiago_pro_description/robots/tiago_pro.urdf",
-    "ur3": "ur_description/urdf/ur3_robot.urdf",
-    "ur3_empty": "ur_description/urdf/ur3.urdf",
-    "ur3_gripper": "ur_description/urdf/ur3_gripper.urdf",
-    "ur3_limited": "ur_description/urdf/ur3_joint_limited_robot.urdf",
-    "ur5": "ur_description/urdf/ur5_robot.urdf",
-    "ur5_gripper": "ur_description/urdf/ur5_gripper.urdf",
-    "ur5_limited": "ur_description/urdf/ur5_joint_limited_robot.urdf",
-    "ur10": "ur_description/urdf/ur10_robot.urdf",
-    "ur10_limited": "ur_description/urdf/ur10_joint_limited_robot.urdf",
-    "xarm7": "xarm_description/urdf/xarm7.urdf",
-    "z1": "z1_description/urdf/z1.urdf",
-}
-ROBOTS: Mapping[str, Listed] = MappingProxyType(
-    dict(
-        sorted(
-            [(name, Listed(urdf, floating_base=True)) for name, urdf in FLOATING.items()]
-            + [(name, Listed(urdf)) for name, urdf in FIXED.items()]
-        )
-    )
-)
-"""Name to URDF and floating base (the wheel of example-robot-data has data, no Python module)."""
+def _listed() -> Mapping[str, Listed]:
+    tables = tomllib.loads(Path(__file__).with_name("robots.toml").read_text())
+    robots = [
+        (name, Listed(path, base == "floating"))
+        for base in tables
+        for name, path in tables[base].items()
+    ]
+    return MappingProxyType(dict(sorted(robots)))
+
+
+ROBOTS = _listed()
+"""The listed robots by name."""
 
 
 @dataclass(frozen=True)
@@ -215,14 +144,6 @@ class Joint:
             own = np.vstack((self.turn.T @ own[:3], self.turn.T @ own[3:]))
         return self.multiplier * own
 
-    def own_twist(self, velocity: Array) -> Array:
-        """The part of the link's twist that the joint makes, shape (6, samples).
-
-        ``velocity`` is that of the leader for a joint that follows one, shape (nv, samples).
-        """
-        own: Array = self.subspace @ velocity
-        return own
-
     @property
     def turning_axis(self) -> Array | None:
         """The axis that the link turns about, of length 1 or 0 where the joint only slides.
@@ -246,11 +167,11 @@ def _joint(model: Any, index: int) -> Joint:
     matches = [word for pattern, word in KINDS.items() if re.fullmatch(pattern, kind)]
     if not matches:
         raise RobotError(f"joint {model.names[index]!r} is of type {kind}, which is not supported")
-    turn = None
+    turn, rotation = None, placement.rotation.T
     if kind.endswith("Unaligned"):
         subspace = np.ravel(joint.createData().S)  # the joint's twist at unit velocity
         turn = _axes_with_z(subspace[:3] + subspace[3:])
-    rotation = placement.rotation.T if turn is None else turn @ placement.rotation.T
+        rotation = turn @ rotation
     return Joint(
         name=str(model.names[index]),
         kind=matches[0],
@@ -271,7 +192,7 @@ def _shift(rotation: Array, translation: Array) -> Array:
 
 
 def _axes_with_z(axis: Array) -> Array:
-    """Rotate to axes whose z is ``axis``."""
+    """Rotation to axes whose z is ``axis``, shape (3, 3)."""
     z = axis / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
@@ -442,7 +363,7 @@ class Robot:
         return v.T
 
     def _named(self, names: tuple[str, ...]) -> Iterator[tuple[int, Joint]]:
-        """Go through the columns of joints that move by themselves."""
+        """Columns of joints that move by themselves, each with its joint."""
         by_name = {joint.name: joint for joint in self.joints if joint.nv == 1}
         for column, name in enumerate(names):
             if name not in by_name:
@@ -453,15 +374,11 @@ class Robot:
     @property
     def neutral(self) -> Array:
         """The configuration in which every joint is at 0, shape (nq,)."""
+        one = {"floating": 6, "continuous": 0, "planar": 2}  # scalar of a quaternion, or cosine
         q = np.zeros(self.nq)
         for joint in self.joints:
-            if joint.name not in self.mimics:
-                if joint.kind == "floating":
-                    q[joint.first_q + 6] = 1.0
-                elif joint.kind == "continuous":
-                    q[joint.first_q] = 1.0
-                elif joint.kind == "planar":
-                    q[joint.first_q + 2] = 1.0
+            if joint.name not in self.mimics and joint.kind in one:
+                q[joint.first_q + one[joint.kind]] = 1.0
         return q
 
 
@@ -484,15 +401,10 @@ def locate(name: str | Path) -> Path:
 def package_roots(name: str | Path, package_root: str | Path | None = None) -> tuple[Path, ...]:
     """Folders that a robot's meshes are searched in, and outside of which none may lie.
 
-    Of a file that is the nearest folder above it that a ``package://`` address in it names; else
-    the nearest one with a package.xml; else the file's own folder and those of ``BESIDE``. The
-    root of the disk, a home, and what contains a home are never among them.
-
-    Args:
-        name: A listed name, or the path of a URDF or an MJCF: where it lies among the listed
-            robots, their folders are taken.
-        package_root: A further folder; unless given, that of the environment variable
-            ``NOISE_PACKAGE_ROOT``, if any.
+    A listed robot has those of the list. For another file it is the nearest folder above that a
+    ``package://`` address in it names; else the nearest one with a package.xml; else the file's own
+    folder and those of ``BESIDE``. The root of the disk, a home, and what contains a home are never
+    among them. ``package_root``, or the environment variable ``NOISE_PACKAGE_ROOT``, adds one.
     """
     named = package_root or os.environ.get(PACKAGE_ROOT)
     further = () if not named else (Path(named).resolve(),)
@@ -510,7 +422,7 @@ def package_roots(name: str | Path, package_root: str | Path | None = None) -> t
 
 def _own_roots(path: Path) -> tuple[Path, ...]:
     try:
-        text = path.read_bytes() if path.stat().st_size <= urdf.MAX_BYTES else b""
+        text = path.read_bytes() if path.stat().st_size <= MAX_BYTES else b""
         packages = set(PACKAGE.findall(text))
     except OSError as error:
         raise RobotError(f"{path}: cannot be read ({error.strerror})") from error
@@ -563,15 +475,19 @@ def _coupled(
             first_q, first_v = first_q + joint.nq, first_v + joint.nv
     for joint in table:
         if joint.name in mimics:
-            leader, multiplier, offset = _leader(joint.name, mimics, path)
+            leader, multiplier, offset = joint.name, 1.0, 0.0
+            for _ in range(len(mimics) + 1):  # a chain of joints that follow each other
+                if leader in mimics:
+                    mimic = mimics[leader]
+                    offset += multiplier * mimic.offset
+                    leader, multiplier = mimic.joint, multiplier * mimic.multiplier
+            about = f"{path}: joint {joint.name!r} mimics {leader!r}"
+            if leader in mimics:
+                raise RobotError(f"{path}: joint {joint.name!r} mimics itself")
             if leader not in placed:
-                raise RobotError(
-                    f"{path}: joint {joint.name!r} mimics {leader!r}, which is missing"
-                )
+                raise RobotError(f"{about}, which is missing")
             if "continuous" in (joint.kind, placed[leader].kind):
-                raise RobotError(
-                    f"{path}: joint {joint.name!r} mimics {leader!r}; continuous joints cannot"
-                )
+                raise RobotError(f"{about}; continuous joints cannot")
             placed[joint.name] = replace(
                 joint,
                 first_q=placed[leader].first_q,
@@ -580,18 +496,6 @@ def _coupled(
                 offset=offset,
             )
     return tuple(placed[joint.name] for joint in table)
-
-
-def _leader(name: str, mimics: Mapping[str, Mimic], path: Path) -> tuple[str, float, float]:
-    """Follow a chain of mimic joints to the joint that moves by itself."""
-    multiplier, offset = 1.0, 0.0
-    for _ in range(len(mimics) + 1):
-        if name not in mimics:
-            return name, multiplier, offset
-        mimic = mimics[name]
-        multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset
-        name = mimic.joint
-    raise RobotError(f"{path}: joint {name!r} mimics itself")
 
 
 @contextmanager
@@ -664,13 +568,9 @@ def menagerie_path(name: str) -> Path:
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of one joint; infinite where the robot states none.
+    """Lowest and highest position of a joint in [rad] or [m], and its highest speed.
 
-    Attributes:
-        lower: Lowest position, in [rad] or [m].
-        upper: Highest position, in [rad] or [m].
-        velocity: Highest speed, in [rad/s] or [m/s].
-        turns: Whether it turns; a prismatic joint slides.
+    They are infinite where the robot states none.
     """
 
     lower: float = -inf
@@ -693,28 +593,17 @@ def joint_limits(name: str | Path) -> Mapping[str, Limits]:
 
 @lru_cache(maxsize=32)
 def _of_file(name: str, path: Path, modified: int) -> Mapping[str, Limits]:
-    if path.suffix.lower() == ".urdf":
-        joints = urdf.checked(path).findall("joint")
-        found = {
-            joint.get("name", ""): _of_element(joint)
-            for joint in joints
-            if joint.get("type") in SINGLE
-        }
-    else:
-        found = limits_of(Robot.load(name))
+    if path.suffix.lower() != ".urdf":
+        return MappingProxyType(limits_of(Robot.load(name)))
+    found = {}  # without Pinocchio, which takes long to import
+    for joint in urdf.checked(path).findall("joint"):
+        if (kind := joint.get("type", "")) in SINGLE:
+            limit = joint.find("limit")
+            known = {} if limit is None else limit.attrib
+            lower, upper = (_number(known.get(each), 0.0) for each in ("lower", "upper"))
+            velocity = _number(known.get("velocity"), inf)
+            found[joint.get("name", "")] = _limits(kind, lower, upper, velocity)
     return MappingProxyType(found)
-
-
-def _of_element(joint: ET.Element) -> Limits:
-    limit = joint.find("limit")
-    known = {} if limit is None else limit.attrib
-    endless = joint.get("type") == "continuous"
-    return _limits(
-        -inf if endless else _number(known.get("lower"), 0.0),
-        inf if endless else _number(known.get("upper"), 0.0),
-        _number(known.get("velocity"), inf),
-        turns=joint.get("type") != "prismatic",
-    )
 
 
 def limits_of(robot: Robot) -> dict[str, Limits]:
@@ -722,23 +611,19 @@ def limits_of(robot: Robot) -> dict[str, Limits]:
     model, found = robot.model, {}
     for joint in robot.joints:
         if joint.kind in SINGLE:
-            endless = joint.kind == "continuous"
             index = model.getJointId(joint.name)  # followers have places of their own there
-            first_q, first_v = model.idx_qs[index], model.idx_vs[index]
-            found[joint.name] = _limits(
-                -inf if endless else float(model.lowerPositionLimit[first_q]),
-                inf if endless else float(model.upperPositionLimit[first_q]),
-                float(model.velocityLimit[first_v]),
-                turns=joint.kind != "prismatic",
-            )
+            q, v = model.idx_qs[index], model.idx_vs[index]
+            lower, upper = model.lowerPositionLimit[q], model.upperPositionLimit[q]
+            speed = float(model.velocityLimit[v])
+            found[joint.name] = _limits(joint.kind, float(lower), float(upper), speed)
     return found
 
 
-def _limits(lower: float, upper: float, velocity: float, *, turns: bool) -> Limits:
+def _limits(kind: str, lower: float, upper: float, velocity: float) -> Limits:
     """Limits without those that are none: an empty range, or no speed at all."""
-    if not lower < upper or max(abs(lower), abs(upper)) > 1e6:
+    if kind == "continuous" or not lower < upper or max(abs(lower), abs(upper)) > 1e6:
         lower, upper = -inf, inf
-    return Limits(lower, upper, velocity if 0 < velocity < 1e6 else inf, turns)
+    return Limits(lower, upper, velocity if 0 < velocity < 1e6 else inf, kind != "prismatic")
 
 
 def _number(text: str | None, default: float) -> float:
@@ -779,14 +664,7 @@ def link_twists(robot: Robot, q: Real, v: Real) -> Array:
 
 
 def chunk_twists(joints: Sequence[Joint], q: Real, v: Real, *, out: Array) -> None:
-    """Compute the link twists of a few thousand samples.
-
-    Args:
-        q: Configurations, shape (samples, nq).
-        v: Velocities, shape (samples, nv).
-        out: Takes the twists in each joint's axes, shape (njoints, 6, samples),
-            in [m/s] and [rad/s].
-    """
+    """Link twists of a few thousand samples, into ``out`` of shape (njoints, 6, samples)."""
     positions, velocities = (np.ascontiguousarray(a.T, dtype=np.float64) for a in (q, v))
     out[0] = 0.0  # the universe rests
     for index, joint in enumerate(joints, start=1):
@@ -798,7 +676,7 @@ def chunk_twists(joints: Sequence[Joint], q: Real, v: Real, *, out: Array) -> No
         twist = out[index]
         if joint.parent:
             np.matmul(joint.shift, out[joint.parent], out=twist)
-            CARRY[joint.kind](joint.axis, twist, position)
+            _carry(joint, twist, position)
         else:
             twist[:] = 0.0
         twist[joint.moves] += velocity
@@ -807,40 +685,34 @@ def chunk_twists(joints: Sequence[Joint], q: Real, v: Real, *, out: Array) -> No
             twist[3:] = joint.turn.T @ twist[3:]
 
 
-# Each of these takes the twist that the parent carries from the resting joint to the joint as it
-# stands. They work in place: copies of these arrays would cost as much as the sums.
+def _carry(joint: Joint, twist: Array, position: Array) -> None:
+    """From the twist that a parent gives the resting joint to the joint as it stands.
 
-
-def _revolute(axis: int, twist: Array, position: Array) -> None:
-    tangent = np.tan(0.5 * position[0])  # one tangent takes less time than a sine and a cosine
-    double = 2.0 / (1.0 + tangent * tangent)
-    _turn(axis, twist, double - 1.0, double * tangent)
-
-
-def _continuous(axis: int, twist: Array, position: Array) -> None:
-    _turn(axis, twist, *(position / np.hypot(*position)))
-
-
-def _prismatic(axis: int, twist: Array, position: Array) -> None:
-    left, right = (axis + 1) % 3, (axis + 2) % 3
-    twist[left] += twist[3 + right] * position[0]  # v' = v + w x (axis q)
-    twist[right] -= twist[3 + left] * position[0]
-
-
-def _planar(axis: int, twist: Array, position: Array) -> None:
-    x, y, cosine, sine = position
-    twist[0] -= twist[5] * y  # v' = v + w x (x, y, 0)
-    twist[1] += twist[5] * x
-    twist[2] += twist[3] * y - twist[4] * x
-    _turn(axis, twist, cosine, sine)
-
-
-def _floating(_axis: int, twist: Array, position: Array) -> None:
-    origin, vector, scalar = position[:3], position[3:6], position[6]
-    twist[:3] += np.cross(twist[3:], origin, axis=0)
-    for part in (twist[:3], twist[3:]):  # R(q)^T part
-        across = 2 * np.cross(part, vector, axis=0)
-        part += scalar * across + np.cross(across, vector, axis=0)
+    It works in place: copies of these arrays would cost as much as the sums.
+    """
+    left, right = (joint.axis + 1) % 3, (joint.axis + 2) % 3
+    match joint.kind:
+        case "revolute":
+            tangent = np.tan(0.5 * position[0])  # takes less time than a sine and a cosine
+            double = 2.0 / (1.0 + tangent * tangent)
+            _turn(joint.axis, twist, double - 1.0, double * tangent)
+        case "continuous":
+            _turn(joint.axis, twist, *(position / np.hypot(*position)))
+        case "prismatic":
+            twist[left] += twist[3 + right] * position[0]  # v' = v + w x (axis q)
+            twist[right] -= twist[3 + left] * position[0]
+        case "planar":
+            x, y, cosine, sine = position
+            twist[0] -= twist[5] * y  # v' = v + w x (x, y, 0)
+            twist[1] += twist[5] * x
+            twist[2] += twist[3] * y - twist[4] * x
+            _turn(joint.axis, twist, cosine, sine)
+        case "floating":
+            origin, vector, scalar = position[:3], position[3:6], position[6]
+            twist[:3] += np.cross(twist[3:], origin, axis=0)
+            for part in (twist[:3], twist[3:]):  # R(q)^T part
+                across = 2 * np.cross(part, vector, axis=0)
+                part += scalar * across + np.cross(across, vector, axis=0)
 
 
 def _turn(axis: int, twist: Array, cosine: Array, sine: Array) -> None:
@@ -851,12 +723,3 @@ def _turn(axis: int, twist: Array, cosine: Array, sine: Array) -> None:
     left += ahead
     right *= cosine
     right -= back
-
-
-CARRY = {
-    "revolute": _revolute,
-    "continuous": _continuous,
-    "prismatic": _prismatic,
-    "planar": _planar,
-    "floating": _floating,
-}

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from noisemodel import runfile
 from noisemodel.errors import RunError, RunFileError
 from noisemodel.files import beyond, limit
-from noisemodel.runfile import OnDemand, pieces, rows_at_once
+from noisemodel.runfile import OnDemand, either_way, pieces, rows_at_once
 from noisemodel.types import Array, Mask, Real
 
 SAMPLED = (
@@ -194,15 +194,12 @@ class Run:
         base, joints = self.base_velocity, self.velocity
         if base is None:
             return joints
-        if not isinstance(joints, OnDemand) and not isinstance(base, OnDemand):
-            return np.hstack((base, joints))
-        shape = len(joints), base.shape[1] + joints.shape[1]
-        both = OnDemand(
-            shape,
-            np.result_type(base.dtype, joints.dtype),
+        return either_way(
+            (base, joints),
+            (len(joints), base.shape[1] + joints.shape[1]),
             lambda first, stop: np.hstack((base[first:stop], joints[first:stop])),
+            np.result_type(base.dtype, joints.dtype),
         )
-        return cast(Real, both)
 
     def cut(self, start: float, stop: float) -> "Run":
         """The part of the run with ``start <= time < stop``, and all that belongs to it.
@@ -292,13 +289,10 @@ def rows_of(run: Run, rows: slice | NDArray[np.intp], **changes: Any) -> Run:
 
 
 def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
-    """Take the motion of a run piece by piece, each of which fits into memory.
+    """The motion of a run piece by piece, each of which fits into memory.
 
-    The pieces are not checked again: one may be a gap alone. They have the rate and the names of
-    the run, and the fields ``MOTION`` alone.
-
-    Args:
-        samples: Of a piece; what is megabytes unless given.
+    The pieces have the rate and the names of the run, and the fields ``MOTION`` alone. They are not
+    checked again: one may be a gap alone. ``samples`` is their length, megabytes unless given.
     """
     whole: dict[str, Any] = {
         **{name: getattr(run, name) for name in ("joint_names", "desired_joint_names")},
@@ -317,7 +311,7 @@ def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
 
 
 def stretches(valid: Mask | None, samples: int) -> Iterator[slice]:
-    """Go through the stretches between gaps that hold two samples or more."""
+    """Stretches between gaps that hold two samples or more."""
     if valid is None:
         valid = np.ones(samples, dtype=bool)
     edges = [0, *(np.flatnonzero(np.diff(valid)) + 1), samples]
@@ -401,14 +395,10 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
 def _blocks(arrays: Mapping[str, NDArray[Any]]) -> tuple[Block, ...]:
     columns = [arrays.get(f"block_{name}", np.empty(0)) for name in ("start", "stop", "label")]
     if len({column.shape for column in columns}) > 1:
-        raise RunError(
-            "block_start, block_stop and block_label have shapes "
-            + ", ".join(str(column.shape) for column in columns)
-        )
-    return tuple(
-        Block(float(start), float(stop), str(label))
-        for start, stop, label in zip(*columns, strict=True)
-    )
+        shapes = ", ".join(str(column.shape) for column in columns)
+        raise RunError(f"block_start, block_stop and block_label have shapes {shapes}")
+    rows = zip(*columns, strict=True)
+    return tuple(Block(float(start), float(stop), str(label)) for start, stop, label in rows)
 
 
 def _meta(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
@@ -562,11 +552,7 @@ def check_quaternions(pose: Real, valid: Mask) -> None:
 def with_velocities(
     signals: Mapping[str, NDArray[Any]],
 ) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-    """Add the velocities that are missing and can be differentiated.
-
-    Args:
-        signals: Arrays of a run file by name, ``time`` among them.
-    """
+    """Add the velocities that can be differentiated; and how, by the name of each."""
     time, filled = signals["time"], dict(signals)
     valid = signals.get("valid", np.ones(len(time), dtype=bool))
     for velocity, position in SOURCES.items():
@@ -584,16 +570,10 @@ def with_velocities(
 
 
 def joint_velocity(time: Array, position: Real, valid: Mask | None = None) -> Array:
-    """Differentiate joint positions; angles that wrap are made continuous first.
+    """Velocities of joints, shape (samples, joints), from their positions at uniform times.
 
-    Args:
-        time: Uniform, shape (samples,), in [s].
-        position: Shape (samples, joints), in [rad] or [m].
-        valid: False in gaps, shape (samples,).
-
-    Returns:
-        Velocities, shape (samples, joints), in [rad/s] or [m/s]; 0 in gaps and in stretches
-        of a single sample.
+    Angles that wrap are made continuous first. Velocities are 0 in gaps, where ``valid`` is False,
+    and in stretches of a single sample.
     """
     step = median_step(time)
 
@@ -604,16 +584,9 @@ def joint_velocity(time: Array, position: Real, valid: Mask | None = None) -> Ar
 
 
 def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
-    """Differentiate the pose of a floating base.
+    """Linear, then angular velocity of a floating base in its own axes, shape (samples, 6).
 
-    Args:
-        time: Uniform, shape (samples,), in [s].
-        pose: x, y, z and quaternion x, y, z, w, shape (samples, 7), in [m].
-        valid: False in gaps, shape (samples,).
-
-    Returns:
-        Linear, then angular velocity in the base's own axes, shape (samples, 6),
-        in [m/s] and [rad/s].
+    ``pose`` is x, y, z and quaternion x, y, z, w, shape (samples, 7); gaps as in `joint_velocity`.
     """
     step = median_step(time)
     return _by_stretch(lambda values: _body_twist(values.astype(np.float64), step), pose, 6, valid)
@@ -624,21 +597,16 @@ def _by_stretch(
 ) -> Array:
     """Derivative of each stretch between gaps, on demand of a signal on demand."""
 
-    def whole(rows: slice) -> Array:
-        found = np.zeros((rows.stop - rows.start, width))
-        values = signal[rows]
-        for stretch in stretches(None if valid is None else valid[rows], len(found)):
-            found[stretch] = derivative(values[stretch])
-        return found
-
     def rows(first: int, stop: int) -> Array:
         # The fit reaches three samples to each side, and a window at the end of a stretch.
         low, high = max(0, first - WINDOW), min(len(signal), stop + WINDOW)
-        return whole(slice(low, high))[first - low : stop - low]
+        values, around = signal[low:high], None if valid is None else valid[low:high]
+        found = np.zeros((high - low, width))
+        for stretch in stretches(around, len(found)):
+            found[stretch] = derivative(values[stretch])
+        return found[first - low : stop - low]
 
-    if isinstance(signal, OnDemand):
-        return cast(Array, OnDemand((len(signal), width), np.float64, rows))
-    return whole(slice(0, len(signal)))
+    return either_way((signal,), (len(signal), width), rows)
 
 
 def _body_twist(pose: Array, step: float) -> Array:
@@ -655,7 +623,7 @@ def _body_twist(pose: Array, step: float) -> Array:
 
 
 def continuous_quaternions(quaternion: Array) -> Array:
-    """Q and -q are one rotation: of shape (samples, 4), with the sign nearer to the one before."""
+    """Quaternions, shape (samples, 4), each with the sign that is nearer to the one before."""
     flips = np.einsum("si,si->s", quaternion[1:], quaternion[:-1]) < 0
     signs = np.concatenate(([1.0], np.cumprod(np.where(flips, -1.0, 1.0))))
     return np.asarray(quaternion * signs[:, None])
@@ -683,18 +651,15 @@ def resample(
 ) -> tuple[Array, Mask]:
     """Values at other instants: monotone between samples (PCHIP), without overshoot.
 
-    Angles have to be continuous, see ``numpy.unwrap``.
-
     Args:
         stamps: Times of the samples, increasing, shape (samples,), in [s].
-        values: Shape (samples, columns).
+        values: Shape (samples, columns); angles have to be continuous, see ``numpy.unwrap``.
         instants: Increasing, shape (instants,), in [s].
         between: The samples of each stretch between gaps; all are one unless given.
         slack: How far outside of a stretch an instant still belongs to it, in [s].
 
     Returns:
-        Values, 0 in gaps, shape (instants, columns), and whether an instant is in none,
-        shape (instants,).
+        Values, 0 in gaps, shape (instants, columns), and which instants are in no gap.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -737,28 +702,24 @@ def decimated(run: Run, rate: float) -> Run:
     if ratio == 1:
         return run
 
-    def optional(signal: Real | None) -> Real | None:
-        return None if signal is None else _lower(signal, ratio)
-
     time = run.time[0] + np.arange(samples) / rate
     valid = np.ones(samples, dtype=bool)
     for gap in np.flatnonzero(~run.mask).tolist():
         center = int(gap * ratio)
         valid[max(0, center - EDGE) : center + EDGE + 1] = False
-    velocity = _without_gaps(_lower(run.velocity, ratio), valid)
-    return replace(
-        run,
-        time=time,
-        velocity=velocity,
-        velocity_desired=optional(run.velocity_desired),
-        base_velocity=optional(run.base_velocity),
-        stages={name: _lower(stage, ratio) for name, stage in run.stages.items()},
-        position=None,
-        position_desired=None,
-        effort=None,
-        base_pose=None,
-        valid=valid,
+    # Positions, efforts and poses are left out.
+    fields: dict[str, Any] = dict.fromkeys(set(SAMPLED) - {"time", "valid"})
+    for name in ("velocity", "velocity_desired", "base_velocity"):
+        if (signal := getattr(run, name)) is not None:
+            fields[name] = _lower(signal, ratio)
+    lower = fields["velocity"]
+    fields["velocity"] = either_way(
+        (lower,),
+        lower.shape,
+        lambda first, stop: np.where(valid[first:stop, None], lower[first:stop], 0.0),
     )
+    fields["stages"] = {name: _lower(stage, ratio) for name, stage in run.stages.items()}
+    return replace(run, time=time, valid=valid, **fields)
 
 
 def _lower(signal: Real, ratio: Fraction) -> Real:
@@ -789,19 +750,4 @@ def _lower(signal: Real, ratio: Fraction) -> Real:
         edges = [*range(start, stop, size), stop]
         return np.concatenate([block(*each) for each in pairwise(edges)] or [block(start, stop)])
 
-    return cast(Real, OnDemand((samples, signal.shape[1]), np.float64, rows))
-
-
-def _without_gaps(signal: Real, valid: Mask) -> Real:
-    """A signal with zeros in gaps."""
-    if not isinstance(signal, OnDemand):
-        signal[~valid] = 0.0
-        return signal
-    return cast(
-        Real,
-        OnDemand(
-            signal.shape,
-            signal.dtype,
-            lambda first, stop: signal[first:stop] * valid[first:stop, None],
-        ),
-    )
+    return either_way((signal,), (samples, signal.shape[1]), rows)

@@ -12,10 +12,11 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from math import inf, prod
 from pathlib import Path
 from threading import Lock
-from typing import IO, Any, TypeVar, cast
+from typing import IO, Any, cast
 
 import numpy as np
 from numpy.lib import format as npy
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from noisemodel.errors import OutputError, RunFileError, hint
 from noisemodel.files import replacing
+from noisemodel.types import Array
 
 FORMAT = "noise-run/1"
 STAGE = "stage_"
@@ -91,8 +93,6 @@ MARKS = 256
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Those of NumPy; others of zipfile unpack a few bytes to gigabytes at once."""
 
-Result = TypeVar("Result")
-
 
 class ArchiveError(ValueError):
     """A file that is no archive of plain arrays, is damaged, or unpacks to more than is read."""
@@ -147,17 +147,15 @@ def _unread(path: Path, error: OSError | ArchiveError) -> RunFileError:
 
 def _reading(path: Path, array: Any) -> Any:
     """An array that raises RunFileError where it is read from the file."""
-    if not isinstance(array, OnDemand):
-        return array
-    read = array.read
 
     def rows(first: int, stop: int) -> NDArray[Any]:
         try:
-            return read(first, stop)
+            found: NDArray[Any] = array.read(first, stop)
         except (OSError, ArchiveError) as error:
             raise _unread(path, error) from error
+        return found
 
-    return OnDemand(array.shape, array.dtype, rows)
+    return OnDemand(array.shape, array.dtype, rows) if isinstance(array, OnDemand) else array
 
 
 def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
@@ -183,18 +181,14 @@ def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
     """
     with replacing(path, overwrite=overwrite) as temporary:
         try:
-            with temporary.open("wb") as stream:
-                _pack(stream, arrays)
+            with zipfile.ZipFile(temporary, "w", compresslevel=1) as packed:
+                for name, array in arrays.items():
+                    shrinks = _shrinks(array)
+                    packed.compression = zipfile.ZIP_DEFLATED if shrinks else zipfile.ZIP_STORED
+                    with packed.open(f"{name}.npy", "w", force_zip64=True) as member:  # dated 1980
+                        npy.write_array(member, np.asanyarray(array), allow_pickle=False)
         except ValueError as error:
             raise OutputError(f"{path}: cannot be written ({one_line(error)})") from error
-
-
-def _pack(stream: IO[bytes], arrays: Mapping[str, Any]) -> None:
-    with zipfile.ZipFile(stream, "w", compresslevel=1) as packed:
-        for name, array in arrays.items():
-            packed.compression = zipfile.ZIP_DEFLATED if _shrinks(array) else zipfile.ZIP_STORED
-            with packed.open(f"{name}.npy", "w", force_zip64=True) as member:  # dated 1980
-                npy.write_array(member, np.asanyarray(array), allow_pickle=False)
 
 
 def _shrinks(array: Any) -> bool:
@@ -283,6 +277,18 @@ class OnDemand(NDArrayOperatorsMixin):
         return getattr(np.asarray(self), name)
 
 
+def either_way(
+    sources: Iterable[Any],
+    shape: tuple[int, ...],
+    read: Callable[[int, int], NDArray[Any]],
+    dtype: Any = np.float64,
+) -> Array:
+    """What ``read`` computes from arrays: on demand if one of them is so, else at once."""
+    if any(isinstance(source, OnDemand) for source in sources):
+        return cast(Array, OnDemand(shape, dtype, read))
+    return read(0, shape[0])
+
+
 def rows_at_once(array: Any) -> int:
     """Rows of an array that are taken at once: at least one."""
     row: int = array.dtype.itemsize * prod(array.shape[1:])
@@ -299,38 +305,29 @@ def pieces(array: Any, multiple: int = 1) -> Iterator[slice]:
 def read_npz(
     path: Path, names: Collection[str] | None = None, *, on_demand: float = inf
 ) -> dict[str, NDArray[Any]]:
-    """Read the arrays of an .npz file by their names.
+    """Read the arrays of an .npz file with these names, all unless given.
 
-    Args:
-        names: Those that are read, all unless given.
-        on_demand: Larger arrays stay in the file, in bytes: an `OnDemand` stands in for each,
-            unless it has one axis or is packed column by column. They raise ArchiveError or OSError
-            where they are read.
+    Arrays of more than ``on_demand`` bytes stay in the file, unless they have one axis or are
+    packed column by column. They raise ArchiveError or OSError where they are read.
     """
-
-    def arrays(archive: zipfile.ZipFile) -> dict[str, NDArray[Any]]:
-        found = {}
+    found: dict[str, Any] = {}
+    with _opened(path) as archive:
         for member in archive.infolist():
             name = member.filename.removesuffix(".npy")
             if names is None or name in names:
                 with archive.open(member) as stream:
-                    kept = None
-                    if member.file_size > on_demand:
-                        kept = _kept(path, stream, name, member)
+                    large = member.file_size > on_demand
+                    kept: Any = _kept(path, stream, name, member) if large else None
                     if kept is None:
-                        found[name] = read_array(stream, name, member.file_size)
-                    else:
-                        found[name] = cast(NDArray[Any], kept)
-        return found
-
-    return _opened(path, arrays)
+                        kept = read_array(stream, name, member.file_size)
+                    found[name] = kept
+    return found
 
 
 def names_in(path: Path) -> tuple[str, ...]:
     """Names of the arrays of an .npz file; raises as `read_npz`."""
-    return _opened(
-        path, lambda archive: tuple(name.removesuffix(".npy") for name in archive.namelist())
-    )
+    with _opened(path) as archive:
+        return tuple(name.removesuffix(".npy") for name in archive.namelist())
 
 
 def read_array(stream: IO[bytes], name: str, size: int) -> NDArray[Any]:
@@ -463,31 +460,28 @@ def _identity(file: IO[bytes]) -> tuple[int, ...]:
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
-def _opened(path: Path, use: Callable[[zipfile.ZipFile], Result]) -> Result:
+@contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """An archive that unpacks to no more than is read, with names of its own for all arrays."""
     check_regular(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            _check(archive.infolist(), path.stat().st_size)
-            return use(archive)
+            members, seen = archive.infolist(), set()
+            check_unpacked(sum(member.file_size for member in members), path.stat().st_size)
+            for member in members:
+                name = member.filename.removesuffix(".npy")
+                if name in seen:
+                    raise ArchiveError(f"has two arrays named {name!r}")
+                if not name.isprintable():
+                    raise ArchiveError(f"has an array named {name!r}")
+                seen.add(name)
+                if member.compress_type not in METHODS:
+                    raise ArchiveError(f"{name} is compressed by another method than NumPy's")
+            yield archive
     except zipfile.BadZipFile as error:
         raise ArchiveError(one_line(error)) from error
     except DAMAGE as error:
         raise ArchiveError(f"damaged: {one_line(error)}") from error
-
-
-def _check(members: Iterable[zipfile.ZipInfo], packed: int) -> None:
-    members = list(members)
-    check_unpacked(sum(member.file_size for member in members), packed)
-    seen = set()
-    for member in members:
-        name = member.filename.removesuffix(".npy")
-        if name in seen:
-            raise ArchiveError(f"has two arrays named {name!r}")
-        if not name.isprintable():
-            raise ArchiveError(f"has an array named {name!r}")
-        seen.add(name)
-        if member.compress_type not in METHODS:
-            raise ArchiveError(f"{name} is compressed by another method than NumPy's")
 
 
 def check_regular(path: Path) -> None:

@@ -1,24 +1,21 @@
 """The surface of a robot: the triangles of every link that moves, and integrals over them."""
 
 import hashlib
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import Any, Literal, Self, get_args
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel import meshes
-from noisemodel.errors import GeometryError, MeshError, MissingMeshError
+from noisemodel.errors import GeometryError, MeshError
 from noisemodel.files import beyond, cached, limit
 from noisemodel.robot import Robot
 from noisemodel.types import Array, Indices
 from noisemodel.urdf import LinkShape, find_mesh, shapes_in
-
-Missing = Literal["error", "skip"]
 
 GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -58,85 +55,25 @@ ALL: Indices = np.zeros(1, dtype=np.intp)
 """Where the only cell begins, if all points are in one."""
 
 
-@dataclass(frozen=True, eq=False)
-class LinkTriangles:
-    """The triangles of every link that moves; a link is all geometry that moves with one joint.
-
-    What is fixed to the world is left out.
-
-    Attributes:
-        joint: Index of the link's joint in Pinocchio, which is 1 to the last, shape (links,).
-        names: Name of each joint's child link.
-        triangles: The link's triangles in the joint's axes, for each link of shape
-            (triangles, 3 corners, 3), in [m]. Which side of a triangle is outside is not known.
-        kind: What each link was taken from: "visual", "collision", "hull" or "none".
-        missing: Addresses of the meshes that were not found and are left out.
-    """
-
-    joint: Indices
-    names: tuple[str, ...]
-    triangles: tuple[Array, ...]
-    kind: tuple[str, ...]
-    missing: tuple[str, ...]
-
-
-def triangles(
-    robot: Robot, geometry: str = "visual", *, missing: Missing = "error"
-) -> LinkTriangles:
-    """Draw all links of a robot with triangles.
+def triangles(robot: Robot, geometry: str = "visual") -> tuple[Array, ...]:
+    """Draw all links that move with triangles; a link is all geometry that moves with one joint.
 
     Args:
         geometry: "visual" or "collision", as the URDF or MJCF has them; "hull", the convex hull of
             every visual by itself; or "auto", the visual or, of a link that has none, the
             collision.
-        missing: What to do about a mesh that is not there: "error", or "skip" it with a warning.
+
+    Returns:
+        The triangles of each joint's link in the joint's axes, of shape (triangles, 3 corners, 3),
+        in [m]. Which side of a triangle is outside is not known.
     """
-    for name, word, known in (
-        ("geometry", geometry, tuple(GEOMETRIES)),
-        ("missing", missing, get_args(Missing)),
-    ):
-        if word not in known:
-            raise GeometryError(f"{name} {word!r} is not known, expected one of {', '.join(known)}")
-    places, names = _links(robot)
-    mesh = _reader(robot, hull=geometry == "hull")
-    surfaces = [np.empty((0, 3, 3))] * len(names)
-    kinds = ["none"] * len(names)
-    absent: list[str] = []
-    count = 0
-    for use in GEOMETRIES[geometry]:
-        if "none" not in kinds:
-            break
-        pieces: dict[int, list[Array]] = defaultdict(list)
-        for shape in shapes_of(robot, use):
-            joint, rotation, translation = places[shape.link]
-            if joint == 0 or kinds[joint - 1] != "none":
-                continue
-            try:
-                surface = _placed(shape, mesh, rotation, translation)
-            except MissingMeshError as error:
-                if missing == "error":
-                    raise
-                absent.append(error.mesh)
-            else:
-                pieces[joint].append(surface)
-                count = _counted(robot, count, surface)
-        for joint, parts in pieces.items():
-            surfaces[joint - 1] = np.concatenate(parts)
-            kinds[joint - 1] = "hull" if geometry == "hull" else use
-    return LinkTriangles(
-        joint=np.arange(1, len(names) + 1),
-        names=names,
-        triangles=tuple(surfaces),
-        kind=tuple(kinds),
-        missing=tuple(dict.fromkeys(absent)),
-    )
-
-
-def shapes_of(robot: Robot, use: str) -> Sequence[LinkShape]:
-    """The geometry of all links as the URDF or MJCF has it; ``use`` is "visual" or "collision"."""
-    if robot.mjcf is None:
-        return shapes_in(robot.path, use)
-    return robot.mjcf.visual if use == "visual" else robot.mjcf.collision
+    if geometry not in GEOMETRIES:
+        known = ", ".join(GEOMETRIES)
+        raise GeometryError(f"geometry {geometry!r} is not known, expected one of {known}")
+    parts = [[np.empty((0, 3, 3))] for _ in robot.joints]
+    for joint, _, surface in pieces(robot, geometry, world=False):
+        parts[joint - 1].append(surface)
+    return tuple(map(np.concatenate, parts))
 
 
 def link_names(robot: Robot) -> tuple[str, ...]:
@@ -144,45 +81,50 @@ def link_names(robot: Robot) -> tuple[str, ...]:
     return _links(robot)[1]
 
 
-def pieces(robot: Robot) -> Iterator[tuple[int, LinkShape, Array]]:
-    """Draw a robot piece by piece, what is fixed to the world included.
+def pieces(
+    robot: Robot,
+    geometry: str = "auto",
+    *,
+    world: bool = True,
+) -> Iterator[tuple[int, LinkShape, Array]]:
+    """Draw a robot piece by piece.
 
-    Of a link without visual geometry the collision geometry is drawn.
+    Args:
+        geometry: One of ``GEOMETRIES``; each link takes the first of its shapes that it has.
+        world: Whether what is fixed to the world is drawn, too.
 
     Yields:
         Index of the joint that moves a piece in Pinocchio, 0 if none does; the piece as the file
         has it; and its triangles in the joint's axes, shape (triangles, 3 corners, 3), in [m].
     """
-    places, _ = _links(robot)
-    mesh = _reader(robot, hull=False)
-    drawn: set[int] = set()
+    places, names = _links(robot)
+    read = meshes.hull if geometry == "hull" else meshes.read
+    mesh = cache(  # left and right often share one
+        lambda address: read(find_mesh(address, robot.path, robot.package_roots))
+    )
+    waiting = set(range(0 if world else 1, len(names) + 1))
     count = 0
-    for use in GEOMETRIES["auto"]:
-        parts = [(*places[shape.link], shape) for shape in shapes_of(robot, use)]
-        parts = [part for part in parts if part[0] not in drawn]
-        for joint, rotation, translation, shape in parts:
+    for use in GEOMETRIES[geometry]:
+        drawn = set()
+        if robot.mjcf is not None:
+            shapes = robot.mjcf.visual if use == "visual" else robot.mjcf.collision
+        else:
+            shapes = tuple(shapes_in(robot.path, use)) if waiting else ()
+        for shape in shapes:
+            joint, rotation, translation = places[shape.link]
+            if joint not in waiting:
+                continue
             surface = _placed(shape, mesh, rotation, translation)
-            count = _counted(robot, count, surface)
+            count += len(surface)  # a mesh counts as often as it is drawn
+            if count > limit("triangles"):
+                raise GeometryError(f"{robot.path}: too many triangles, {beyond('triangles')}")
+            drawn.add(joint)
             yield joint, shape, surface
-        drawn |= {part[0] for part in parts}
-
-
-def _reader(robot: Robot, *, hull: bool) -> Callable[[str], Array]:
-    """Reads meshes by their addresses, each once: left and right often share one."""
-    read = meshes.hull if hull else meshes.read
-    return cache(lambda address: read(find_mesh(address, robot.path, robot.package_roots)))
-
-
-def _counted(robot: Robot, count: int, surface: Array) -> int:
-    """Count the triangles of a robot; a mesh counts as often as it is drawn."""
-    count += len(surface)
-    if count > limit("triangles"):
-        raise GeometryError(f"{robot.path}: too many triangles, {beyond('triangles')}")
-    return count
+        waiting -= drawn
 
 
 def _links(robot: Robot) -> tuple[dict[str, tuple[int, Array, Array]], tuple[str, ...]]:
-    """Joint that moves each link of the robot, the link's pose there, and the links' names."""
+    """Joint that moves each link, with the link's pose there, and the child link of each joint."""
     from pinocchio import FrameType
 
     bodies = [frame for frame in robot.model.frames if frame.type == FrameType.BODY]
@@ -246,7 +188,7 @@ def moments(triangles: Array) -> Moments:
 
 
 def _faces(triangles: Array) -> tuple[Array, Array, Array]:
-    """Leave out triangles without area; add areas, in [m²], and unit normals, shape (n, 3)."""
+    """Triangles that have an area, their areas, in [m²], and unit normals, shape (n, 3)."""
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     double = np.linalg.norm(across, axis=1)
     real = double > 0.0
@@ -309,10 +251,9 @@ def fine(triangles: Array) -> Cloud:
 
 
 def _on_triangle(along: int, across: int) -> tuple[Array, Array]:
-    """Place points on lines through the first corner: two by two (Gauss) in each panel.
+    """Points on lines through the first corner, two by two (Gauss) in each panel.
 
-    Returns:
-        Shares of the three corners in each point, shape (points, 3), and weights of sum 1.
+    They are shares of the three corners, shape (points, 3), with weights of sum 1.
     """
     gauss = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
     far = ((np.arange(along)[:, None] + gauss) / along).ravel()[:, None]
@@ -339,15 +280,7 @@ def reduced(cloud: Cloud, *, halvings: int) -> Cloud:
 
 
 def point_speeds(points: Array, twists: Array) -> Array:
-    """Speed of points on a body that moves with a twist.
-
-    Args:
-        points: Shape (points, 3), in [m].
-        twists: Linear, then angular velocity, shape (6, samples), in [m/s] and [rad/s].
-
-    Returns:
-        Shape (points, samples), in [m/s].
-    """
+    """Speed of points, shape (points, 3), under twists, shape (6, samples): (points, samples)."""
     (x, y, z), (vx, vy, vz, wx, wy, wz) = points.T, twists
     # |v + w x r|² = |v|² + 2 r.(v x w) + |w|²|r|² - (w.r)²: one product of matrices for all
     shape = [np.ones_like(x), 2 * x, 2 * y, 2 * z, y * y + z * z, x * x + z * z, x * x + y * y]
@@ -381,7 +314,7 @@ def _cells(cloud: Cloud, halvings: int) -> tuple[Array, Array, Indices]:
 
 
 def _plumper(cloud: Cloud) -> Array:
-    """Find axes in which the cloud's lengths are to each other as their square roots are."""
+    """Axes in which the cloud's lengths are to each other as their square roots are."""
     _, (covariance,) = _statistics(cloud.points, cloud.weights, ALL)
     spread, axes = np.linalg.eigh(covariance)
     plumper: Array = axes / np.maximum(spread, SLENDEREST**2 * spread[2]) ** 0.25
@@ -406,15 +339,10 @@ def _cell(starts: Indices, points: int) -> Indices:
 
 
 def rounding(inertia: Array) -> Array:
-    """Find the axes in which rotations of equal size have the same root-mean-square speed.
+    """Axes in which rotations of equal size have the same root-mean-square speed.
 
-    In these axes a slender link is as round as a ball, so that one table fits all.
-
-    Args:
-        inertia: Mean-square speed of unit rotations, w' J w, shape (3, 3), in [m²].
-
-    Returns:
-        The matrix U with |U w|² = w' J w, shape (3, 3), in [m].
+    In these axes a slender link is as round as a ball, so that one table fits all. ``inertia`` is J
+    of the mean-square speed w' J w, in [m²]; the result is U with |U w|² = w' J w, in [m].
     """
     spread, axes = np.linalg.eigh(inertia)
     lengths = np.sqrt(np.maximum(spread, np.finfo(np.float64).eps * spread[2]))  # of a needle
@@ -422,11 +350,10 @@ def rounding(inertia: Array) -> Array:
 
 
 def tabulate(cloud: Cloud, rounded: Array) -> Array:
-    """Tabulate the ratio of the mean to the root-mean-square speed over all axes.
+    """Ratio of the mean to the root-mean-square speed, by the axis of rotation.
 
-    Returns:
-        The ratio in [0, 1] at direction (a, b, 1 - |a| - |b|), for a and b from -1 to 1,
-        shape (97, 97); 0 where |a| + |b| is much above 1.
+    It stands at direction (a, b, 1 - |a| - |b|), for a and b from -1 to 1, shape (97, 97), and is 0
+    where |a| + |b| is much above 1.
     """
     a, b = (
         grid.ravel() for grid in np.meshgrid(*2 * [np.linspace(-1, 1, SIDE + 1)], indexing="ij")
@@ -485,11 +412,9 @@ class LinkSurface:
 
     @classmethod
     def of(cls, triangles: Array, axis: Array | None) -> Self:
-        """Integrate over a link's triangles, or take the integrals from the cache.
+        """Integrate over triangles in the joint's axes, or take the integrals from the cache.
 
-        Args:
-            triangles: Corners in the joint's axes, shape (triangles, 3, 3), in [m].
-            axis: What the joint turns about, shape (3,); None if it turns about any axis.
+        ``axis`` is what the joint turns about, None if it turns about any.
         """
         content = hashlib.sha256(triangles.tobytes())
         content.update(b"any" if axis is None else axis.tobytes())
@@ -526,34 +451,26 @@ class Surface:
             that joint's child link.
         joint: Index of each link's joint in Pinocchio, shape (links,).
         links: The surface of each link.
-        missing: Addresses of the meshes that were not found and are left out.
     """
 
     names: tuple[str, ...]
     joint: NDArray[np.intp]
     links: tuple[LinkSurface, ...]
-    missing: tuple[str, ...]
 
     @classmethod
-    def of(cls, robot: Robot, geometry: str = "visual", *, missing: Missing = "error") -> Self:
+    def of(cls, robot: Robot, geometry: str = "visual") -> Self:
         """Integrate over the links of a robot; what takes long is kept for the next time.
 
         Args:
             robot: The robot.
             geometry: "visual", "collision", "hull" or "auto".
-            missing: What to do about a mesh that is not there: "error", or "skip" it.
 
         Raises:
             GeometryError: If a shape or a mesh cannot be read, or has no surface.
         """
-        return cls.of_triangles(robot, triangles(robot, geometry, missing=missing))
-
-    @classmethod
-    def of_triangles(cls, robot: Robot, drawn: LinkTriangles) -> Self:
-        """Integrate over triangles that have been read."""
-        axes = [robot.joints[index - 1].turning_axis for index in drawn.joint]
-        links = map(LinkSurface.of, drawn.triangles, axes)
-        return cls(drawn.names, drawn.joint, tuple(links), drawn.missing)
+        axes = [joint.turning_axis for joint in robot.joints]
+        links = tuple(map(LinkSurface.of, triangles(robot, geometry), axes))
+        return cls(link_names(robot), np.arange(1, len(links) + 1), links)
 
     @property
     def area(self) -> Array:

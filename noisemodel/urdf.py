@@ -16,11 +16,10 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel.errors import GeometryError, MeshError, MissingMeshError, RobotError
-from noisemodel.files import beyond, limit, parsed_xml
+from noisemodel.errors import GeometryError, MeshError, RobotError
+from noisemodel.files import beyond, limit, read_xml
 from noisemodel.types import Array
 
-MAX_BYTES = 64 * 2**20
 NUMBERS = {"xyz": 3, "rpy": 3, "ixx": 1, "iyy": 1, "izz": 1, "ixy": 1, "ixz": 1, "iyz": 1}
 
 AXIAL = {"revolute", "continuous", "prismatic", "planar"}
@@ -37,13 +36,7 @@ HINT = "--package-root (`package_root=`) names a folder of meshes elsewhere"
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint that follows another: its position is multiplier times the other's plus offset.
-
-    Attributes:
-        joint: The joint that is followed.
-        multiplier: In [rad/rad], or as the two joints' units have it.
-        offset: In [rad] or [m].
-    """
+    """A joint that follows another one: position = multiplier * the other's + offset."""
 
     joint: str
     multiplier: float
@@ -73,18 +66,7 @@ class LinkShape:
 
 def checked(path: Path) -> ET.Element:
     """Root of a URDF that Pinocchio can be given."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise RobotError(f"{path}: larger than {MAX_BYTES} bytes, no URDF is")
-        text = path.read_bytes()
-    except OSError as error:
-        raise RobotError(f"{path}: cannot be read ({error.strerror})") from error
-    if not text.strip():
-        raise RobotError(f"{path}: the URDF is empty")
-    try:
-        root = parsed_xml(text)
-    except ValueError as error:
-        raise RobotError(f"{path}: {error}") from error
+    root = read_xml(path, "URDF")
     if root.tag != "robot":
         raise RobotError(f"{path}: not a URDF, its root is <{root.tag}>, expected <robot>")
     if not root.get("name"):
@@ -166,11 +148,7 @@ def _finite(path: Path, element: ET.Element, name: str) -> list[float]:
 
 
 def shapes_in(urdf: Path, use: str) -> list[LinkShape]:
-    """Read the geometry of all links of a URDF that was checked.
-
-    Args:
-        use: "visual" or "collision".
-    """
+    """The geometry of all links of a URDF that was checked, for "visual" or "collision"."""
     root = ET.parse(urdf).getroot()  # noqa: S314
     return [
         _shape(f"{urdf}: {use} of link {link.get('name')!r}", link.get("name", ""), element)
@@ -332,11 +310,8 @@ SOLIDS: Mapping[str, tuple[tuple[str, ...], int, Callable[..., Array]]] = Mappin
 def find_mesh(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
     """Find the file of a mesh, with links resolved.
 
-    Args:
-        address: As the URDF has it: ``package://`` (two slashes or three), ``file://``, or a path
-            relative to the URDF.
-        roots: Folders that ``package://`` addresses are searched in: packages, or folders of
-            packages. Meshes lie in one of these.
+    Its address is ``package://`` (two slashes or three), ``file://``, or a path relative to the
+    URDF. ``roots`` are packages, or folders of packages; meshes lie in one of these.
     """
     if not address:
         raise MeshError("''", f"{urdf.name} names a mesh without a file")
@@ -346,7 +321,7 @@ def find_mesh(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
         raise MeshError(address, f"cannot be looked up ({error.strerror})") from error
     listed = ", ".join(map(str, roots)) or "any folder: a home has no meshes"
     if not found:
-        raise MissingMeshError(address, f"not found in {listed}; {HINT}")
+        raise MeshError(address, f"not found in {listed}; {HINT}")
     # Resolving takes longer than all else here, and most folders are no links.
     for path in found:
         if any(path.is_relative_to(root) for root in roots) or any(

@@ -16,7 +16,6 @@ from noisemodel import (
     Comparisons,
     GeometryError,
     LeftOut,
-    MotionError,
     NoiseModelError,
     Robot,
     Run,
@@ -30,12 +29,9 @@ from noisemodel import (
 from noisemodel.compare import (
     BANDS,
     COMPARED,
-    SHAKES,
     Comparison,
     check_length,
-    correlation,
     ends,
-    envelopes,
     excitation,
     log_spectra,
     medians,
@@ -61,36 +57,35 @@ def swinging(robot, samples=2000):
     return np.sin(rates * time) / rates, np.cos(rates * time)
 
 
-def compared(robot, q, v, kinds=COMPARED, *, rate=RATE, surface="visual"):
+def as_run(robot, q, v, rate=RATE):
+    """A run of these configurations and velocities."""
+    base = 6 * robot.floating_base
+    return Run(
+        time=np.arange(len(q)) / rate,
+        velocity=v[:, base:],
+        position=q[:, base + robot.floating_base :],
+        base_pose=q[:, :7] if base else None,
+        base_velocity=v[:, :6] if base else None,
+        joint_names=robot.joint_names,
+        robot="panda" if robot.name == "panda" else str(robot.path),
+    )
+
+
+def compared(robot, q, v, kinds=COMPARED, *, rate=RATE):
     """The comparison of one motion."""
-    found = compare(robot, motion=(q, v), kinds=kinds, rate=rate, surface=surface)
+    found = compare(as_run(robot, q, v, rate), kinds=kinds, surface="visual")
     assert found.left_out == ()
     return found[0]
 
 
 @pytest.fixture(scope="module")
 def comparison(panda):
-    return compared(panda[0], *swinging(panda[0]), surface=panda[1])
+    return compared(panda[0], *swinging(panda[0]))
 
 
 def test_each_kind_is_as_itself(comparison):
     assert np.allclose(np.diag(comparison.correlation), 1.0, rtol=1e-12)
     assert not np.diag(comparison.distance).any()
-
-
-def test_comparing_has_no_direction(comparison):
-    assert np.allclose(comparison.correlation, comparison.correlation.T, rtol=1e-12)
-    assert np.array_equal(comparison.distance, comparison.distance.T)
-    assert (np.abs(comparison.correlation) <= 1 + 1e-12).all()
-
-
-def test_shares_are_those_of_the_noise(panda, comparison):
-    robot, surface = panda
-    for kind in ("paper", "normal"):
-        noise = extended(robot, surface, *swinging(robot), kind)
-        found = comparison.shares[comparison.kinds.index(kind)]
-        assert np.allclose(found, noise.shares()[0], rtol=1e-12)
-    assert np.allclose(comparison.shares.sum(axis=1), 1.0, rtol=1e-12)
 
 
 def test_the_simplified_noise_shares_by_joint_velocity(panda, comparison):
@@ -99,10 +94,8 @@ def test_the_simplified_noise_shares_by_joint_velocity(panda, comparison):
     assert np.allclose(comparison.shares[0], squares / squares.sum(), rtol=1e-12)
 
 
-def test_a_joint_that_follows_has_no_share_of_the_simplified_noise(panda):
-    robot = Robot.load("panda", mimic=True)
-    q, v = swinging(robot)
-    found = compared(robot, q, v, ["simplified", "normal"])
+def test_a_joint_that_follows_has_no_share_of_the_simplified_noise():
+    found = compare("panda", kinds=["simplified", "normal"])[0]
     assert found.shares[0, -1] == 0.0
     assert found.shares[0, -2] > 0.0
     assert found.shares[0].sum() == pytest.approx(1.0)
@@ -113,17 +106,6 @@ def test_the_terms_are_shares_of_the_power_of_paper(panda, comparison):
     assert comparison.terms.sum() == pytest.approx(1.0, rel=1e-12)
     paper = comparison.shares[comparison.kinds.index("paper")]
     assert np.allclose(comparison.terms.sum(axis=1), paper, rtol=1e-12)
-
-
-def test_envelopes_are_root_mean_squares_of_whole_stretches():
-    powers = np.array([[1.0, 7, 9, 9, 5], [0, 2, 8, 0, 99]])
-    np.testing.assert_allclose(envelopes(powers, 2), [[2.0, 3.0], [1.0, 2.0]])
-
-
-def test_signals_are_correlated_as_numpy_does():
-    signals = np.random.default_rng(6).normal([[1.0], [2.0], [3.0]], size=(3, 50))
-    np.testing.assert_allclose(correlation(signals), np.corrcoef(signals), rtol=1e-12)
-    assert np.isnan(correlation(np.array([[1.0, 1, 1], [1, 2, 3]]))[0]).all()
 
 
 def test_spectra_are_of_windows_that_overlap_by_half():
@@ -167,9 +149,9 @@ def test_a_vibration_that_one_kind_lacks_is_found_in_its_frequencies(tmp_path):
 
 
 def test_silence_is_compared_without_a_warning(panda):
-    robot, surface = panda
+    robot, _ = panda
     q, v = swinging(robot)
-    found = compared(robot, q, 0 * v, surface=surface)
+    found = compared(robot, q, 0 * v)
     assert not found.pressure.any()
     assert np.isnan(found.correlation).all()
     assert not found.distance.any()
@@ -333,13 +315,6 @@ def test_mimic_joints_that_cannot_be_coupled_move_independently(tmp_path):
     assert "move independently" in found.remarks[0]
 
 
-def test_mimic_joints_follow(tmp_path):
-    follow = '<mimic joint="joint1" multiplier="2"/>'
-    found = alone(arm(tmp_path, "revolute", "revolute", follow=follow))
-    assert found.joints == 1
-    assert len(found.links) == 2
-
-
 def rows(found):
     """The numbers of a comparison, by robot and kind."""
     return {(row["name"], row["kind"]): row for row in found.to_arrow().to_pylist()}
@@ -351,39 +326,17 @@ def urdfs(tmp_path_factory):
     return [arm(tmp_path_factory.mktemp("arm"), *kinds) for kinds in (ARM, SLIDING)]
 
 
-def test_many_robots_are_compared_as_each_alone(urdfs):
-    together = compare(urdfs, kinds=FEW)
-    for one, urdf in zip(together, urdfs, strict=True):
-        np.testing.assert_array_equal(one.pressure, alone(urdf).pressure)
-
-
 def test_a_run_brings_its_robot_and_its_motion(urdfs, tmp_path):
     robot = Robot.load(urdfs[0])
     run = excitation(robot, seed=3)
     run.save(tmp_path / "run.npz")
     paths = (tmp_path / "run.npz", str(tmp_path / "run.npz"))
     found = compare([run, *paths], kinds=FEW)
+    expected = alone(urdfs[0], seed=3)
     assert [one.name for one in found] == [urdfs[0], str(paths[0]), paths[1]]
-    expected = alone(robot, motion=run)
     for one in found:
         np.testing.assert_array_equal(one.pressure, expected.pressure)
         assert one.events == run.blocks
-
-
-def test_a_run_a_pair_and_a_name_are_the_same_motion(urdfs):
-    robot = Robot.load(urdfs[0])
-    run = excitation(robot, seed=2)
-    pair = alone(robot, motion=robot.configuration(run), rate=run.rate)
-    np.testing.assert_array_equal(pair.pressure, alone(robot, motion=run).pressure)
-    named = alone(robot, motion="excitation", seed=2)
-    np.testing.assert_array_equal(pair.pressure, named.pressure)
-    assert (pair.events, len(named.events)) == ((), 3)
-
-
-def test_a_surface_that_is_at_hand_is_taken(urdfs):
-    robot = Robot.load(urdfs[0])
-    found = alone(robot, surface=Surface.of(robot))
-    np.testing.assert_array_equal(found.pressure, alone(robot, surface="visual").pressure)
 
 
 def test_each_kind_is_evaluated_once(urdfs, monkeypatch):
@@ -433,19 +386,6 @@ def test_robots_that_are_left_out_are_named_with_the_reason(urdfs, tmp_path):
     assert str(first) == f"{missing}: left out: there is no such URDF file"
 
 
-def test_progress_passes_each_robot_on(urdfs):
-    passed = []
-
-    def progress(results, *, total):
-        for result in results:
-            passed.append((result.name, total))
-            yield result
-
-    found = compare([*urdfs, "tallos"], kinds=FEW, progress=progress)
-    assert passed == [(name, 3) for name in (*urdfs, "tallos")]
-    assert len(found) == 2
-
-
 def test_where_every_robot_is_left_out_the_reasons_remain():
     found = compare("tallos", kinds=FEW)
     assert (list(found), str(found)) == ([], str(found.left_out[0]))
@@ -481,18 +421,8 @@ def test_robots_that_cannot_be_read_or_have_no_surface_are_left_out(tmp_path):
         ({"kinds": ("A", "A")}, NoiseModelError, "expected two different ones"),
         ({"kinds": ()}, NoiseModelError, "expected two different ones"),
         ({"surface": "skin"}, GeometryError, "geometry 'skin' is not known, .* visual, collision"),
-        (
-            {"motion": "dance"},
-            NoiseModelError,
-            "no built-in motion 'dance'; there is excitation",
-        ),
-        ({"motion": 7}, NoiseModelError, "a motion is of type int, expected a Run, a pair"),
-        ({"motion": [np.zeros((9, 9))]}, NoiseModelError, "a motion is of type list, expected"),
-        ({"robots": ["run.npz"], "rate": 9.0}, NoiseModelError, "but runs have their own"),
-        ({"motion": (np.zeros((9, 9)),) * 2}, NoiseModelError, "needs the rate of its samples"),
         ({"robots": []}, NoiseModelError, "no robots to compare"),
         ({"robots": ["panda", 3]}, NoiseModelError, "a robot is of type int, expected a Robot"),
-        ({"rate": 0.0}, NoiseModelError, "rate is 0 Hz"),
         ({"seed": -1}, NoiseModelError, "seed is -1, expected 0 or more"),
         ({"jobs": 0}, NoiseModelError, "jobs is 0, expected 1 or more"),
     ],
@@ -500,21 +430,6 @@ def test_robots_that_cannot_be_read_or_have_no_surface_are_left_out(tmp_path):
 def test_what_cannot_be_compared_is_refused_before_any_work(options, error, message):
     with pytest.raises(error, match=message):
         compare(**({"robots": ["panda", "go2"]} | options))
-
-
-def test_one_surface_for_many_robots_is_refused(urdfs):
-    surface = Surface.of(Robot.load(urdfs[0]))
-    with pytest.raises(GeometryError, match="one surface for 2 robots, expected a geometry's name"):
-        compare(urdfs, surface=surface)
-
-
-def test_a_pair_that_is_not_the_robots_is_refused(urdfs):
-    q, v = np.zeros((200, 3)), np.zeros((200, 2))
-    with pytest.raises(MotionError, match=r"chain.urdf: q has shape \(200, 3\), expected \(200, 2"):
-        compare(urdfs[0], motion=(q, v), rate=1000.0)
-    v[7, 1] = np.nan
-    with pytest.raises(MotionError, match="v: nan in row 7, column 1"):
-        compare(urdfs[0], motion=(q[:, :2], v), rate=1000.0)
 
 
 @pytest.fixture(scope="module")
@@ -689,17 +604,6 @@ def test_the_contrast_of_an_event_is_its_mean_power_over_that_outside_of_all(tmp
     np.testing.assert_allclose(found.by_label(1, ["jerk"]), expected[1, [0, 2]].mean(), rtol=1e-9)
 
 
-def test_the_motion_is_the_excitation_of_seed_0_at_4000_hertz_unless_another_is_named(
-    urdfs, thrice
-):
-    found = alone(urdfs[1], THREE)
-    np.testing.assert_array_equal(found.pressure, thrice[0].pressure)
-    assert not np.array_equal(found.pressure, thrice[1].pressure)
-    slow = alone(urdfs[0], THREE, rate=1000.0)
-    assert (found.rate, slow.rate) == (4000.0, 1000.0)
-    assert len(slow.time) * 4 == len(found.time)
-
-
 def test_of_equal_stretches_the_first_is_compared_with_the_blocks_that_lie_in_it(tmp_path):
     robot = chain(tmp_path, "revolute", shapes=[""])
     run = excitation(robot)
@@ -714,10 +618,11 @@ def test_of_equal_stretches_the_first_is_compared_with_the_blocks_that_lie_in_it
         Block(edges[1], 2.2, "jerk"),
     )
     signals = {"velocity": run.velocity * valid[:, None], "position": run.position * valid[:, None]}
-    found = moving(dataclasses.replace(run, valid=valid, blocks=blocks, **signals), "excitation")
+    gaps = dataclasses.replace(run, valid=valid, blocks=blocks, **signals)
+    _, found, remarks = moving(gaps)
     assert (len(found.time), found.time[0], found.time[-1]) == (8000, *edges)
-    assert [event.label for event in found.events] == ["jerk", "fall"]
-    assert found.remarks == ("The run has gaps: compared from 0.00 s on.",)
+    assert [block.label for block in found.blocks] == ["ok", "jerk", "fall"]
+    assert remarks == ("The run has gaps: compared from 0.00 s on.",)
 
 
 ODD = (
@@ -766,29 +671,6 @@ def test_velocities_are_the_slopes_of_positions(robot):
     np.testing.assert_allclose(slope, run.velocity[1:], atol=1e-7)
 
 
-def test_both_shakes_are_equally_fast(tmp_path):
-    robot = chain(tmp_path, "revolute", "revolute", "revolute")
-    run = excitation(robot)
-    near, far = ends(robot)
-    energies, loudest = [], []
-    for label, name in zip(SHAKES, (near, far), strict=True):
-        (block,) = [block for block in run.blocks if block.label == label]
-        inside = (run.time >= block.start) & (run.time < block.stop)
-        velocity = run.velocity[inside, robot.joint_names.index(name)]
-        spectrum = np.abs(np.fft.rfft(velocity * np.hanning(len(velocity))))
-        energies.append(spectrum[30:].max())
-        loudest.append((30 + spectrum[30:].argmax()) * run.rate / len(velocity))
-    assert energies[0] == pytest.approx(energies[1], rel=0.1)
-    assert 40.0 <= loudest[0] == loudest[1] <= 200.0
-
-
-def test_the_near_joint_carries_most_and_the_far_one_ends_the_chain(tmp_path):
-    robot = chain(tmp_path, "prismatic", "revolute", "continuous", "revolute", "prismatic")
-    assert ends(robot) == ("joint2", "joint4")
-    assert ends(chain(tmp_path, "prismatic")) == ()
-    assert ends(chain(tmp_path, "revolute")) == ("joint1",)
-
-
 def tree(folder, *joints, **options):
     """A robot of links that are named after their joints: name, kind and parent link of each."""
     text = '<robot name="tree"><link name="base"/>'
@@ -829,23 +711,6 @@ def test_the_ends_of_a_robot_with_branches(tmp_path):
     assert ends(tree(tmp_path, *continuous[:-1])) == ("c", "d2")
 
 
-def test_each_joint_has_its_own_limits(tmp_path):
-    robot = tree(
-        tmp_path,
-        ("a", "continuous", "base", -1, 1, 4),
-        ("b", "b2", "base"),
-        ("b2", "revolute", "b", -1, 3, 0),
-        ("c", "prismatic", "base", 0.5, 0.6, 0.25),
-        ("d", "revolute", "c", 2, 2, 7),
-        floating_base=True,
-    )
-    assert robot.joint_names == ("a", "b2", "c", "d")
-    bounds = limits(robot)
-    np.testing.assert_allclose(bounds.centre, [0.0, 1.0, 0.55, 0.0])
-    np.testing.assert_allclose(bounds.range, [np.inf, 4.0, 0.1, np.inf])
-    np.testing.assert_array_equal(bounds.speed, [4.0, np.inf, 0.25, 7.0])
-
-
 def test_a_joint_uses_nine_tenths_of_its_range_or_of_its_speed(tmp_path):
     robot = tree(
         tmp_path,
@@ -875,14 +740,6 @@ def test_the_speed_of_all_joints_jumps_by_half_and_the_jump_decays(tmp_path):
     assert {-1.0, 1.0} == set(np.sign(step))
     gone = run.velocity[first] - run.velocity[first + round(0.03 * run.rate)]
     np.testing.assert_allclose(gone * np.sign(step), 0.5 * (1 - np.exp(-1)), atol=0.2)
-
-
-def test_the_rate_changes_the_samples_and_not_the_events(tmp_path):
-    robot = chain(tmp_path, "revolute", "revolute")
-    slow, fast = excitation(robot, rate=1000.0), excitation(robot)
-    assert (slow.rate, fast.rate) == (1000.0, 4000.0)
-    assert slow.duration == fast.duration
-    assert slow.blocks == fast.blocks
 
 
 def test_the_motion_of_a_seed_is_that_of_every_version(tmp_path):

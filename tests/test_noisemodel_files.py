@@ -14,7 +14,6 @@ import pytest
 from noiseclassifier import modelfile
 from noisemodel import OutputError, files
 from noisemodel.files import (
-    TEMPORARY,
     _machine,
     _sweep,
     cache_folder,
@@ -41,12 +40,6 @@ def test_a_file_appears_with_its_contents_and_nothing_else(tmp_path):
     assert os.listdir(tmp_path) == ["out.txt"]
 
 
-def test_nothing_exists_under_the_name_before_the_end(tmp_path):
-    with replacing(tmp_path / "out.txt") as temporary:
-        temporary.write_text("half")
-        assert not (tmp_path / "out.txt").exists()
-
-
 @pytest.mark.parametrize("mask", [0o022, 0o027, 0o077])
 def test_the_file_has_the_permissions_of_any_new_file(tmp_path, mask):
     before = os.umask(mask)
@@ -56,18 +49,6 @@ def test_the_file_has_the_permissions_of_any_new_file(tmp_path, mask):
     finally:
         os.umask(before)
     assert (tmp_path / "out.txt").stat().st_mode == (tmp_path / "other.txt").stat().st_mode
-
-
-@pytest.mark.parametrize("interruption", [KeyboardInterrupt, ZeroDivisionError])
-def test_an_interrupted_write_leaves_nothing_behind(tmp_path, interruption):
-    def interrupted():
-        with replacing(tmp_path / "out.txt") as temporary:
-            temporary.write_text("half")
-            raise interruption
-
-    with pytest.raises(interruption):
-        interrupted()
-    assert os.listdir(tmp_path) == []
 
 
 def test_an_interrupted_overwrite_leaves_the_old_file(tmp_path):
@@ -158,13 +139,6 @@ def write_late(path):
         late.write_text("second")
 
 
-def test_of_two_that_write_one_file_at_once_the_second_fails_and_changes_nothing(tmp_path):
-    with pytest.raises(OutputError, match=r"out\.txt: exists already; choose another name"):
-        write_late(tmp_path / "out.txt")
-    assert (tmp_path / "out.txt").read_text() == "first"
-    assert os.listdir(tmp_path) == ["out.txt"]
-
-
 def without_links(*_):
     raise PermissionError(1, "Operation not permitted")
 
@@ -175,16 +149,6 @@ def test_without_hard_links_the_second_of_two_writers_fails_as_well(tmp_path, mo
         write_late(tmp_path / "out.txt")
     assert (tmp_path / "out.txt").read_text() == "first"
     assert os.listdir(tmp_path) == ["out.txt"]
-
-
-def test_temporary_files_of_killed_processes_are_deleted_after_a_day(tmp_path):
-    names = [".noise-inspector-0123abcd", ".noise-inspector-4567abcd", ".other-0123abcd", "a.txt"]
-    for name in names:
-        (tmp_path / name).touch()
-        os.utime(tmp_path / name, (time.time() - 90_000,) * 2)
-    os.utime(tmp_path / names[1])  # one that is being written
-    write(tmp_path / "out.txt", "")
-    assert sorted(os.listdir(tmp_path)) == sorted([*names[1:], "out.txt"])
 
 
 KILLED = """
@@ -267,22 +231,6 @@ def test_a_machine_is_known_by_its_start_or_by_its_name(monkeypatch):
     assert _machine.__wrapped__() == hashlib.sha256(b"robot").hexdigest()[:8]
 
 
-def test_without_hard_links_a_file_is_written_and_replaced_only_if_asked(tmp_path, monkeypatch):
-    monkeypatch.setattr(os, "link", without_links)
-    write(tmp_path / "out.txt", "first")
-    with pytest.raises(OutputError, match=r"out\.txt: exists already"):
-        write(tmp_path / "out.txt", "second")
-    assert (tmp_path / "out.txt").read_text() == "first"
-    write(tmp_path / "out.txt", "second", overwrite=True)
-    assert (tmp_path / "out.txt").read_text() == "second"
-    assert os.listdir(tmp_path) == ["out.txt"]
-
-
-def test_a_temporary_file_is_known_by_its_name(tmp_path):
-    with replacing(tmp_path / "out.txt") as temporary:
-        assert TEMPORARY.fullmatch(temporary.name)[1] == _machine()
-
-
 def test_a_folder_that_refuses_files_is_one_error(tmp_path, monkeypatch):
     def refusing(*_):
         raise PermissionError(13, "Permission denied")
@@ -290,14 +238,6 @@ def test_a_folder_that_refuses_files_is_one_error(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "open", refusing)
     with pytest.raises(OutputError, match=r"out\.txt: cannot be written \(Permission denied\)$"):
         write(tmp_path / "out.txt", "")
-
-
-def test_an_output_that_exists_is_refused_unless_it_may_be_replaced(tmp_path):
-    (tmp_path / "out.txt").touch()
-    with pytest.raises(OutputError, match=r"out\.txt: exists already"):
-        refuse_existing(tmp_path / "out.txt")
-    refuse_existing(tmp_path / "out.txt", overwrite=True)
-    refuse_existing(tmp_path / "other.txt")
 
 
 @pytest.fixture(autouse=True)
@@ -330,18 +270,6 @@ def test_cached_arrays_are_made_once():
     assert make.calls == 1
 
 
-def test_another_key_is_another_thing():
-    make = Maker()
-    cached("a-1", make)
-    cached("a-2", make)
-    assert make.calls == 2
-
-
-def test_it_lies_in_the_users_cache_folder(home):
-    cached("a-1", Maker())
-    assert [path.name for path in home.iterdir()] == ["a-1.npz"]
-
-
 @pytest.mark.parametrize("value", ["", "relative/folder", None])
 def test_without_an_absolute_folder_it_is_the_one_in_the_home_folder(tmp_path, monkeypatch, value):
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -350,16 +278,6 @@ def test_without_an_absolute_folder_it_is_the_one_in_the_home_folder(tmp_path, m
     else:
         monkeypatch.setenv("XDG_CACHE_HOME", value)
     assert cache_folder() == tmp_path / ".cache" / "noise-inspector" / "surfaces"
-
-
-@pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x05\x06" + b"\0" * 18])
-def test_a_damaged_file_is_made_anew(home, content):
-    make = Maker()
-    cached("a-1", make)
-    (home / "a-1.npz").write_bytes(content)
-    cached("a-1", make)
-    assert_made(cached("a-1", make))
-    assert make.calls == 2
 
 
 def test_a_file_with_one_byte_changed_anywhere_is_made_anew(home):
@@ -372,15 +290,6 @@ def test_a_file_with_one_byte_changed_anywhere_is_made_anew(home):
         (home / "a-1.npz").write_bytes(damaged)
         assert_made(cached("a-1", make))
     assert make.calls == 1 + len(whole)
-
-
-def test_pickles_in_the_folder_are_not_opened(home):
-    home.mkdir(parents=True)
-    archive = io.BytesIO()
-    np.savez(archive, points=np.array([{"a": 1}], dtype=object))
-    content = archive.getvalue()
-    (home / "a-1.npz").write_bytes(content + hashlib.sha256(content).digest())
-    assert_made(cached("a-1", Maker()))
 
 
 def test_a_folder_that_cannot_be_written_to_is_no_error(tmp_path, monkeypatch):
@@ -400,36 +309,6 @@ def test_arrays_that_cannot_be_made_are_not_cached(home):
         cached("a-1", fail)
     assert not home.exists()
     assert_made(cached("a-1", Maker()))
-
-
-def test_nothing_but_the_archive_is_left_behind(home):
-    cached("a-1", Maker())
-    assert len(list(home.iterdir())) == 1
-    with np.load(home / "a-1.npz", allow_pickle=False) as archive:
-        assert_made(dict(archive))
-
-
-def test_the_secret_is_the_users_alone(home):
-    make, secret = Maker(), home.parent / "secret"
-    cached("a-1", make)
-    assert (secret.stat().st_mode & 0o777, len(secret.read_bytes())) == (0o600, 32)
-    for bit in (0o1, 0o2, 0o4, 0o10, 0o20, 0o40):
-        secret.chmod(0o600 | bit)
-        assert_made(cached("a-1", make))
-    assert make.calls == 7
-    for mode in (0o400, 0o600, 0o700):
-        secret.chmod(mode)
-        cached("a-1", make)
-    assert make.calls == 7
-
-
-@pytest.mark.parametrize("difference", [-1, 1])
-def test_the_secret_of_another_user_is_not_taken(monkeypatch, difference):
-    make, user = Maker(), os.getuid()
-    cached("a-1", make)
-    monkeypatch.setattr(os, "getuid", lambda: user + difference)
-    assert_made(cached("a-1", make))
-    assert make.calls == 2
 
 
 @pytest.mark.parametrize("length", [0, 31, 33])

@@ -99,27 +99,6 @@ def test_one_brick_is_the_same_in_every_kind_of_file(tmp_path, name, content):
     assert np.array_equal(meshes.read(tmp_path / name), BRICK)  # now from the cache
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("two.stl", ascii_stl(BRICK[:5], "a") + ascii_stl(BRICK[5:], "b")),
-        ("two.dae", dae(geometry(BRICK[:5]) + geometry(BRICK[5:], "h"), NODE + NODE_H)),
-        ("two.obj", obj(BRICK).replace(b"f 7", b"o second\nusemtl paint\nf 7")),
-    ],
-)
-def test_a_brick_in_two_parts_is_still_that_brick(tmp_path, name, content):
-    triangles = read(tmp_path, name, content)
-    assert len(triangles) == 12
-    assert area(triangles) == 22.0
-
-
-def test_digits_beyond_single_precision_are_kept(tmp_path):
-    fine = BRICK * 0.1234567890123
-    for name, content in (("a.obj", obj(fine)), ("a.dae", dae(geometry(fine), NODE))):
-        assert np.array_equal(read(tmp_path, name, content), fine)
-        assert np.array_equal(meshes.read(tmp_path / name), fine)
-
-
 def test_what_is_cached_belongs_to_the_content_not_to_the_name(tmp_path, cache):
     assert area(read(tmp_path, "a.obj", obj(BRICK))) == 22.0
     assert area(read(tmp_path, "b.obj", obj(BRICK))) == 22.0
@@ -153,15 +132,6 @@ def test_comments_in_any_encoding_do_not_matter(tmp_path):
 def test_a_dae_is_taken_as_it_is_written_whatever_its_unit_and_upward_axis(tmp_path):
     asset = '<unit meter="0.001" name="mm"/><up_axis>Y_UP</up_axis>'
     assert np.array_equal(read(tmp_path, "a.dae", dae(geometry(BRICK), NODE, asset)), BRICK)
-
-
-def test_the_nodes_of_a_dae_move_what_they_contain_in_their_order(tmp_path):
-    nodes = """<node><translate>1 0 0</translate><rotate>0 0 2 90</rotate>
-      <node><scale>2 1 1</scale><matrix>1 0 0 0  0 1 0 5  0 0 1 0  0 0 0 1</matrix>
-      <instance_geometry url="#g"/></node></node>"""
-    triangles = read(tmp_path, "a.dae", dae(geometry(TRIANGLE), nodes))
-    # Up by 5 along y, then twice as long along x, then x to y and y to -x, then 1 along x.
-    assert np.allclose(triangles, [[[-4, 0, 0], [-4, 2, 0], [-5, 0, 0]]], rtol=0, atol=1e-15)
 
 
 def test_a_node_of_a_dae_may_stand_in_several_places(tmp_path):
@@ -325,12 +295,6 @@ def test_an_input_of_a_dae_without_an_offset_is_the_first(tmp_path):
     assert np.array_equal(found, TRIANGLE[:, [0, 2, 1]])
 
 
-def test_a_strip_of_a_dae_is_cut_into_triangles_of_three_neighbours(tmp_path):
-    part = f"<tristrips>{INPUTS}<p>9 1 9 2 9 0 9 3</p><p>9 4 9 0 9 2</p></tristrips>"
-    found = read(tmp_path, "a.dae", dae(geometry(PENTAGON, part=part), NODE))
-    assert np.array_equal(found, PENTAGON[[[1, 2, 0], [2, 0, 3], [4, 0, 2]]])
-
-
 def test_parts_of_a_dae_without_polygons_add_nothing(tmp_path):
     parts = "".join(
         f"<{kind}>{INPUTS}{'<vcount/>' if kind == 'polylist' else ''}<p/></{kind}>"
@@ -359,44 +323,6 @@ def test_the_limit_of_triangles_counts_points_and_instances(monkeypatch):
         monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", str(most - 1))
         with pytest.raises(ValueError, match=f"triangles or points, the limit is {most - 1}"):
             meshes.READERS[".dae"](content)
-
-
-def test_faces_of_an_obj_that_name_nothing_are_passed_over(tmp_path):
-    content = b"f\n\nvn 1 0 0\n" + obj(TRIANGLE) + b"f 1 2\nf 1\n#\n"
-    assert np.array_equal(read(tmp_path, "a.obj", content), TRIANGLE)
-    quad = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
-    (one, other) = read(tmp_path, "b.obj", quad)
-    assert np.array_equal(one, [[0, 0, 0], [1, 0, 0], [1, 1, 0]])
-    assert np.array_equal(other, [[0, 0, 0], [1, 1, 0], [0, 1, 0]])
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "problem"),
-    [
-        ("a.obj", b"# nothing\n", "has no triangles"),
-        ("a.obj", b"f 1 1 1\n", "a face names point 1 of 0"),
-        ("a.obj", b"v 0 0\n", "'v 0 0' is no point"),
-        ("a.obj", b"v 1 " + b"0" * 80, f"'v 1 {'0' * 56}' is no point"),
-        ("a.obj", b"f 0 " + b"1" * 80, f"'f 0 {'1' * 56}' names a point"),
-        ("a.stl", ascii_stl(BRICK).replace(b"endfacet", b"vertex 1 2 3\nendfacet", 1), "not three"),
-        ("a.stl", ascii_stl(BRICK).replace(b"endfacet\n", b"", 1), "not three corners"),
-        ("a.dae", dae("", "<node><lookat>1 2 3</lookat></node>"), "it has a <lookat>"),
-        (
-            "a.dae",
-            dae(
-                geometry(
-                    BRICK,
-                    part=f"<polylist>{INPUTS}<vcount>4 -1</vcount><p>9 0 9 1 9 2</p></polylist>",
-                ),
-                NODE,
-            ),
-            "a <polylist> of 3 corners has 3",
-        ),
-    ],
-)
-def test_what_is_wrong_with_a_mesh_is_said(tmp_path, name, content, problem):
-    with pytest.raises(MeshError, match=problem):
-        read(tmp_path, name, content)
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed"])

@@ -66,27 +66,12 @@ def test_the_empty_ur3_is_refused_in_one_line():
     assert "\n" not in str(caught.value)
 
 
-def test_a_listed_robot_has_what_its_urdf_has():
-    talos = Robot.load("talos")
-    assert (talos.nq, talos.nv, talos.floating_base) == (39, 38, True)
-    assert talos.name == "talos"
-    assert talos.joint_names[0] == "leg_left_1_joint"
-    assert "root_joint" not in talos.joint_names
-    assert (Robot.load("talos", floating_base=False).nq) == 32
-
-
 def test_a_urdf_of_ones_own_has_a_fixed_base_unless_requested(tmp_path):
     robot = arm(tmp_path)
     assert robot.name == "arm"
     assert robot.joint_names == ("shoulder", "elbow", "finger")
     assert (robot.nq, robot.nv) == (4, 3)
     assert arm(tmp_path, floating_base=True).nq == 11
-
-
-@pytest.mark.parametrize("name", ["talos", "kinova", "iris", "pr2"])
-def test_neutral_is_pinocchios(name):
-    robot = Robot.load(name)
-    assert np.array_equal(robot.neutral, pin.neutral(robot.model))
 
 
 def test_neutral_is_pinocchios_for_every_kind_of_joint(tmp_path):
@@ -101,9 +86,9 @@ def test_of_a_file_that_is_too_large_no_package_is_looked_up(tmp_path, monkeypat
     path.write_text('<robot><mesh filename="package://parts/a.stl"/></robot>')
     size = path.stat().st_size
     for most, root in ((size - 1, path.parent), (size + 1, path.parent.parent)):
-        monkeypatch.setattr("noisemodel.urdf.MAX_BYTES", most)
+        monkeypatch.setattr("noisemodel.robot.MAX_BYTES", most)
         assert package_roots(path) == (root,)
-    monkeypatch.setattr("noisemodel.urdf.MAX_BYTES", size)
+    monkeypatch.setattr("noisemodel.robot.MAX_BYTES", size)
     assert package_roots(path) == (path.parent.parent,)
 
 
@@ -145,14 +130,6 @@ def test_mimic_joints_follow_and_take_no_place(tmp_path):
     independent = arm(tmp_path, follows)
     explicit = link_twists(independent, np.array([[1, 0, 1, 0.3]]), np.array([[0, 2, 0.2]]))
     assert np.allclose(link_twists(robot, q[:1], v[:1]), explicit, rtol=0, atol=1e-15)
-
-
-def test_a_joint_that_only_keeps_a_distance_to_another_follows_it(tmp_path):
-    follows = '<mimic joint="elbow" offset="0.2"/>'
-    robot, independent = arm(tmp_path, follows, mimic=True), arm(tmp_path, follows)
-    found = link_twists(robot, np.array([[0.6, 0.8, 1.0]]), np.array([[3.0, 2.0]]))
-    explicit = np.array([[0.6, 0.8, 1.0, 1.2]]), np.array([[3.0, 2.0, 2.0]])
-    np.testing.assert_allclose(found, link_twists(independent, *explicit), rtol=0, atol=1e-15)
 
 
 def test_a_chain_of_followers_ends_at_the_joint_that_moves_by_itself(tmp_path):
@@ -300,36 +277,12 @@ def test_spinning_link_moves_its_tip_at_radius_times_rate(tmp_path):
     assert np.allclose(tip, [0, radius * rate, 0, 0, 0, rate], rtol=0, atol=1e-15)
 
 
-def test_sliding_link_moves_along_its_axis(tmp_path):
-    robot = read(tmp_path, [("prismatic", "0 3 4", "1 2 3", "0 0 0")])
-    twist = link_twists(robot, np.array([[0.5]]), np.array([[2.0]]))[0, 1]
-    assert np.allclose(twist, [0, 1.2, 1.6, 0, 0, 0], rtol=0, atol=1e-15)
-
-
-def test_tip_of_a_turning_slider_moves_faster_the_further_it_is_out(tmp_path):
-    robot = read(
-        tmp_path,
-        [("revolute", "0 0 1", "0 0 0", "0 0 0"), ("prismatic", "1 0 0", "0 0 0", "0 0 0")],
-    )
-    out = np.array([[0.3, 0.1], [0.3, 0.2]])
-    twists = link_twists(robot, out, np.array([[2.0, 0.0], [2.0, 0.0]]))
-    assert np.allclose(np.linalg.norm(twists[:, 2, :3], axis=1), [0.2, 0.4], rtol=1e-14)
-
-
 def test_pose_of_the_base_changes_no_twist():
     robot = Robot.load("solo12")
     q, v = states(robot.model)
     elsewhere = q.copy()
     elsewhere[:, :7] = [5, -3, 1, 0.5, 0.5, 0.5, 0.5]
     assert np.array_equal(link_twists(robot, q, v), link_twists(robot, elsewhere, v))
-
-
-def test_twists_are_linear_in_the_velocities():
-    robot = Robot.load("talos")
-    q, v = states(robot.model)
-    other = v[::-1]
-    sum_of_twists = 2 * link_twists(robot, q, v) - 3 * link_twists(robot, q, other)
-    assert np.allclose(link_twists(robot, q, 2 * v - 3 * other), sum_of_twists, rtol=0, atol=1e-12)
 
 
 def test_a_run_is_the_same_in_one_piece_and_in_many(monkeypatch):
@@ -345,11 +298,6 @@ def test_single_precision_is_computed_in_double():
     q, v = (state.astype(np.float32) for state in states(robot.model))
     exact = link_twists(robot, q.astype(np.float64), v.astype(np.float64))
     assert np.array_equal(link_twists(robot, q, v), exact)
-
-
-def test_no_samples_have_no_twists():
-    robot = Robot.load("panda")
-    assert link_twists(robot, np.empty((0, 9)), np.empty((0, 9))).shape == (0, 10, 6)
 
 
 @pytest.mark.parametrize("name", ["talos", "kinova", "pr2", "tiago", "romeo", "hyq", "iris"])
@@ -469,13 +417,3 @@ def test_a_range_is_as_it_is_written_and_none_if_it_is_empty_or_without_end(
 )
 def test_a_speed_is_as_it_is_written_and_none_if_no_joint_moves_so(tmp_path, written, speed):
     assert limits(tmp_path, f"lower='-1' upper='1' velocity='{written}'").velocity == speed
-
-
-def test_a_joint_that_turns_for_ever_has_a_speed_and_no_range(tmp_path):
-    found = limits(tmp_path, "lower='-1' upper='1' velocity='3'", kind="continuous")
-    assert found == Limits(-inf, inf, 3.0, turns=True)
-
-
-def test_limits_of_which_nothing_is_stated_are_none():
-    nothing = Limits()
-    assert (nothing.lower, nothing.upper, nothing.velocity) == (-inf, inf, inf)

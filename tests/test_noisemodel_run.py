@@ -10,22 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from noisemodel import Block, Run, RunError, RunFileError, decimated, runfile
+from noisemodel import Block, Run, RunError, decimated, runfile
 from noisemodel.run import (
     METHOD,
     NotUniformError,
     base_velocity,
     check_blocks,
-    check_names,
     check_quaternions,
     check_signal,
     check_time,
-    check_valid,
-    check_words,
     joint_velocity,
-    part,
     pieces_of,
-    stretches,
     with_velocities,
 )
 from noisemodel.runfile import OnDemand
@@ -52,11 +47,6 @@ def test_the_rate_is_the_nominal_one(rate):
     recorded = run(time=1.7e4 + np.arange(100) / rate)
     assert recorded.rate == pytest.approx(rate, rel=1e-6)
     assert run(time=np.arange(100) / rate).rate == pytest.approx(rate, rel=1e-9)
-
-
-def test_stamps_of_a_day_in_unix_time_are_uniform():
-    """Their own spacing is 2.4e-7 s, which is coarser than a thousandth of 0.1 ms."""
-    assert run(time=1.8e9 + np.arange(100) / 10_000).rate == pytest.approx(10_000, rel=3e-3)
 
 
 def test_blocks_are_sorted():
@@ -123,42 +113,6 @@ def test_signals_that_do_not_fit_are_refused(changes, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("blocks", "message"),
-    [
-        ([(0.05, 0.02, "ok")], "block 'ok': starts at 0.05 s, stops at 0.02 s"),
-        ([(0.05, 0.05, "ok")], "block 'ok': starts at 0.05 s, stops at 0.05 s"),
-        ([(np.nan, 0.05, "ok")], "block 'ok': starts at nan s"),
-        ([(0.05, 0.2, "ok")], "0.05 s to 0.2 s lies outside of the run, 0 s to 0.099 s"),
-        ([(-1.0, 0.05, "ok")], "-1 s to 0.05 s lies outside of the run"),
-        ([(0.0, 0.05, "ok"), (0.04, 0.06, "impact")], "'ok' until 0.05 s and 'impact' from 0.04 s"),
-        ([(0.0, 0.05, "")], "block_label: '' is no name"),
-    ],
-)
-def test_blocks_that_do_not_fit_are_refused(blocks, message):
-    with pytest.raises(RunError, match=message):
-        run(blocks=tuple(Block(*block) for block in blocks))
-
-
-def test_only_signals_whose_axes_are_exchanged_are_said_to_be_transposed():
-    for shape, hint in (((2, 100), True), ((2, 99), False), ((100, 3), False), ((100,), False)):
-        with pytest.raises(RunError) as caught:
-            run(velocity=np.ones(shape))
-        assert str(caught.value).endswith("; samples come first, is it transposed?") == hint
-
-
-def test_blocks_may_touch_and_reach_the_end_of_the_last_sample_and_no_further():
-    with pytest.raises(RunError, match="block 'ok'"):
-        run(blocks=(Block(0.0, 0.102, "ok"),))
-    assert len(run(blocks=(Block(0.0, 0.05, "ok"), Block(0.05, 0.1, "impact"))).blocks) == 2
-
-
-def test_quaternions_in_gaps_are_not_checked():
-    pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (100, 1))
-    pose[50] = 0.0
-    assert run(base_pose=pose, valid=np.arange(100) != 50).base_pose is not None
-
-
 def filled():
     """A run with every signal, a gap, and two blocks."""
     random = np.random.default_rng(0)
@@ -197,12 +151,6 @@ def same(one, other):
     return True
 
 
-@pytest.mark.parametrize("stretch", [(-np.inf, np.inf), (0.0, 1.0), (-5.0, 0.0991)])
-def test_a_cut_of_everything_is_the_run(stretch):
-    whole = filled()
-    assert same(whole.cut(*stretch), whole)
-
-
 @given(
     st.tuples(*[st.floats(-0.01, 0.11)] * 4).map(sorted).filter(lambda t: t[2] - t[1] > 0.02),
     st.sampled_from((1, -1)),
@@ -223,14 +171,6 @@ def test_a_cut_holds_the_samples_from_its_start_to_before_its_stop():
         np.testing.assert_array_equal(getattr(cut, name), getattr(whole, name)[20:50])
     np.testing.assert_array_equal(cut.stages["motor"], whole.stages["motor"][20:50])
     assert (cut.robot, cut.meta, cut.joint_names) == (whole.robot, whole.meta, whole.joint_names)
-
-
-def test_the_halves_of_a_run_are_the_run():
-    whole = filled()
-    halves = whole.cut(-np.inf, 0.033), whole.cut(0.033, np.inf)
-    for name in ("time", "velocity", "velocity_desired", "valid"):
-        joined = np.concatenate([getattr(half, name) for half in halves])
-        np.testing.assert_array_equal(joined, getattr(whole, name))
 
 
 def test_blocks_are_clipped_to_a_cut():
@@ -262,24 +202,10 @@ def test_an_empty_cut_is_refused(stretch, message):
         filled().cut(*stretch)
 
 
-def test_a_part_has_no_blocks_and_the_changes_that_are_given():
-    whole = filled()
-    found = part(whole, 10, 30, effort=None)
-    assert (found.blocks, found.effort) == ((), None)
-    np.testing.assert_array_equal(found.position, whole.position[10:30])
-
-
 def test_a_run_is_represented_in_one_line():
     line = "Run(panda, 2 joints, 100 samples at 1000 Hz, 0.1 s, 2 blocks)"
     assert repr(filled()) == line
     assert repr(run()) == "Run(no robot, 2 joints, 100 samples at 1000 Hz, 0.1 s, 0 blocks)"
-
-
-def test_a_cut_that_ends_before_it_begins_has_no_samples():
-    text = "0 samples from 0.05 s to 0.01 s, expected 2 at least; the run has 0 s to 0.099 s"
-    with pytest.raises(RunError, match=f"^{text}$"):
-        filled().cut(0.05, 0.01)
-    assert len(filled().cut(0.05, 0.0511).time) == 2
 
 
 def test_a_run_moves_by_joints_or_by_its_base():
@@ -288,25 +214,6 @@ def test_a_run_moves_by_joints_or_by_its_base():
     text = "^joint_names: there are no joints, and the base does not move$"
     with pytest.raises(RunError, match=text):
         run(velocity=np.zeros((100, 0)), joint_names=())
-
-
-def test_the_motion_of_a_floating_base_comes_before_that_of_the_joints():
-    base, joints = np.random.default_rng(0).normal(size=(2, 100, 6))
-    whole = run(velocity=joints[:, :2], base_velocity=base)
-    np.testing.assert_array_equal(whole.motion, np.hstack((base, joints[:, :2])))
-
-    def on_demand(array):
-        return OnDemand(array.shape, array.dtype, lambda first, stop: array[first:stop])
-
-    for changes in (
-        {"velocity": on_demand(whole.velocity)},
-        {"base_velocity": on_demand(base.astype(np.float32))},
-        {"velocity": on_demand(whole.velocity), "base_velocity": on_demand(base)},
-    ):
-        kept = replace(whole, **changes).motion
-        assert isinstance(kept, OnDemand)
-        assert (kept.shape, kept.dtype) == ((100, 8), np.float64)
-        np.testing.assert_allclose(kept[7:13], whole.motion[7:13], rtol=1e-6)
 
 
 @pytest.mark.parametrize("samples", [1, 7, 99, 100, 101, None])
@@ -342,13 +249,6 @@ def refused(message, error=RunError):
 def cut(monkeypatch):
     """Pieces of four rows, of one column of floats."""
     monkeypatch.setattr(runfile, "AT_ONCE", 4 * 8)
-
-
-@pytest.mark.parametrize("shape", [(), (0,), (1,), (2, 1), (2, 2)])
-def test_a_time_has_one_axis_and_two_samples_at_least(shape):
-    with refused(f"time: shape {shape}, expected (samples,) with at least 2 samples"):
-        check_time(np.zeros(shape))
-    check_time(np.arange(2.0))
 
 
 @pytest.mark.parametrize(
@@ -410,50 +310,6 @@ def test_stamps_far_from_zero_may_lie_two_of_their_own_spacings_from_the_median(
         check_time(-time[::-1] if mirrored else time)
 
 
-@pytest.mark.parametrize("row", range(1, 12))
-def test_an_uneven_step_is_named_in_every_piece_of_the_time(cut, row):
-    time = np.arange(12.0)
-    time[row:] += 0.5
-    with pytest.raises(NotUniformError, match=f"the step to row {row} is 1.5 s"):
-        check_time(time)
-
-
-@pytest.mark.parametrize("word", ["", "a\nb", "\x00"])
-def test_words_are_printable_and_not_empty(word):
-    check_words("stages", ["a b", "ö"])
-    with refused(f"stages: {word!r} is no name; it is empty or cannot be printed"):
-        check_words("stages", ["a", word])
-
-
-def test_names_that_repeat_are_all_named(monkeypatch):
-    with refused("joint_names: a, c named twice"):
-        check_names("joint_names", ["c", "b", "a", "c", "a", "a"])
-    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "3")
-    check_names("joint_names", ["a", "b", "c"])
-    with refused("joint_names: 4 joints, the limit is 3 (--limit joints=N raises it)"):
-        check_names("joint_names", ["a", "b", "c", "d"])
-
-
-@pytest.mark.parametrize(
-    ("shape", "turned"),
-    [
-        ((2, 5), True),
-        ((7, 5), True),
-        ((2, 4), False),
-        ((5, 5), False),
-        ((5, 3), False),
-        ((5,), False),
-        ((1, 5, 1), False),
-        ((2, 2, 5), False),
-        ((2, 5, 2), False),
-    ],
-)
-def test_signals_of_another_shape_are_refused_and_samples_that_come_last_are_named(shape, turned):
-    hint = "; samples come first, is it transposed?" if turned else ""
-    with refused(f"effort: shape {shape}, expected (5, 2){hint}"):
-        check_signal("effort", np.zeros(shape), (5, 2))
-
-
 def test_signals_are_of_floating_point_numbers_of_any_size():
     for kind in (np.float16, np.float32, np.float64):
         check_signal("effort", np.ones((5, 2), dtype=kind), (5, 2))
@@ -492,16 +348,6 @@ def test_a_signal_on_demand_is_read_for_its_check_once_and_its_shape_always(cut)
         assert read == [(0, 4), (4, 8), (8, 9)]
     with refused("effort: shape (9, 1), expected (9, 2)"):
         check_signal("effort", signal, (9, 2))
-
-
-def test_a_mask_is_a_boolean_for_each_sample_and_leaves_one_at_least():
-    check_valid(np.arange(5) == 3, 5)
-    for wrong in (np.ones(5), np.ones(4, dtype=bool), np.ones((5, 1), dtype=bool)):
-        text = f"valid: shape {wrong.shape} of {wrong.dtype}, expected (5,) of bool"
-        with refused(text):
-            check_valid(wrong, 5)
-    with refused("valid: false in every sample, no sample is left"):
-        check_valid(np.zeros(5, dtype=bool), 5)
 
 
 @pytest.mark.parametrize(
@@ -557,16 +403,6 @@ def run_of(hertz, *, rate=10_000, seconds=3.0, **fields):
     return Run(time=time, velocity=velocity, joint_names=("elbow",), **fields)
 
 
-@pytest.mark.parametrize("rate", [5000.0, 1000.0, 2500.0, 300.0])
-def test_a_slow_motion_is_unchanged(rate):
-    slow = decimated(run_of(20.0), rate)
-    assert slow.rate == pytest.approx(rate)
-    inner = slice(20, -20)
-    expected = np.sin(2 * np.pi * 20.0 * (slow.time - 5.0))
-    np.testing.assert_allclose(slow.velocity[inner, 0], expected[inner], atol=3e-3)
-    assert slow.time[0] == 5.0
-
-
 def test_frequencies_above_the_lower_nyquist_frequency_are_removed_not_folded():
     slow = decimated(run_of(900.0), 1000.0)
     assert np.abs(slow.velocity[20:-20]).max() < 1e-2
@@ -600,16 +436,6 @@ def test_all_velocities_are_decimated_and_nothing_else_is_kept():
     assert (slow.blocks, dict(slow.meta), slow.robot) == (run.blocks, {"seed": 1}, "panda")
 
 
-def test_what_a_gap_reaches_into_is_not_valid():
-    valid = np.ones(30_000, dtype=bool)
-    valid[15_000:15_100] = False
-    slow = decimated(run_of(20.0, valid=valid), 1000.0)
-    assert not slow.valid[1490:1520].any()
-    assert slow.valid[:1490].all()
-    assert slow.valid[1520:].all()
-    assert (slow.velocity[~slow.valid] == 0).all()
-
-
 def test_the_same_rate_changes_nothing():
     run = run_of(20.0)
     assert decimated(run, 10_000.0) is run
@@ -640,24 +466,6 @@ def test_ten_samples_to_either_side_of_a_gap_are_not_valid(gap):
     lost = np.flatnonzero(~slow.valid)
     assert lost.tolist() == [*range(max(0, gap - 10), min(3000, gap + 11))]
     assert (slow.velocity[lost] == 0.0).all()
-
-
-@pytest.mark.parametrize(("up", "down"), [(1, 3), (2, 5), (1, 25), (4, 5)])
-def test_rows_that_are_decimated_on_demand_are_those_of_the_whole(monkeypatch, up, down):
-    monkeypatch.setattr(runfile, "AT_ONCE", 8 * 20)
-    run = run_of(90.0, rate=1000, seconds=0.503, valid=np.arange(503) != 300)
-    shifted = replace(run, velocity=run.velocity + 3.0 + np.linspace(0.0, 5.0, 503)[:, None])
-    there = OnDemand((503, 1), np.float64, lambda first, stop: shifted.velocity[first:stop])
-    whole = decimated(shifted, 1000.0 * up / down)
-    kept = decimated(replace(shifted, velocity=there), 1000.0 * up / down)
-    assert isinstance(kept.velocity, OnDemand)
-    samples = 503 * up // down
-    assert kept.velocity.shape == whole.velocity.shape == (samples, 1)
-    for first in (0, 1, 2, 3, 7, samples // 2, samples - 5, samples - 1):
-        for stop in (first, first + 1, first + 4, samples):
-            found = kept.velocity[first:stop]
-            np.testing.assert_allclose(found, whole.velocity[first:stop], atol=1e-12)
-    np.testing.assert_array_equal(kept.valid, whole.valid)
 
 
 RATE = 1000.0
@@ -699,18 +507,6 @@ def test_nothing_is_differentiated_across_a_gap():
     assert np.abs(found - velocity)[valid].max() < 1e-3 * np.abs(velocity).max()
 
 
-def test_short_stretches_are_differentiated_by_differences():
-    position = np.outer(LONG[:6], [2.0])
-    valid = np.array([True, True, True, False, False, True])
-    assert np.allclose(joint_velocity(LONG[:6], position, valid).T, [[2, 2, 2, 0, 0, 0]], atol=1e-9)
-
-
-def test_stretches_lie_between_gaps():
-    valid = np.array([0, 1, 1, 0, 1, 0, 1, 1, 1], dtype=bool)
-    assert list(stretches(valid, 9)) == [slice(1, 3), slice(6, 9)]
-    assert list(stretches(None, 9)) == [slice(0, 9)]
-
-
 def test_a_tumbling_base_has_its_body_velocity():
     pose, twist = tumble(LONG)
     assert np.allclose(base_velocity(LONG, pose), twist, rtol=0, atol=1e-6)
@@ -720,14 +516,6 @@ def test_quaternions_that_flip_their_sign_give_no_spike():
     pose, twist = tumble(LONG)
     pose[700:1300, 3:] *= -1
     assert np.allclose(base_velocity(LONG, pose), twist, rtol=0, atol=1e-6)
-
-
-def test_a_half_turn_between_two_samples_does_not_silence_the_rest():
-    pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (20, 1))
-    pose[5:, 3:] = [1.0, 0, 0, 0]
-    pose[:, 0] = np.arange(20) / RATE
-    linear = base_velocity(LONG[:20], pose)[:, :3]
-    assert np.allclose(np.linalg.norm(linear, axis=1), 1.0, atol=1e-9)
 
 
 def test_a_run_of_positions_alone_has_velocities_and_states_their_source(tmp_path):
@@ -746,73 +534,6 @@ def test_a_run_of_positions_alone_has_velocities_and_states_their_source(tmp_pat
         "velocity_desired": METHOD,
         "base_velocity": METHOD,
     }
-
-
-def test_velocities_that_are_there_are_left_alone(tmp_path):
-    position, velocity = swing(LONG)
-    np.savez(tmp_path / "run.npz", time=LONG, position=position, velocity=2 * velocity)
-    run = Run.load(tmp_path / "run.npz")
-    assert np.array_equal(run.velocity, 2 * velocity)
-    assert "differentiated" not in run.meta
-
-
-@pytest.mark.parametrize(
-    ("arrays", "message"),
-    [
-        ({"position": np.ones((3, 2))}, r"position: shape \(3, 2\), expected \(2000, 2\)"),
-        (
-            {"position": np.where(LONG == 0.003, np.nan, 1.0)[:, None]},
-            "position: nan in row 3, column 0; mark gaps with valid = false",
-        ),
-        (
-            {"velocity": np.ones((2000, 1)), "base_pose": np.ones((2000, 6))},
-            r"base_pose: shape \(2000, 6\), expected \(2000, 7\)",
-        ),
-        (
-            {"velocity": np.ones((2000, 1)), "base_pose": np.zeros((2000, 7))},
-            "the quaternion in row 0 has norm 0, expected 1",
-        ),
-    ],
-)
-def test_positions_that_cannot_be_differentiated_are_refused(tmp_path, arrays, message):
-    np.savez(tmp_path / "run.npz", time=LONG, **arrays)
-    with pytest.raises(RunFileError, match=message):
-        Run.load(tmp_path / "run.npz")
-
-
-@pytest.mark.parametrize("derivative", [joint_velocity, base_velocity])
-def test_rows_that_are_differentiated_on_demand_are_those_of_the_whole(derivative):
-    time, read = LONG[:60], []
-    pose, _ = tumble(time)
-    pose[30:, 3:] *= -1
-    valid = np.ones(60, dtype=bool)
-    valid[[7, 20, 23, 40, 41]] = False
-    whole = derivative(time, pose, valid)
-
-    def rows(first, stop):
-        assert 0 <= first <= stop <= 60
-        read.append((first, stop))
-        return pose[first:stop]
-
-    kept = derivative(time, OnDemand((60, 7), np.float64, rows), valid)
-    assert isinstance(kept, OnDemand)
-    assert (kept.shape, kept.dtype) == (whole.shape, np.float64)
-    for first in range(0, 60, 3):
-        for stop in (first + 1, first + 5, 60):
-            found = kept[first:stop]
-            np.testing.assert_allclose(found, whole[first:stop], atol=1e-9)
-    assert max(stop - first for first, stop in read[::3]) <= 1 + 2 * 7
-    without = derivative(time, OnDemand((60, 7), np.float64, rows))
-    np.testing.assert_allclose(without[10:20], derivative(time, pose)[10:20], atol=1e-9)
-
-
-def test_a_base_on_a_straight_and_level_way_has_the_velocity_along_its_own_axes():
-    """A quarter turn about z: what is x in the world is -y of the base."""
-    pose = np.tile([0, 0, 0, 0, 0, np.sqrt(0.5), np.sqrt(0.5)], (20, 1))
-    pose[:, :3] = np.outer(LONG[:20], [2.0, 3.0, 5.0])
-    expected = np.tile([3.0, -2.0, 5.0, 0, 0, 0], (20, 1))
-    np.testing.assert_allclose(base_velocity(LONG[:20], pose), expected, atol=1e-9)
-    np.testing.assert_allclose(base_velocity(LONG[:20], 1.005 * pose), 1.005 * expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("samples", [2, 3, 6, 7, 8])

@@ -46,14 +46,14 @@ def mesh(path: Path) -> Path:
 )
 def test_meshes_of_the_robots_own_folders_are_found(tmp_path, place, file, address):
     mesh(tmp_path / file)
-    assert len(triangles(Robot.load(urdf(tmp_path / place, address))).triangles[0]) == 1
+    assert len(triangles(Robot.load(urdf(tmp_path / place, address)))[0]) == 1
 
 
 def test_a_package_of_another_folder_name_is_known_by_its_package_xml(tmp_path):
     mesh(tmp_path / "clone-of-arm" / "meshes" / "a.obj")
     (tmp_path / "clone-of-arm" / "package.xml").touch()
     path = urdf(tmp_path / "clone-of-arm" / "robots" / "urdf", "package://arm/meshes/a.obj")
-    assert len(triangles(Robot.load(path)).triangles[0]) == 1
+    assert len(triangles(Robot.load(path))[0]) == 1
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_a_neighbouring_package_needs_a_package_root(tmp_path):
     with pytest.raises(MeshError, match="not found in .*--package-root"):
         triangles(Robot.load(path))
     found = Robot.load(path, package_root=tmp_path / "ws")
-    assert len(triangles(found).triangles[0]) == 1
+    assert len(triangles(found)[0]) == 1
     with pytest.raises(RobotError, match="package root .*nowhere: there is no such folder"):
         Robot.load(path, package_root=tmp_path / "nowhere")
 
@@ -94,7 +94,7 @@ def test_a_home_and_what_contains_it_are_no_roots(tmp_path, monkeypatch):
         with pytest.raises(MeshError, match=r"(outside of|not found in)"):
             triangles(Robot.load(urdf(folder, address)))
     mesh(home / "meshes" / "a.obj")
-    assert len(triangles(Robot.load(urdf(home, "meshes/a.obj"))).triangles[0]) == 1
+    assert len(triangles(Robot.load(urdf(home, "meshes/a.obj")))[0]) == 1
 
 
 def test_the_root_of_the_disk_is_no_root(tmp_path, monkeypatch):
