@@ -7,10 +7,8 @@ and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robot
 
 from noisemodel.compare import Comparison, Comparisons, LeftOut, compare
 from noisemodel.errors import (
-    ClusterError,
     GeometryError,
     MeshError,
-    MotionError,
     NoiseModelError,
     OutputError,
     RobotError,
@@ -31,13 +29,11 @@ __all__ = [
     "KINDS",
     "ROBOTS",
     "Block",
-    "ClusterError",
     "Comparison",
     "Comparisons",
     "GeometryError",
     "LeftOut",
     "MeshError",
-    "MotionError",
     "Noise",
     "NoiseModelError",
     "OutputError",

@@ -491,7 +491,7 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
     scaled down. Joints that mimic another one follow it; the base's pose stays at the origin.
 
     Args:
-        rate: Sample rate, in [Hz]; its Nyquist frequency has to be above that of the shakes.
+        rate: Sample rate, in [Hz]; its Nyquist frequency has to be above the shakes.
     """
     if not 2.0 * SHAKE_HZ[1] < rate < np.inf:
         raise NoiseModelError(
@@ -619,9 +619,9 @@ def compare(
     """Comparison of kinds of noise estimates, on the motions of one robot or many.
 
     All estimates are compared as pressures, whose scale is arbitrary: a factor between two kinds
-    changes neither their correlation nor their distance. Each kind is evaluated once. The kinds
-    are those of F. Sygulla and D. Rixen, "Learning the Noise of Failure", Sec. II-A, and of
-    ``surface_speed``.
+    changes neither their correlation nor their distance. F. Sygulla and D. Rixen define the
+    kinds "simplified" and "paper" ("Learning the Noise of Failure", Sec. II-A); ``surface_speed``
+    defines the others. Each kind is evaluated once.
 
     Robots that cannot be read or have no surface, and runs that do not suffice, are left out and
     listed with the reason.

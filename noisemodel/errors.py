@@ -25,16 +25,8 @@ class OutputError(NoiseModelError):
     """An output that exists already or cannot be written."""
 
 
-class ClusterError(NoiseModelError):
-    """A Dask cluster that cannot be reached, is lost, or has other software or files."""
-
-
 class RobotError(NoiseModelError):
     """A robot that cannot be found or read, or that moves in a way that is not supported."""
-
-
-class MotionError(NoiseModelError):
-    """Configurations or velocities that are not a robot's, or not finite."""
 
 
 class UnknownKindError(NoiseModelError):

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel.errors import MotionError, NoiseModelError, UnknownKindError
+from noisemodel.errors import NoiseModelError, UnknownKindError
 from noisemodel.noise import CHUNK, SOUND_SPEED, Noise, check_positive, sound_power
 from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
 from noisemodel.run import Run, rows_of, stretches
@@ -49,15 +49,15 @@ def surface_speed(robot: Robot, surface: Surface, q: Real, v: Real, kind: str = 
         v: Velocities as Pinocchio has them, shape (samples, nv).
         kind: "paper", the sum of the paper's terms "A", "B" and "C", or one of these; "mean",
             the exact mean that the sum is an upper bound of; "rms", the root of the mean-square
-            speed; "normal", that of the mean-square speed normal to the surface.
+            speed; "normal", the same for the speed normal to the surface.
 
     Returns:
         Shape (samples, links), in [m/s]; 0 for links without geometry.
 
     Raises:
         UnknownKindError: If there is no such kind.
-        GeometryError: If the surface is that of another robot.
-        MotionError: If ``q`` or ``v`` are of another shape or not finite.
+        GeometryError: If the surface belongs to another robot.
+        NoiseModelError: If ``q`` or ``v`` are of another shape or not finite.
     """
     check_kind(kind)
     check_surface(surface, robot)
@@ -136,11 +136,11 @@ def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q
     """Refuse a motion that is not this robot's, or not finite."""
     for name, array, width in zip(names, (q, v), (robot.nq, robot.nv), strict=True):
         if array.shape != (len(q), width):
-            raise MotionError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
+            raise NoiseModelError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
         finite = np.isfinite(array)
         if not finite.all():
             row, column = np.argwhere(~finite)[0]
-            raise MotionError(
+            raise NoiseModelError(
                 f"{name}: {array[row, column]} in row {row}, column {column}; cut gaps out"
             )
 
@@ -209,9 +209,9 @@ def extended(
         v: Velocities as Pinocchio has them, shape (samples, nv).
         kind: How the mean speed of a surface is taken, see ``surface_speed``.
         efficiency: Radiation efficiency: one for all links, one for each, shape (links,), or
-            "dipole", that of a small body that oscillates, by its frequency (see
-            `Dipole`). With the kind "normal" that is the physics; the motion that
-            the other kinds see is filtered alike, so that they can be compared.
+            "dipole": a small body that oscillates radiates less at low frequencies, see `Dipole`.
+            This is physics for the kind "normal"; the other kinds get the same filter, so that
+            they can be compared.
         rate: Sample rate, which only "dipole" needs, in [Hz].
         q_desired: Desired configurations, shape (samples, nq); ``q`` unless given.
         v_desired: Desired velocities, shape (samples, nv); the power of this motion is added.
@@ -222,10 +222,9 @@ def extended(
 
     Raises:
         UnknownKindError: If the kind does not exist.
-        GeometryError: If the surface is that of another robot.
-        MotionError: If ``q`` or ``v`` are of another shape than the robot's, or not finite.
-        NoiseModelError: If a number is not positive, lengths differ, or a link is too small for
-            "dipole" at this rate.
+        GeometryError: If the surface belongs to another robot.
+        NoiseModelError: If ``q`` or ``v`` are of another shape than the robot's, or not finite; a
+            number is not positive; lengths differ; or a link is too small for "dipole".
     """
     check_kind(kind)
     check_surface(surface, robot)

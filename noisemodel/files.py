@@ -27,7 +27,7 @@ from noisemodel.errors import NoiseModelError, OutputError, RobotError
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 TEMPORARY = re.compile(r"\.noise-inspector-([0-9a-f]{8})?[0-9a-f]{8}")
-"""Names of temporary files, with the machine; those of model files, without, too."""
+"""Names of temporary files: with the machine, or without it for model files."""
 ABANDONED, ABANDONED_HERE = 86_400.0, 60.0
 """Ages from which a temporary file is one of a process that was killed, in [s]: on any machine that
 shares the folder, and on this one, whose locks are known."""

@@ -118,7 +118,7 @@ def _parsed(path: Path, data: bytes) -> Mesh:
     try:
         points, faces = READERS[path.suffix.lower()](data)
     except (ValueError, LookupError, OverflowError, RecursionError) as error:
-        # The readers' own words, or those of numpy on what is no number.
+        # The words of the reader, or of NumPy where a number is expected.
         raise MeshError(path, f"cannot be read ({' '.join(str(error).split())})") from error
     if len(faces) > limit("triangles"):
         raise MeshError(path, f"has {len(faces)} triangles, {beyond('triangles')}; simplify it")

@@ -67,8 +67,8 @@ class Mjcf:
 
     Attributes:
         model: The ``pinocchio.Model``.
-        floating_base: Whether its first joint lets the base move freely. Further free joints are
-            those of objects, which stay where the file puts them.
+        floating_base: Whether its first joint lets the base move freely. Further free joints
+            belong to objects, which stay where the file puts them.
         mimics: Joints that a linear equality constraint ties to another one, by name.
         visual: The geoms that are drawn, by the rule of `_visual`.
         collision: The geoms that can collide.
@@ -276,7 +276,7 @@ def _without_files(spec: Any, path: Path, folders: Sequence[Path]) -> dict[int, 
     for name, mesh in by_name.items():
         if name not in fitted:
             spec.delete(mesh)
-    # Bodies whose mass MuJoCo would take from meshes have that of the spheres: nothing reads it.
+    # MuJoCo takes the masses of some bodies from meshes, now from spheres: nothing reads them.
     spec.compiler.boundmass = spec.compiler.boundinertia = 1e-6
     return meshes
 

@@ -29,7 +29,7 @@ def simplified(velocity: Real, velocity_desired: Real | None = None) -> Array:
     """Estimate a robot's noise pressure from its joint velocities, all constants 1.
 
     Args:
-        velocity: Measured velocities, those of a floating base included,
+        velocity: Measured velocities, a floating base's included,
             shape (samples, n), in [rad/s] and [m/s].
         velocity_desired: Desired joint velocities, shape (samples, m); none counts as zero.
 

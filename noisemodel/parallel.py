@@ -19,7 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from noisemodel.errors import ClusterError
+from noisemodel.errors import NoiseModelError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -150,12 +150,12 @@ def _end_with(parent: int) -> None:
 def _cluster(address: str) -> Iterator[Any]:
     """A client of a scheduler that has a worker; Dask's own messages are left out."""
     if find_spec("distributed") is None:
-        raise ClusterError(
+        raise NoiseModelError(
             "a Dask cluster needs distributed, which is not installed;"
             " run `pip install 'noise-inspector[cluster]'`"
         )
     if not re.fullmatch(r"\w+://.+:\d+", address):
-        raise ClusterError(f"{address!r} is no address of a Dask scheduler, tcp://HOST:PORT")
+        raise NoiseModelError(f"{address!r} is no address of a Dask scheduler, tcp://HOST:PORT")
     from distributed import CancelledError, Client, KilledWorker
 
     for name in ("distributed", "distributed.client"):
@@ -163,7 +163,7 @@ def _cluster(address: str) -> Iterator[Any]:
     try:
         client = Client(address, timeout=REACHED, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise ClusterError(
+        raise NoiseModelError(
             f"{address}: no Dask scheduler answers there; start one with `dask scheduler`,"
             " and name the address that it prints"
         ) from error
@@ -171,7 +171,7 @@ def _cluster(address: str) -> Iterator[Any]:
         try:
             client.wait_for_workers(1, timeout=STAFFED)
         except TimeoutError as error:
-            raise ClusterError(
+            raise NoiseModelError(
                 f"{address}: the Dask scheduler has no worker after {STAFFED:.0f} s; start some"
                 f" with `dask worker {address} --nthreads 1`"
             ) from error
@@ -179,12 +179,12 @@ def _cluster(address: str) -> Iterator[Any]:
         try:
             yield client
         except KilledWorker as error:
-            raise ClusterError(f"{address}: {DIED}; what it worked on is not known") from error
+            raise NoiseModelError(f"{address}: {DIED}; what it worked on is not known") from error
         except (OSError, CancelledError) as error:
             if isinstance(error, OSError) and client.status == "running":
                 raise
             lost = f"{address}: the connection to the Dask scheduler is lost"
-            raise ClusterError(lost) from error
+            raise NoiseModelError(lost) from error
 
 
 def _check_software(client: Any, address: str) -> None:
@@ -194,7 +194,7 @@ def _check_software(client: Any, address: str) -> None:
         for worker, found in client.run(_version, name, on_error="return").items():
             there = "none" if isinstance(found, Exception) else found
             if there != here:
-                raise ClusterError(
+                raise NoiseModelError(
                     f"{address}: worker {worker} has {name} {there}, here is {here};"
                     " install the same on all"
                 )
@@ -213,7 +213,7 @@ def _there(
     """Call a function on a Dask worker as the client would: in its folder, with its settings."""
     os.environ.update(variables)
     if not Path(folder).is_dir():
-        raise ClusterError(
+        raise NoiseModelError(
             f"a worker has no folder {folder}; it must see the same files, by the same paths"
         )
     os.chdir(folder)

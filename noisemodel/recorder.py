@@ -49,7 +49,7 @@ class Recorder:
         meta: What else is known, for the run.
 
     Raises:
-        RunError: If the rate is none that a run may have.
+        RunError: If a run cannot have this rate.
         RobotError: If the robot cannot be read.
         UnknownJointError: If it lacks one of the joints.
 
@@ -201,7 +201,7 @@ class Recorder:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Save what there is; an error of the loop counts for more than one of saving."""
+        """Save the samples so far; an error of the loop hides an error of saving."""
         if self._path is None:
             return
         try:

@@ -40,7 +40,7 @@ PACKAGE = re.compile(rb"package:///?([^/\"'<>\s]+)/")
 """The package in the address of a mesh."""
 
 BESIDE = ("meshes", "visual", "collision", "assets")
-"""Folders beside that of a URDF or an MJCF that belong to it where no package says so."""
+"""Folders beside a URDF's or MJCF's own that belong to the robot if no package says so."""
 
 KINDS = {
     r"R[XYZ]|RevoluteUnaligned": "revolute",
@@ -204,7 +204,7 @@ class Robot:
     """A robot with its kinematics.
 
     Attributes:
-        name: Its name in the list, or that of its file.
+        name: Its name in the list, or its file's.
         path: The URDF or MJCF that it was read from.
         package_roots: Folders that ``package://`` addresses are searched in.
         model: Pinocchio's model; mimic joints are joints of their own in it.
@@ -245,7 +245,7 @@ class Robot:
             floating_base: Whether the base moves freely; unless given, as listed, False for a URDF
                 of one's own, and as an MJCF has it.
             mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
-            package_root: A folder that meshes may lie in besides those of `package_roots`.
+            package_root: A further folder that meshes may lie in, see `package_roots`.
 
         Returns:
             The robot.
@@ -337,11 +337,12 @@ class Robot:
         if run.velocity_desired is None:
             return None
         v = self._velocities(run.desired_joint_names, run.velocity_desired)
-        if run.position_desired is None and run.position is not None:
-            return self._positions(run.joint_names, run.position), v
-        if run.position_desired is None:
+        names, position = run.desired_joint_names, run.position_desired
+        if position is None:
+            names, position = run.joint_names, run.position
+        if position is None:
             raise RunError(f"the run has no positions; {self.name!r} cannot be moved without")
-        return self._positions(run.desired_joint_names, run.position_desired), v
+        return self._positions(names, position), v
 
     def _positions(self, names: tuple[str, ...], position: Real) -> Array:
         # Samples lie next to each other in memory, as batch kinematics reads them.
@@ -401,7 +402,7 @@ def locate(name: str | Path) -> Path:
 def package_roots(name: str | Path, package_root: str | Path | None = None) -> tuple[Path, ...]:
     """Folders that a robot's meshes are searched in, and outside of which none may lie.
 
-    A listed robot has those of the list. For another file it is the nearest folder above that a
+    Listed robots share their folders. For another file it is the nearest folder above that a
     ``package://`` address in it names; else the nearest one with a package.xml; else the file's own
     folder and those of ``BESIDE``. The root of the disk, a home, and what contains a home are never
     among them. ``package_root``, or the environment variable ``NOISE_PACKAGE_ROOT``, adds one.

@@ -187,7 +187,7 @@ class Run:
 
     @property
     def motion(self) -> Real:
-        """All measured velocities, those of a floating base first, shape (samples, n).
+        """All measured velocities, a floating base's first, shape (samples, n).
 
         The simplified noise counts the base's six velocities too (paper, Sec. II-A: n = 30).
         """
@@ -691,7 +691,7 @@ def decimated(run: Run, rate: float) -> Run:
         meta. Samples that the filter took partly from a gap are marked as not valid.
 
     Raises:
-        RunError: If ``rate`` is above that of the run, or leaves fewer than two samples.
+        RunError: If ``rate`` is above the run's, or leaves fewer than two samples.
     """
     ratio = Fraction(rate / run.rate).limit_denominator(1000)  # jitter of 0.1 % is none
     if not 0 < ratio <= 1:

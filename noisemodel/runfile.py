@@ -200,7 +200,7 @@ def _shrinks(array: Any) -> bool:
 
 
 class OnDemand(NDArrayOperatorsMixin):
-    """An array of which rows are read when they are needed.
+    """An array whose rows are read when they are needed.
 
     It can stand in for a NumPy array. Slices and indices of rows read these; whatever else is done
     with it reads it whole, once, and keeps it in memory.
@@ -355,7 +355,7 @@ def _header(stream: IO[bytes], name: str, size: int) -> tuple[tuple[int, ...], b
         header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[version]
         shape, fortran, dtype = header(stream)
         length = prod(shape)
-    except Exception as error:  # NumPy lets those of its parser through: any, by the bytes
+    except Exception as error:  # NumPy lets any error of its parser through
         raise ArchiveError(f"{name} is no array ({one_line(error)})") from error
     if dtype.hasobject:
         raise ObjectArrayError(name)

@@ -23,7 +23,7 @@ from noisemodel.types import Array
 NUMBERS = {"xyz": 3, "rpy": 3, "ixx": 1, "iyy": 1, "izz": 1, "ixy": 1, "ixz": 1, "iyz": 1}
 
 AXIAL = {"revolute", "continuous", "prismatic", "planar"}
-"""Joint types whose axis matters; that of a fixed joint is often 0."""
+"""Joint types whose axis matters; a fixed joint's is often 0."""
 
 SECTIONS = 64
 """Flat sides of a cylinder or capsule."""
@@ -237,7 +237,7 @@ def capsule(radius: float, length: float) -> Array:
     """Draw a cylinder of this length with a half sphere on either end, along the z axis.
 
     The half spheres are cut along their circles of longitude and latitude: so they meet the
-    cylinder's corners, which those of an icosahedron would not.
+    cylinder's corners, which an icosahedron would not.
     """
     latitude = np.linspace(0, np.pi / 2, SECTIONS // 4 + 1)
     rim, height = radius * np.cos(latitude), radius * np.sin(latitude) + 0.5 * length

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from commandline import call
 
-from noisemodel import ClusterError, parallel
+from noisemodel import NoiseModelError, parallel
 from noisemodel.parallel import as_done, in_order
 
 ROOT = Path(__file__).parents[1]
@@ -96,13 +96,15 @@ def handler(_):
 @pytest.mark.parametrize("address", ["localhost", "tcp://localhost", "tcp://:8786", "8786"])
 def test_an_address_has_a_protocol_a_host_and_a_port(address):
     pytest.importorskip("distributed")
-    with pytest.raises(ClusterError, match=r"is no address of a Dask scheduler, tcp://HOST:PORT"):
+    with pytest.raises(
+        NoiseModelError, match=r"is no address of a Dask scheduler, tcp://HOST:PORT"
+    ):
         list(in_order(invert, [1], jobs=address, died=dead))
 
 
 def test_without_the_extra_it_is_one_line(monkeypatch):
     monkeypatch.setattr(parallel, "find_spec", lambda name: None)
-    with pytest.raises(ClusterError, match=r"run `pip install 'noise-inspector\[cluster\]'`$"):
+    with pytest.raises(NoiseModelError, match=r"run `pip install 'noise-inspector\[cluster\]'`$"):
         list(in_order(invert, [1], jobs="tcp://127.0.0.1:8786", died=dead))
 
 
@@ -113,7 +115,7 @@ def test_without_items_no_scheduler_is_asked():
 def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(parallel, "REACHED", 0.5)
-    with pytest.raises(ClusterError, match="no Dask scheduler answers there; start one with"):
+    with pytest.raises(NoiseModelError, match="no Dask scheduler answers there; start one with"):
         list(in_order(invert, [1], jobs="tcp://127.0.0.1:1", died=dead))
 
 
@@ -122,7 +124,7 @@ def test_workers_with_other_software_are_named():
         def run(self, function, name, *, on_error):
             return {"tcp://worker": "0.0.1" if name == "numpy" else function(name)}
 
-    with pytest.raises(ClusterError, match=r"worker tcp://worker has numpy 0.0.1, here is"):
+    with pytest.raises(NoiseModelError, match=r"worker tcp://worker has numpy 0.0.1, here is"):
         parallel._check_software(Client(), "tcp://x:1")
 
 
@@ -134,7 +136,7 @@ def test_a_worker_without_the_clients_folder_is_refused(tmp_path, monkeypatch):
     found = parallel._there(lambda item: (item, Path.cwd()), str(tmp_path / "there"), variables, 3)
     assert found == (3, tmp_path / "there")
     assert os.environ["NOISE_LIMIT_JOINTS"] == "7"
-    with pytest.raises(ClusterError, match="must see the same files, by the same paths"):
+    with pytest.raises(NoiseModelError, match="must see the same files, by the same paths"):
         parallel._there(print, str(tmp_path / "gone"), {}, 3)
 
 
