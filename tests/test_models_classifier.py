@@ -1,12 +1,9 @@
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier import classifier as classifier_module
 
 RATE = 1000.0
 RANDOM = np.random.default_rng(11)
@@ -117,23 +114,6 @@ def test_noisytests_profile_loses_the_first_sample_and_the_tail():
     np.testing.assert_allclose(labels.start, 0.001 + 0.1 * np.arange(7))
 
 
-def test_classifying_twice_is_equal(ours):
-    signal = knocks(3.0)
-    once, again = ours.classify(signal, RATE), ours.classify(signal, RATE)
-    assert np.array_equal(once.label, again.label)
-    assert np.array_equal(once.scores, again.scores)
-
-
-def test_labels_do_not_depend_on_chunks(ours, monkeypatch):
-    signal = np.concatenate([noise(4.0, hum=0.2), knocks(6.0), noise(5.0)])
-    whole = ours.classify(signal, RATE)
-    monkeypatch.setattr(classifier_module, "CHUNK", 7)
-    chunked = ours.classify(signal, RATE)
-    assert len(whole) > classifier_module.CHUNK
-    assert np.array_equal(whole.label, chunked.label)
-    np.testing.assert_allclose(whole.scores, chunked.scores, atol=1e-9)
-
-
 def test_labels_are_those_of_the_frames_alone(ours):
     signal = np.concatenate([knocks(2.0), noise(2.0)])
     frames = nc.frame(signal, length=400, hop=100)
@@ -175,11 +155,6 @@ def test_signals_that_cannot_be_classified_are_refused(ours, signal, reason):
         ours.classify(signal, RATE)
 
 
-def test_validity_of_another_length_is_refused(ours):
-    with pytest.raises(nc.SignalError, match=r"validity of shape \(3,\)"):
-        ours.classify(np.zeros(500), RATE, valid=np.ones(3, bool))
-
-
 @pytest.mark.parametrize("rate", [970.0, 10_000.0, 0.0, float("nan")])
 def test_a_signal_of_another_rate_is_refused(ours, rate):
     with pytest.raises(nc.RateError, match="rates are 1000 Hz: lower the signal's rate"):
@@ -210,19 +185,6 @@ def test_the_nearest_model_is_the_one_below(ours):
         nc.nearest(library, 500.0)
     with pytest.raises(nc.RateError, match="the models' rates are none Hz"):
         nc.nearest({}, 500.0)
-
-
-def test_classifying_needs_neither_scikit_learn_nor_scipy(ours, tmp_path):
-    ours.save(tmp_path / "model.npz")
-    code = (
-        "import sys, numpy, noiseclassifier\n"
-        "model = noiseclassifier.Classifier.load(sys.argv[1])\n"
-        "print(len(model.classify(numpy.zeros(2000), 1000.0)))\n"
-        "print(sorted({'sklearn', 'scipy', 'noisemodel', 'joblib'} & set(sys.modules)))\n"
-    )
-    command = [sys.executable, "-c", code, tmp_path / "model.npz"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.split("\n")[:2] == ["17", "[]"]
 
 
 def test_the_package_lists_its_public_names_alone():

@@ -2,13 +2,10 @@
 
 import json
 from dataclasses import asdict, replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from generalmodel import RATES, RECIPE, frames, recording, signals, trained
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import noiseclassifier as nc
 from noiseclassifier.estimators.trees import Trees
@@ -42,22 +39,6 @@ def rewrite(path, manifest=(), **changes):
     np.savez(path, **{name: array for name, array in arrays.items() if array is not None})
 
 
-def streamed(classifier, signals, cuts):
-    """Labels of a signal in pieces, as those of the whole."""
-    count = next(iter(signals.values())).shape[-1]
-    joints = next((each.shape[0] for each in signals.values() if each.ndim > 1), 1)
-    stream = nc.Stream(classifier, joints=joints)
-    parts = [
-        stream.push({name: each[..., a:b] for name, each in signals.items()})
-        for a, b in pairwise([0, *sorted(cuts), count])
-    ]
-    parts.append(stream.finish())
-    return {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("start", "stop", "label", "scores", "novel")
-    }
-
-
 @pytest.mark.parametrize("given_", GIVEN)
 @pytest.mark.parametrize("rate", RATES)
 def test_a_bound_model_decides_as_the_full_one_without_the_missing_features(rate, given_):
@@ -70,19 +51,6 @@ def test_a_bound_model_decides_as_the_full_one_without_the_missing_features(rate
     full[:, RECIPE.places(bound.profile)] = features
     expected = model.estimator.decision((full - model.mean) / model.scale)
     np.testing.assert_array_equal(bound.decide(features), expected)
-
-
-@settings(max_examples=6, deadline=None)
-@given(data=st.data())
-@pytest.mark.parametrize("given_", GIVEN)
-@pytest.mark.parametrize("rate", RATES)
-def test_a_stream_in_any_chunks_has_the_labels_of_the_whole_run(rate, given_, data):
-    there = signals(rate, "oscillations", seed=8, names=GIVEN[given_], seconds=3.0)
-    bound = trained().at(rate, there)
-    cuts = data.draw(st.lists(st.integers(0, round(3.0 * rate)), max_size=20))
-    whole = bound.classify(there, rate)
-    for name, each in streamed(bound, there, cuts).items():
-        np.testing.assert_array_equal(each, getattr(whole, name), err_msg=name)
 
 
 @pytest.mark.parametrize("names", INPUTS, ids=", ".join)
@@ -255,18 +223,6 @@ def test_trees_have_the_probabilities_of_scikit_learn_where_features_are_missing
     np.testing.assert_allclose(
         ours.score(ours.decision(points)), theirs.predict_proba(points), rtol=1e-9
     )
-
-
-def test_a_part_of_the_frames_may_lack_a_feature_that_others_have():
-    recordings = [
-        recording(rate, label, seed)
-        for seed, rate in enumerate((80.0, 125.0, 125.0, 500.0))
-        for label in ("ok", "oscillations")
-    ]
-    model = nc.General.train(nc.Frames.joined(nc.frames_of(recordings, RECIPE)), RECIPE)
-    shaken = signals(500.0, "oscillations", seed=12)
-    labels = model.at(500.0, shaken).classify(shaken, 500.0)
-    assert "oscillations" in {event.label for event in labels.events()}
 
 
 # --- the file

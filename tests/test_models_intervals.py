@@ -49,16 +49,6 @@ def test_runs_without_a_mistake_have_the_bound_of_their_number():
         assert (nothing.low, nothing.high) == (0.0, pytest.approx(1.0 - 0.025 ** (1 / runs)))
 
 
-def test_intervals_shrink_with_the_root_of_the_number_of_groups():
-    widths = []
-    for runs in (20, 80, 320):
-        part = np.where(np.arange(runs) % 4 == 0, 2.0, 9.0)
-        share = share_of(each_its_own(runs), part, np.full(runs, 10.0))
-        widths.append(share.high - share.low)
-    assert widths[0] / widths[1] == pytest.approx(2.0, rel=0.15)
-    assert widths[1] / widths[2] == pytest.approx(2.0, rel=0.15)
-
-
 def test_intervals_hold_what_is_true_in_95_of_100_cases_and_those_by_frames_do_not():
     random = np.random.default_rng(5)
     held, naive = 0, 0
@@ -89,13 +79,6 @@ def test_only_runs_in_the_sample_of_a_measure_count():
     nothing = share_of(each_its_own(7), np.zeros(7), np.zeros(7))
     assert isnan(nothing.value)
     assert nothing.as_dict() == {"value": None, "low": None, "high": None, "runs": 0, "groups": 0}
-
-
-def test_the_rate_of_one_robot_has_the_bounds_of_its_count():
-    events, time = np.array([2.0, 0.0, 1.0]), np.array([0.5, 0.25, 3.25])
-    found = each_its_own(3).mean_rate(events, time, [np.ones(3, dtype=bool)])
-    assert found.value == pytest.approx(3 / 4.0)
-    assert (found.low, found.high) == pytest.approx(np.divide(garwood(3), 4.0))
 
 
 def test_the_mean_of_two_sets_that_are_the_same_is_the_share_of_the_set():

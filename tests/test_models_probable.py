@@ -149,42 +149,9 @@ def test_a_frame_louder_than_all_of_the_training_set_is_unknown(classifier):
     assert replace(labels, unknown_is_finding=False).events() == ()
 
 
-@pytest.mark.parametrize("chunk", [1, 37, 400, 999, 5000])
-def test_a_stream_has_the_same_labels(classifier, chunk):
-    each = RECORDINGS[14]
-    batch = classifier.classify(each.signal, RATE)
-    stream, found = nc.Stream(classifier, joints=JOINTS), []
-    for first in range(0, each.samples, chunk):
-        piece = slice(first, first + chunk)
-        signals = {name: signal[..., piece] for name, signal in each.signal.items()}
-        found.append(stream.push(signals))
-    found.append(stream.finish())
-    together = {
-        name: np.concatenate([getattr(part, name) for part in found])
-        for name in ("start", "stop", "label", "scores")
-    }
-    for name, each in together.items():
-        np.testing.assert_array_equal(each, getattr(batch, name))
-
-
 def test_a_stream_of_other_joints_is_refused():
     classifier = nc.Classifier.train(
         Examples.read(RECORDINGS[:12], PROFILES["joints"]), PROFILES["joints"]
     )
     with pytest.raises(nc.SignalError, match="12 rows of norms and joints, expected 15"):
         nc.Stream(classifier, joints=4).push(RECORDINGS[0].signal)
-
-
-@pytest.mark.slow
-def test_training_twice_gives_the_same_bytes_and_they_are_read_back(classifier, tmp_path):
-    profile = classifier.profile
-    again = nc.Classifier.train(Examples.read(RECORDINGS[:12], profile), profile)
-    for name, each in (("a", classifier), ("b", again)):
-        each.save(tmp_path / f"{name}.npz")
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    read = nc.Classifier.load(tmp_path / "a.npz")
-    signal = RECORDINGS[13].signal
-    np.testing.assert_array_equal(
-        read.classify(signal, RATE).scores, classifier.classify(signal, RATE).scores
-    )
-    assert read.profile == profile

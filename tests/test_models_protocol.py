@@ -14,7 +14,6 @@ from noiseclassifier.labels import Event, Labels
 from noiseclassifier.matching import (
     SHIFTS,
     Outcome,
-    Unanswered,
     common,
     confirmed_at,
     duration,
@@ -447,50 +446,6 @@ def test_spans_are_merged_and_shared_as_on_a_fine_grid():
         both = inside(one) & inside(other)
         assert duration(common(one, other)) == pytest.approx(both.sum() / 8)
     assert duration(np.zeros((0, 2))) == 0.0
-
-
-def test_runs_without_a_verdict_are_counted_and_listed_with_their_robots():
-    slow = [
-        Unanswered(f"slow{number}", {"robot": "a1", "domain": "field"}, "rate 200 Hz < 1000 Hz")
-        for number in range(3)
-    ]
-    found = measured(perfect(1), slow)
-    assert found.not_answered == 0.5
-    assert found.by["robot"]["a1"].unanswered == 3
-    assert np.isnan(found.by["robot"]["a1"].measures["recall_injected"])
-    assert found.alike["recall_injected"].value == 1.0
-    text = [line for lines in lines_of(found) for line in lines]
-    assert "not answered: 3 runs (rate 200 Hz < 1000 Hz) of a1" in text
-    (share,) = (line for line in text if line.startswith("Runs without a verdict"))
-    assert share.split()[4:] == ["50.0%", "3", "of", "6"]
-    assert found.as_dict()["unanswered"][0]["robot"] == "a1"
-
-
-def test_the_table_has_one_line_for_each_robot_domain_or_scenario():
-    odd = reporting("go2/blow-001", IMPACT, [], scenario="blow", domain="soft")
-    found = measured([*perfect(domain="stiff"), odd])
-    heads = [lines[0].split("  ")[0] for lines in lines_of(found)]
-    assert heads[-2:] == ["By robot", "By domain"]
-    (table,) = (lines for lines in lines_of(found, "scenario") if lines[0].startswith("By "))
-    assert [line.split()[0] for line in table[1:]] == ["blow", "good", "swing"]
-    worst = next(lines for lines in lines_of(found) if lines[0].startswith("The worst"))
-    assert " ".join(worst[1].split()) == "go2 blow 0.0% 0 of 1 injected, 0 of 1 detectable"
-
-
-@pytest.mark.parametrize(
-    ("seconds", "rate", "hours"),
-    [(2.0, "1800", "0.000556"), (5.0, "720", "0.00139"), (500.0, "7.2", "0.139")],
-)
-def test_false_alarms_are_listed_where_they_are_most_frequent(seconds, rate, hours):
-    good = blocks((0.0, seconds, "ok"))
-    facts = {"scenario": "good", "domain": "soft", "seconds": seconds}
-    false = reporting("go2/good-001", good, [("impact", 1.0, 1.5)], **facts)
-    found = measured([*perfect(domain="stiff"), false])
-    tables = [lines for lines in lines_of(found) if lines[0].startswith("The worst 1 of robot")]
-    assert [lines[0].split(", by ")[1] for lines in tables] == ["alarms per hour of ok time"]
-    ((_, row),) = tables
-    words = f"go2 soft {rate} per hour 1 in {hours} h"
-    assert row.split() == words.split()
 
 
 def test_long_tables_have_the_worst_and_long_names_keep_both_ends():

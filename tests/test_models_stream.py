@@ -102,18 +102,6 @@ def assert_equal(ours, batch):
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
 @pytest.mark.parametrize("name", PROFILES)
-def test_labels_are_those_of_the_whole_signal_however_it_is_cut(name, data):
-    samples = data.draw(st.integers(401, 3000))
-    cuts = data.draw(st.lists(st.integers(0, samples), max_size=30))
-    signal = noise(samples, seed=samples)
-    stream = nc.Stream(classifier(name), start=5.0)
-    batch = classifier(name).classify(signal, RATE, start=5.0)
-    assert_equal(streamed(stream, signal, cuts), batch)
-
-
-@settings(max_examples=40, deadline=None)
-@given(data=st.data())
-@pytest.mark.parametrize("name", PROFILES)
 def test_frames_that_touch_a_gap_are_left_out_as_in_the_whole_signal(name, data):
     samples = data.draw(st.integers(401, 3000))
     cuts = data.draw(st.lists(st.integers(0, samples), max_size=10))

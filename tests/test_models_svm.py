@@ -5,7 +5,7 @@ import pytest
 from sklearn.svm import SVC
 
 import noiseclassifier as nc
-from noiseclassifier.estimators.svm import choose, fit, score, svm_count
+from noiseclassifier.estimators.svm import choose, fit, score
 
 RANDOM = np.random.default_rng(3)
 CENTRES = RANDOM.standard_normal((4, 20))
@@ -95,8 +95,3 @@ def test_votes_decide_and_the_first_of_equals_wins():
     assert choose(circle, classes=3, multiclass="one-vs-one").tolist() == [0]
     # what is undecided goes to the second of a pair, as libsvm has it
     assert choose(np.zeros((1, 3)), classes=3, multiclass="one-vs-one").tolist() == [2]
-
-
-def test_there_are_as_many_svms_as_pairs_or_classes():
-    assert svm_count(4, "one-vs-one") == 6
-    assert svm_count(4, "one-vs-rest") == 4

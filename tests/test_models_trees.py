@@ -143,27 +143,6 @@ def test_a_thousandth_of_the_training_frames_lies_above_the_bound_of_a_feature()
     assert ours.decision(ours.known[None] + [[0.5, -3.0]])[0, -1] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(("frames", "jobs"), [(49, 1), (50, 1), (51, -1)])
-def test_processes_are_started_for_many_frames_alone(monkeypatch, frames, jobs):
-    import joblib
-
-    started = []
-
-    def parallel(n_jobs):
-        started.append(n_jobs)
-        return list_of_calls
-
-    def list_of_calls(tasks):
-        return [function(*args, **options) for function, args, options in tasks]
-
-    monkeypatch.setattr(joblib, "Parallel", parallel)
-    monkeypatch.setattr(module, "MANY", 50)
-    features, targets = drawn(2, frames)
-    profile = replace(nc.GENERAL.at(1000.0), rounds=1)
-    Trees.fit(features, targets, np.array(["one"] * frames), profile)
-    assert started == [jobs]
-
-
 def test_the_first_leaf_that_is_left_is_the_lowest_bit():
     assert len(module._FIRST) == 1 << 16
     few = np.random.default_rng(0).integers(1, 1 << 16, size=500).tolist()

@@ -93,9 +93,7 @@ class Examples:
 
     Attributes:
         features: Not yet standardised, shape (frames, features).
-        labels: Class of each frame, shape (frames,).
-        runs: Name of the recording that each frame is from, shape (frames,).
-        hashes: SHA-256 of each recording, by name.
+        labels, runs, hashes: As of a `Dataset`.
     """
 
     features: Array

@@ -13,12 +13,7 @@ class SignalError(ModelsError):
 
 
 class MissingSignalError(SignalError):
-    """Signals that a model needs and that are missing.
-
-    Args:
-        lacking: Their names.
-        there: Names of the signals that there are.
-    """
+    """Signals that a model needs and that are missing, beside those that there are."""
 
     def __init__(self, lacking: Iterable[str], there: Iterable[str]) -> None:
         self.lacking, self.there = tuple(lacking), tuple(there)
@@ -30,12 +25,7 @@ class ProfileError(ModelsError):
 
 
 class RecordingError(ModelsError):
-    """A recording whose samples or annotations are wrong.
-
-    Args:
-        name: The name of the recording.
-        problem: What is wrong with it, in one line.
-    """
+    """A recording whose samples or annotations are wrong; the problem is one line."""
 
     def __init__(self, name: str, problem: str) -> None:
         self.name, self.problem = name, problem
@@ -54,21 +44,15 @@ class RateError(ModelsError):
     def __init__(self, rate: float, known: Iterable[float], advice: str = "") -> None:
         self.rate, self.known = rate, tuple(sorted(set(known)))
         there = ", ".join(f"{each:g}" for each in self.known) or "none"
+        message = f"logged at {rate:g} Hz, the model needs {there.partition(',')[0]} Hz or more"
         if advice or not self.known:
             advice = advice or "there is no model"
-            super().__init__(f"rate of {rate:g} Hz; the models' rates are {there} Hz: {advice}")
-        else:
-            least = f"{self.known[0]:g} Hz or more"
-            super().__init__(f"logged at {rate:g} Hz, the model needs {least}")
+            message = f"rate of {rate:g} Hz; the models' rates are {there} Hz: {advice}"
+        super().__init__(message)
 
 
 class FileError(ModelsError):
-    """A model file, or a file of a data set, that cannot be read or holds wrong values.
-
-    Args:
-        path: The file.
-        problem: What is wrong with it, in one line.
-    """
+    """A model file, or a file of a data set, that cannot be read or holds wrong values."""
 
     def __init__(self, path: str | Path, problem: str) -> None:
         self.path, self.problem = Path(path), problem
@@ -80,12 +64,7 @@ class OutputError(FileError):
 
 
 class AnnotationError(ModelsError):
-    """Annotations that cannot be understood.
-
-    Args:
-        problem: What is wrong with them, in one line.
-        where: The place, say "chunk 3"; may be empty.
-    """
+    """Annotations that cannot be understood, and the place, say "chunk 3"; it may be empty."""
 
     def __init__(self, problem: str, where: str = "") -> None:
         self.problem, self.where = problem, where
@@ -97,12 +76,7 @@ class DatasetError(ModelsError):
 
 
 class NoFrameError(DatasetError):
-    """Recordings without a single frame that is annotated and whole.
-
-    Args:
-        count: How many recordings there are.
-        classes: What their blocks could be called.
-    """
+    """Recordings without a single frame that is annotated and whole."""
 
     def __init__(self, count: int, classes: Iterable[str]) -> None:
         self.count, self.classes = count, tuple(classes)

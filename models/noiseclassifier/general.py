@@ -66,14 +66,8 @@ class General:
 
     Attributes:
         recipe: Bands, frames and settings of the estimator, for any rate.
-        classes: Names of the classes that it was trained with, in the recipe's order.
         estimator: Trees on all features.
-        mean: Mean of each feature, to be subtracted, shape (features,).
-        scale: Scale of each feature, to divide by, shape (features,).
-        runs: SHA-256 of each training recording, by name.
-        metrics: Measures of the training set.
-        versions: Of the software that trained it.
-        sha256: SHA-256 of the file that it was loaded from; empty if it was not.
+        mean, scale, classes, runs, metrics, versions, sha256: As of a `Classifier`.
     """
 
     recipe: LogBands

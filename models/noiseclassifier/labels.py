@@ -159,10 +159,10 @@ class Labels:
         A stretch has the class of most of its time: the frames at both ends of an oscillation often
         look like an impact.
         """
-        return tuple(self._event(self._name(frames), frames) for frames in self.stretches)
+        return tuple(map(self._event, self.stretches))
 
-    def _event(self, label: str, frames: Index) -> Event:
-        scores = self.scores[frames]
+    def _event(self, frames: Index) -> Event:
+        label, scores = self._name(frames), self.scores[frames]
         if self.above_threshold is not None:  # of any failure, as the alarm threshold
             score = 1.0 - float(scores[:, 0].min())
         elif label in self.classes:

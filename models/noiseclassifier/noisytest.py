@@ -36,10 +36,15 @@ def read_log(path: str | Path) -> tuple[Array, Array]:
         FileError: If the file is missing or empty, a line is no pair of finite numbers, or
             time does not go forward in even steps; the line is named.
     """
-    _check_regular(path)
-    columns = _read_fast(path)
-    if columns is None or columns.shape[1] != 2 or not np.isfinite(columns).all():
-        columns = _read_slowly(path)
+    try:
+        # A device or a pipe may have no end.
+        if not (stat.S_ISREG(Path(path).stat().st_mode) or Path(path).is_dir()):
+            raise FileError(path, "is no regular file; save what it holds to one")
+        columns = _read_fast(path)
+        if columns is None or columns.shape[1] != 2 or not np.isfinite(columns).all():
+            columns = _read_slowly(path)
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror or error})") from error
     time, noise = columns.T.copy()
     _check_time(path, time)
     return time, noise
@@ -48,16 +53,6 @@ def read_log(path: str | Path) -> tuple[Array, Array]:
 def nominal_rate(time: Array) -> float:
     """Sample rate that evenly spaced times have on the whole, in [Hz]."""
     return float(f"{(len(time) - 1) / (time[-1] - time[0]):.9g}")
-
-
-def _check_regular(path: str | Path) -> None:
-    """Refuse a device or a pipe, which may have no end."""
-    try:
-        regular = stat.S_ISREG(Path(path).stat().st_mode) or Path(path).is_dir()
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror or error})") from error
-    if not regular:
-        raise FileError(path, "is no regular file; save what it holds to one")
 
 
 def _read_fast(path: str | Path) -> Array | None:
@@ -71,8 +66,6 @@ def _read_fast(path: str | Path) -> Array | None:
             raise
         except (ValueError, UserWarning):
             return None
-        except OSError as error:
-            raise FileError(path, f"cannot be read ({error.strerror or error})") from error
 
 
 def _lines(path: str | Path, stream: TextIO) -> Iterator[str]:
