@@ -321,7 +321,7 @@ def _train_general(
     parts = list(nc.frames_of(simulators.noting(usable), nc.ANY, thin=THIN))
     if not parts:
         raise InspectorError(f"no run to train {ANY_RATE} on; {left_out}")
-    frames = nc.Frames.joined(parts)
+    frames = nc.Examples.joined(parts)
     model = simulators.signed(nc.General.train(frames, nc.ANY, thin=THIN))
     model.save(output, overwrite=overwrite)
     return model.evaluate(frames), left_out

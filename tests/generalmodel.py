@@ -56,7 +56,7 @@ def frames(recipe=RECIPE):
         for seed in range(2)
         for label in ("ok", "impact", "oscillations")
     ]
-    return nc.Frames.joined(nc.frames_of(recordings, recipe))
+    return nc.Examples.joined(nc.frames_of(recordings, recipe))
 
 
 @cache

@@ -178,7 +178,7 @@ def test_features_relative_to_a_reference_are_never_novel():
 
 
 def test_training_takes_two_classes():
-    alone = nc.Frames.joined(nc.frames_of([recording(500.0, "ok", 0)], RECIPE))
+    alone = nc.Examples.joined(nc.frames_of([recording(500.0, "ok", 0)], RECIPE))
     with pytest.raises(nc.DatasetError, match="two classes or more of ok, impact, .* are ok"):
         nc.General.train(alone, RECIPE)
 

@@ -28,7 +28,7 @@ from noiseclassifier.errors import (
     SignalError,
 )
 from noiseclassifier.features import features, frame
-from noiseclassifier.general import Frames, General, Model, frames_of, load, nearest
+from noiseclassifier.general import General, Model, frames_of, load, nearest
 from noiseclassifier.labels import UNKNOWN, Event, Labels
 from noiseclassifier.lasting import Lasting, merged
 from noiseclassifier.matching import Unanswered, match
@@ -73,7 +73,6 @@ __all__ = [
     "Examples",
     "Fault",
     "FileError",
-    "Frames",
     "General",
     "Labels",
     "Lasting",

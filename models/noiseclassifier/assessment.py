@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from noiseclassifier.classifier import Classifier
-from noiseclassifier.dataset import Dataset
+from noiseclassifier.dataset import Dataset, Examples
 from noiseclassifier.errors import DatasetError, SignalError
 from noiseclassifier.general import Model
 from noiseclassifier.labels import Event, Labels, interval
@@ -279,11 +279,9 @@ def measure(
 def evaluate(classifier: Classifier, dataset: Dataset) -> Evaluation:
     """Confusion matrix of a classifier on annotated frames, and all measures that follow from it.
 
-    Args:
-        classifier: The classifier.
-        dataset: Annotated frames; labels that the classifier does not have count as missed.
+    Labels that the classifier does not have count as missed.
     """
-    return Evaluation.of(dataset.labels, classifier.predict(dataset.frames), classifier.classes)
+    return classifier.evaluate(Examples.of(dataset, classifier.profile))
 
 
 # --- as text

@@ -135,7 +135,7 @@ class Classifier:
         """
         return self.decide(features_in_chunks(frames, self.profile))
 
-    def decide(self, plain: Array) -> Array:
+    def decide(self, plain: Real) -> Array:
         """Decision values, shape (frames, decisions).
 
         Args:

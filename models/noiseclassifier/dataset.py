@@ -2,10 +2,9 @@
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from types import MappingProxyType
 from typing import Self
 
 import numpy as np
@@ -69,9 +68,7 @@ class Dataset:
                 runs += [recording.name] * len(frames[-1])
         if not labels:
             raise NoFrameError(len(hashes), profile.classes)
-        return cls(
-            np.concatenate(frames), np.array(labels), np.array(runs), MappingProxyType(hashes)
-        )
+        return cls(np.concatenate(frames), np.array(labels), np.array(runs), hashes)
 
     @classmethod
     def read(cls, folder: str | Path, profile: Profile, *, training: bool = True) -> Self:
@@ -92,11 +89,12 @@ class Examples:
     """Features of labelled frames; a tenth of the memory that the frames themselves take.
 
     Attributes:
-        features: Not yet standardised, shape (frames, features).
+        features: Not yet standardised; of logs of any rates, NaN where one is missing, shape
+            (frames, features).
         labels, runs, hashes: As of a `Dataset`.
     """
 
-    features: Array
+    features: Real
     labels: Words
     runs: Words
     hashes: Mapping[str, str]
@@ -137,11 +135,17 @@ class Examples:
                 found.append(cls.of(Dataset.of([recording], profile, training=training), profile))
         if not found:
             raise NoFrameError(len(hashes), profile.classes)
+        return replace(cls.joined(found), hashes=hashes)
+
+    @classmethod
+    def joined(cls, parts: Iterable[Self]) -> Self:
+        """Examples of all parts, one or more."""
+        every = list(parts)
         return cls(
-            np.concatenate([each.features for each in found]),
-            np.concatenate([each.labels for each in found]),
-            np.concatenate([each.runs for each in found]),
-            MappingProxyType(hashes),
+            np.concatenate([part.features for part in every]),
+            np.concatenate([part.labels for part in every]),
+            np.concatenate([part.runs for part in every]),
+            {name: digest for part in every for name, digest in part.hashes.items()},
         )
 
     @property

@@ -15,6 +15,7 @@ import numpy as np
 
 from noiseclassifier import modelfile
 from noiseclassifier.classifier import Classifier, targets_of
+from noiseclassifier.dataset import Examples
 from noiseclassifier.errors import MissingSignalError, RateError
 from noiseclassifier.estimators.trees import Detector, Trees
 from noiseclassifier.features import frame_features, standard
@@ -22,42 +23,14 @@ from noiseclassifier.labels import UNKNOWN
 from noiseclassifier.matching import OK, UNCLEAR, truth_of, within
 from noiseclassifier.measures import Evaluation
 from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, RELATIVE, TOLERANCE, LogBands
-from noiseclassifier.recording import Recording, group_of
+from noiseclassifier.recording import Recording
 from noiseclassifier.signals import EFFORT, NOISE, feeds, named
-from noiseclassifier.types import Array, Real, Words
+from noiseclassifier.types import Array
 
 LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
 """Of the inputs, those that training takes of each log: the others lack features of the first."""
 UNBOUNDED = 1e9
 """Highest value of features relative to the run: they say nothing of novelty."""
-
-
-@dataclass(frozen=True, eq=False)
-class Frames:
-    """Labelled frames of logs, in all features that there are.
-
-    Attributes:
-        features: Not yet standardised; NaN where a feature is missing, shape (frames, features).
-        labels: Class of each frame, shape (frames,).
-        groups: Group of each, see `recording.group_of`, shape (frames,).
-        hashes: SHA-256 of each recording, by name.
-    """
-
-    features: Real
-    labels: Words
-    groups: Words
-    hashes: Mapping[str, str] = field(default_factory=dict)
-
-    @classmethod
-    def joined(cls, parts: Iterable[Self]) -> Self:
-        """Frames of all parts, one or more."""
-        every = list(parts)
-        return cls(
-            np.concatenate([part.features for part in every]),
-            np.concatenate([part.labels for part in every]),
-            np.concatenate([part.groups for part in every]),
-            {name: digest for part in every for name, digest in part.hashes.items()},
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +54,11 @@ class General:
     sha256: str = ""
 
     @classmethod
-    def train(cls, frames: Frames, recipe: LogBands, *, thin: int = 1) -> Self:
+    def train(cls, frames: Examples, recipe: LogBands, *, thin: int = 1) -> Self:
         """Train a model; needs scikit-learn.
 
         Args:
-            frames: Of logs of any rates and signals.
+            frames: Of logs of any rates and signals, see `frames_of`.
             recipe: All settings.
             thin: They hold every ``thin``-th `ok` frame, for which the odds are corrected.
 
@@ -115,7 +88,7 @@ class General:
         metrics = {"training": model.evaluate(frames).as_dict()}
         return replace(model, metrics=metrics, versions=modelfile.versions())
 
-    def evaluate(self, frames: Frames) -> Evaluation:
+    def evaluate(self, frames: Examples) -> Evaluation:
         """Measures of the model on frames."""
         decisions = self.estimator.decision((frames.features - self.mean) / self.scale)
         names = np.array((*self.classes, UNKNOWN))
@@ -187,7 +160,7 @@ def frames_of(
     *,
     thin: int = 1,
     inputs: Sequence[Sequence[str]] = LEARNT,
-) -> Iterator[Frames]:
+) -> Iterator[Examples]:
     """Labelled frames of recordings, once for each of the inputs that they feed.
 
     Frames are those that classifying would cut, relative to the recording itself. Frames of which
@@ -201,7 +174,7 @@ def frames_of(
         inputs: Signals to take.
 
     Yields:
-        Frames of a recording.
+        Frames of a recording in all features that there are, NaN where one is missing.
     """
     efforts = np.array([name.startswith(EFFORT) for name in recipe.columns])
     for recording in recordings:
@@ -217,8 +190,8 @@ def frames_of(
             full = np.full((len(kept), len(efforts)), np.nan, dtype=np.float32)
             full[:, recipe.places(profile)] = features[kept]
             full[:, efforts] = np.nan  # their unit is not known, but relative to the run it is none
-            groups = np.full(len(full), group_of(recording.name))
-            yield Frames(full, truth[kept], groups, {recording.name: recording.sha256})
+            runs = np.full(len(full), recording.name)
+            yield Examples(full, truth[kept], runs, {recording.name: recording.sha256})
 
 
 # --- files, and the choice of a model
