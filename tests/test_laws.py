@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from addedfaults import KINDS, fault
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulated import simulated
@@ -22,7 +23,6 @@ from inspector.analysis import analyse
 from inspector.assets import demo_run
 from inspector.library import load_library, signals_of
 from inspector.status import Status, Unknown
-from noiseclassifier.faults import KINDS, fault
 
 FLOOR = 0.3
 """Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling

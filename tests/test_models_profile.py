@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from addedfaults import with_fault
 
 import noiseclassifier as nc
-from noiseclassifier.faults import with_fault
 from noiseclassifier.profile import HIGHEST, columns
 from noiseclassifier.signals import JOINTS, MOTION
 

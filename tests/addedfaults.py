@@ -1,18 +1,15 @@
 """Faults put into good motion: tones, band noise and blows of a known level on one joint."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from noiseclassifier.signals import NOISE
-from noiseclassifier.types import Array, Real
 
 KINDS = ("tone", "noise", "blow")
 LONG, SHORT = 1.0, 0.1
 """How long tones and noise, and blows, last, in [s]."""
 
 
-def fault(time: Array, kind: str, frequency: float, seed: int, *, start: float) -> Array:
+def fault(time, kind, frequency, seed, *, start):
     """A signal of level 1 while it lasts, 0 before.
 
     Args:
@@ -25,20 +22,19 @@ def fault(time: Array, kind: str, frequency: float, seed: int, *, start: float) 
     since = time - start
     if kind == "blow":
         since = np.maximum(since, 0.0)
-        blow: Array = np.exp(-since * frequency / 3.0) * np.sin(2 * np.pi * frequency * since)
+        blow = np.exp(-since * frequency / 3.0) * np.sin(2 * np.pi * frequency * since)
         return blow / _level(blow[(time >= start) & (time < start + SHORT)])
     during = (since >= 0.0) & (since < LONG)
     if kind == "tone":
-        tone: Array = np.sqrt(2.0) * np.sin(2 * np.pi * frequency * since) * during
-        return tone
+        return np.sqrt(2.0) * np.sin(2 * np.pi * frequency * since) * during
     white = np.fft.rfft(np.random.default_rng(seed).normal(size=len(time)))
     place = np.fft.rfftfreq(len(time), float(time[1] - time[0]))
     white[(place < frequency / np.sqrt(2.0)) | (place > frequency * np.sqrt(2.0))] = 0.0
-    noise: Array = np.fft.irfft(white, len(time))
+    noise = np.fft.irfft(white, len(time))
     return noise / _level(noise) * during
 
 
-def with_fault(signals: Mapping[str, Real], joint: int, added: Array) -> dict[str, Real]:
+def with_fault(signals, joint, added):
     """Signals of a motion with something added to the measured velocity of a joint.
 
     Args:
@@ -58,5 +54,5 @@ def with_fault(signals: Mapping[str, Real], joint: int, added: Array) -> dict[st
     return found
 
 
-def _level(signal: Array) -> float:
+def _level(signal):
     return float(np.sqrt(np.mean(signal**2)))
