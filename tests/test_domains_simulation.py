@@ -244,12 +244,6 @@ def test_targets_are_robots_domains_and_loggers_apart():
     assert side_of("ur5", domain, replace(fine, hold=5)) == "logger"
 
 
-def test_domains_are_kept_as_they_were_drawn(good):
-    facts = dict(good.meta["domain"])
-    facts.pop("name")
-    assert Domain(**facts).as_dict() == good.meta["domain"]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", list(WIDE)[::2])
 def test_every_other_robot_has_a_good_run_among_its_first_seeds(robot):

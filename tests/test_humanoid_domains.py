@@ -15,10 +15,7 @@ from noiseclassifier.scenarios.labels import unplanned
 from noiseclassifier.scenarios.loop import record
 from noiseclassifier.scenarios.motions import STEPS, TICK, Gesture, Stand, Stroll
 from noiseclassifier.scenarios.robots import LEGS, WIDE, similar
-from noiseclassifier.scenarios.table import FAULTS, ON_DRIVES
 from noiseclassifier.scenarios.world import reduced_model
-
-OWN = {n: each for n, each in FAULTS["humanoid"].items() if n not in ON_DRIVES}
 
 G1 = WIDE["g1"]
 G1_MOVING = WIDE["g1_with_hands"]
@@ -153,18 +150,6 @@ def test_a_pendulum_of_a_quarter_of_the_height_steps_twice_as_fast():
     assert small["drives"]["stiffness"][0] == pytest.approx(TALOS.drives.stiffness[0] / 256)
     same = similar(TALOS, 1.0, TALOS.centre)["drives"]
     assert same == {name: getattr(TALOS.drives, name) for name in same}
-
-
-@pytest.mark.parametrize("wildness", [0.0, 0.5, 1.0])
-def test_every_defect_is_drawn_for_every_motion(wildness):
-    for seed in range(12):
-        rng = np.random.default_rng(seed)
-        way = planned(HUMANOIDS[seed % len(HUMANOIDS)], humanoid_motion(rng, wildness, G1), seed)
-        for name, defect in OWN.items():
-            faults = defect(rng, way)
-            if "obstacle" in name or name == "edge":
-                assert not faults.boxes or len(way.contacts) > 2
-            assert all(event.start < event.stop for event in faults.events)
 
 
 def test_motions_of_a_seed_are_equal_and_both_kinds_are_drawn():

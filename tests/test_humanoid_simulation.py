@@ -171,7 +171,7 @@ def test_a_robot_that_lies_on_its_side_has_fallen():
     data = mujoco.MjData(scenery.model)
     data.qpos[:] = scenery.start
     mujoco.mj_forward(scenery.model, data)
-    assert not scenery.control.fallen(data.sensordata)
+    assert not scenery.fallen(data.sensordata)
     data.qpos[3:7] = (np.cos(0.5), np.sin(0.5), 0.0, 0.0)
     mujoco.mj_forward(scenery.model, data)
-    assert scenery.control.fallen(data.sensordata)
+    assert scenery.fallen(data.sensordata)

@@ -6,10 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from noiseclassifier.scenarios import simulation
-from noiseclassifier.scenarios.domains import LIMITS, quadruped_motion, steady
-from noiseclassifier.scenarios.drives import Drives
-from noiseclassifier.scenarios.errors import DivergedError, ScenarioError
+from noiseclassifier.scenarios.domains import quadruped_motion, steady
+from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import no_defect
 from noiseclassifier.scenarios.motions import Trot
 from noiseclassifier.scenarios.quadruped import SHIFT, TILT, poses, stand
@@ -181,53 +179,3 @@ def test_steps_on_soft_drives_are_quick_trots_or_walks():
     assert steady(Trot(gait="stand")) == Trot(gait="stand")
     fast = Trot(period=(0.5, 0.6))
     assert steady(fast) == fast
-
-
-def soften(monkeypatch, **scales):
-    """Replace the drives by soft ones that hold targets, with a delay."""
-
-    class Soft(Drives):
-        def __init__(self, *given):
-            self._targets, self._number = (), 0
-            super().__init__(*given)
-            self._stiffness = scales["stiffness"] * self._stiffness
-            self._damping = scales["damping"] * self._damping
-
-        def torque(self, position, velocity, desired, rate, feedforward):
-            if self._number % round(scales["hold"] * 1e4) == 0:
-                self._targets = desired.copy(), rate.copy(), scales["feedforward"] * feedforward
-            self._number += 1
-            return super().torque(position, velocity, *self._targets)
-
-    monkeypatch.setattr(simulation, "Drives", Soft)
-
-
-def at_the_limits(robot, monkeypatch, gait):
-    limits = LIMITS["quadruped"]
-    soften(
-        monkeypatch,
-        stiffness=limits.stiffness[0],
-        damping=limits.damping[0],
-        hold=limits.hold,
-        feedforward=limits.feedforward,
-    )
-    return run(robot, steady(Trot(gait=gait)))
-
-
-def test_go2_trots_on_the_softest_drives(monkeypatch):
-    trial = at_the_limits(GO2, monkeypatch, "trot")
-    assert upright(trial)
-    error = trial.motion.velocity - trial.motion.velocity_desired
-    assert 0.5 < np.sqrt((error**2).mean()) < 4
-
-
-@pytest.mark.slow
-def test_four_of_five_runs_on_the_softest_drives_stay_upright(monkeypatch):
-    fallen = []
-    for robot, gait in zip(QUADRUPEDS, cycle(["trot", "walk"]), strict=False):
-        with monkeypatch.context() as patch:
-            try:
-                at_the_limits(robot, patch, gait)
-            except DivergedError as error:
-                fallen.append((robot.name, gait, str(error)))
-    assert len(fallen) <= 0.2 * len(QUADRUPEDS), fallen

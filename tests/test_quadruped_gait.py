@@ -124,15 +124,6 @@ def test_a_walk_lifts_one_foot_at_a_time_in_the_lateral_sequence():
     assert swing[inside].mean() == pytest.approx(1 - GAITS["walk"].duty, abs=0.02)
 
 
-@pytest.mark.parametrize("name", GAITS)
-def test_the_feet_on_the_ground_share_the_weight_in_every_gait(name):
-    gait = GAITS[name]
-    timing = _timing(gait)
-    load, share = loads(TIME, timing, gait), swings(TIME, timing, gait)
-    np.testing.assert_allclose(load.sum(axis=1), 1, atol=1e-12)
-    assert not load[share < 1].any()
-
-
 def _timing(gait):
     rng = np.random.default_rng(4)
     return beats(rng, begin=0.5, end=5.5, period=0.7, jitter=0.1, gait=gait)

@@ -2,7 +2,6 @@
 
 from itertools import cycle
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -108,39 +107,6 @@ def test_feet_touch_when_they_are_planned_to(trot):
     assert touching[::10][in_air].mean() < 0.35  # the last of the swing, where it may touch
 
 
-def test_mujoco_and_pinocchio_agree_on_where_and_how_fast_the_feet_are(trot):
-    trial, plan = trot
-    motion, model = trial.motion, reduced_model(GO2)
-    perfect = Imperfections.draw(np.random.default_rng(0), GO2, bodies=13)
-    perfect = type(perfect)(**{**vars(perfect), "mass": (1.0,) * 13, "payload": 0.0})
-    built = scene(GO2, plan, Faults(), perfect).model
-    theirs, ours, where = mujoco.MjData(built), model.createData(), sensors_of(built)
-    for sample in range(0, len(motion.position), 1499):
-        pose, velocity = motion.base_pose[sample], motion.base_velocity[sample]
-        theirs.qpos[:] = np.concatenate((pose, motion.position[sample]))
-        theirs.qvel[:] = np.concatenate((velocity, motion.velocity[sample]))
-        mujoco.mj_forward(built, theirs)
-        quaternion = pose[[4, 5, 6, 3]]
-        turn = pin.Quaternion(quaternion).normalized().toRotationMatrix()
-        q = np.concatenate((pose[:3], quaternion, motion.position[sample]))
-        v = np.concatenate((turn.T @ velocity[:3], velocity[3:], motion.velocity[sample]))
-        pin.forwardKinematics(model, ours, q, v)
-        pin.updateFramePlacements(model, ours)
-        pin.centerOfMass(model, ours, q, v)
-        for foot in GO2.effectors:
-            frame = model.getFrameId(foot.frame)
-            place = theirs.sensordata[where[f"{foot.frame}.place"]]
-            assert ours.oMf[frame].translation == pytest.approx(place, abs=1e-8)
-            jacobian = np.zeros((3, built.nv))
-            site = built.site(foot.frame).id
-            mujoco.mj_jacSite(built, theirs, jacobian, None, site)
-            axes = pin.LOCAL_WORLD_ALIGNED
-            speed = pin.getFrameVelocity(model, ours, frame, axes).linear
-            assert speed == pytest.approx(jacobian @ theirs.qvel, abs=1e-8)
-        assert ours.com[0] == pytest.approx(theirs.sensordata[where["centre.place"]], abs=1e-8)
-        assert ours.vcom[0] == pytest.approx(theirs.sensordata[where["centre.velocity"]], abs=1e-8)
-
-
 def test_an_obstacle_is_an_impact_and_the_run_is_healthy_before(trot, stumble):
     healthy, _ = trot
     first = stumble.contacts[0]
@@ -166,7 +132,7 @@ def test_a_robot_that_lies_or_leans_has_fallen():
         sensors = np.zeros(ready.model.nsensordata)
         sensors[where["centre.place"]] = (0, 0, height)
         sensors[where["base.turn"]] = (np.cos(tilt / 2), np.sin(tilt / 2), 0, 0)
-        assert ready.control.fallen(sensors) == fallen
+        assert ready.fallen(sensors) == fallen
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ from itertools import cycle
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios import faults
 from noiseclassifier.scenarios.arm import plan
 from noiseclassifier.scenarios.arm_reaching import KINDS, ReachPlan, Tool
 from noiseclassifier.scenarios.domains import arm_motion
@@ -267,7 +266,7 @@ def test_a_collision_is_drawn_while_the_tool_moves():
     one = reach(duration=6.0)
     speed = np.linalg.norm(np.gradient(one.places[:, 0], TICK, axis=0), axis=1)
     for seed in range(10):
-        for load in faults.collisions(RNG(seed), one).loads:
+        for load in OWN["collision-hard"](RNG(seed), one).loads:
             assert speed[round(load.start / TICK)] > 0.05
 
 
@@ -275,7 +274,7 @@ def test_pushes_are_drawn_while_the_tool_stands_or_is_slow():
     for seed in range(10):
         one = reach(seed=seed, duration=6.0, stand=3.0)
         speed = np.linalg.norm(np.gradient(one.places[:, 0], TICK, axis=0), axis=1)
-        found = faults.pushes(RNG(seed), one)
+        found = OWN["push"](RNG(seed), one)
         for load in found.loads:
             now = slice(round(load.start / TICK), round(load.stop / TICK))
             assert speed[now].max() <= SLOW

@@ -88,7 +88,8 @@ def test_ground_that_gives_way_is_as_high_as_before_until_it_does():
 
 
 def test_jumps_of_the_reference_return():
-    found = draw(faults.reference_jumps, seed=2)
+    settings = {"every": 1.4, "distance": (0.001, 0.004), "speed": (0.1, 2.0)}
+    found = draw(faults.reference_jumps, seed=2, **settings)
     shift = found.shift(PICKS.time)[:, 0]
     way = np.linalg.norm(shift, axis=1)
     assert not way[: int(found.events[0].start * 1e3)].any()

@@ -164,7 +164,6 @@ class ToolControl:
         self._force = self._offset = self._left = self._excess = 0.0
         self._pressing = 0  # ticks of force control so far
         self._joints = [rest] * 3  # of the last three ticks
-        self._velocity = self._planned = np.zeros(len(rest))
         self._path = plan.places[:, 0]
         self._velocities = np.gradient(self._path, TICK, axis=0)
         self._turning = np.gradient(plan.yaw, TICK)
@@ -177,10 +176,10 @@ class ToolControl:
         velocity = (after - before) / (2 * TICK)
         acceleration = (after - 2 * here + before) / TICK**2
         planned = inverse @ (*self._velocities[number], 0, 0, self._turning[number])
-        reference = Reference(
-            position=np.stack((before, here)),
-            velocity=np.stack((self._velocity, velocity)),
-            planned=np.stack((self._planned, planned)),
+        return Reference(
+            position=here,
+            velocity=velocity,
+            planned=planned,
             torque=self._tool.torque(
                 here,
                 velocity,
@@ -188,12 +187,6 @@ class ToolControl:
             ),
             lift=inverse[None, :, 2],
         )
-        self._velocity, self._planned = velocity, planned
-        return reference
-
-    def fallen(self, sensors: Array) -> bool:
-        """False: an arm does not fall."""
-        return False
 
     def _press(self, number: int, force: float) -> float:
         """Height offset of the tool: the integral of the error of the contact force, in [m]."""

@@ -362,19 +362,14 @@ class JointControl:
 
     def tick(self, number: int, sensors: Array) -> Reference:
         """Advance by one tick; the sensors have no effect."""
-        ends = np.minimum((number, number + 1), len(self._position) - 1)
-        here = self._position[number]
+        here, end = self._position[number], min(number + 1, len(self._position) - 1)
         return Reference(
-            position=self._position[ends],
-            velocity=self._velocity[ends],
-            planned=self._planned[ends],
+            position=self._position[end],
+            velocity=self._velocity[end],
+            planned=self._planned[end],
             torque=self._tool.torque(here, self._velocity[number], self._acceleration[number]),
             lift=self._inverse(here)[None, :, 2],
         )
-
-    def fallen(self, sensors: Array) -> bool:
-        """False: an arm does not fall."""
-        return False
 
     def _inverse(self, joints: Array) -> Array:
         """Damped inverse Jacobian of the tip's place, shape (joints, 3), in [rad/m]."""

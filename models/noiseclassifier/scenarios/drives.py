@@ -12,19 +12,11 @@ from noisemodel.types import Array
 
 
 def tracking_gains(bandwidth: float, step: float) -> tuple[float, float]:
-    """Gains of the filter that estimates velocities from an encoder.
+    """Gains of the critically damped alpha-beta filter that estimates velocities from an encoder.
 
     At 10 kHz, differences of encoder counts would mask every motion; servo drives track their
-    encoders instead. This is the critically damped alpha-beta filter: it predicts, and corrects
-    position and velocity by a share of the innovation.
-
-    Args:
-        bandwidth: Natural frequency, in [Hz].
-        step: Time between two readings, in [s].
-
-    Returns:
-        Share of the innovation that corrects the position, and its multiple that corrects the
-        velocity, in [1/s]; both poles lie at exp(-2 pi bandwidth step).
+    encoders instead. The filter predicts, and corrects position and velocity (the latter in [1/s])
+    by a share of the innovation; both poles lie at exp(-2 pi bandwidth step).
     """
     pole = float(np.exp(-2 * np.pi * bandwidth * step))
     return 1 - pole**2, (1 - pole) ** 2 / step

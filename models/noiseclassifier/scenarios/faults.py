@@ -189,14 +189,7 @@ def decalibration(
     return Faults(decalibration={joint: offset}, facts={"joint": joint, "angle": offset})
 
 
-def reference_jumps(
-    rng: Rng,
-    plan: Plan,
-    *,
-    every: float = 1.4,
-    distance: Range = (0.001, 0.004),
-    speed: Range = (0.1, 2.0),
-) -> Faults:
+def reference_jumps(rng: Rng, plan: Plan, *, every: float, distance: Range, speed: Range) -> Faults:
     """Jumps of the planned motion, away and back again: one in so many [s], by [m], at [m/s]."""
     count = max(1, round(plan.duration / every))
     starts = (np.arange(count) + rng.uniform(0.25, 0.75, count)) * plan.duration / count
@@ -521,13 +514,7 @@ def _speed(plan: Plan) -> Array:
 
 
 def collisions(
-    rng: Rng,
-    plan: Plan,
-    *,
-    every: float = 2.0,
-    stiffness: Range = (1e3, 1e5),
-    limit: Range = (10.0, 150.0),
-    hold: Range = (0.1, 0.5),
+    rng: Rng, plan: Plan, *, every: float, stiffness: Range, limit: Range, hold: Range
 ) -> Faults:
     """Obstacles in the air that a tool meets while it moves, one in so many [s].
 
@@ -556,12 +543,7 @@ def collisions(
 
 
 def joint_stops(
-    rng: Rng,
-    plan: Plan,
-    *,
-    overshoot: Range = (0.05, 0.4),
-    stiffness: Range = (3e3, 3e4),
-    least: float = 0.1,
+    rng: Rng, plan: Plan, *, overshoot: Range, stiffness: Range, least: float
 ) -> Faults:
     """An end stop nearer than the controller knows; none where joints move little, or are free.
 
@@ -593,14 +575,7 @@ def joint_stops(
 
 
 def pushes(
-    rng: Rng,
-    plan: Plan,
-    *,
-    every: float = 2.5,
-    force: Range = (3.0, 40.0),
-    rise: Range = (0.1, 1.0),
-    hold: Range = (0.0, 0.4),
-    along: Range = (0.3, 1.0),
+    rng: Rng, plan: Plan, *, every: float, force: Range, rise: Range, hold: Range, along: Range
 ) -> Faults:
     """Hands that push links where the tool is slow; at least one, where it is slowest.
 

@@ -498,7 +498,6 @@ class WalkControl:
         self._place, self._turn = where["base.place"], where["base.turn"]
         rest = body.configuration[7:]
         self._before = self._here = rest
-        self._velocity = self._planned = np.zeros(len(rest))
         self._lowest = body.configuration[2] - LOWEST - plan.centre[0, 2]
         self._number = 0
 
@@ -514,18 +513,14 @@ class WalkControl:
         base = pin.rpy.rpyToMatrix(0.0, 0.0, self._heading[number])
         upper = self._upper[number]
         after = self._body.follow(places, turns, self._centre[number], base, upper=upper)[7:]
-        before, here = self._here, after
-        velocity = (after - self._before) / (2 * TICK)
-        planned = self._body.inverse[6:] @ self._rates[number]
         reference = Reference(
-            position=np.array((self._before, self._here)),
-            velocity=np.array((self._velocity, velocity)),
-            planned=np.array((self._planned, planned)),
+            position=self._here,
+            velocity=(after - self._before) / (2 * TICK),
+            planned=self._body.inverse[6:] @ self._rates[number],
             torque=self._body.hold(self._weight * self._bearing[number]),
             lift=self._body.lift,
         )
-        self._before, self._here = before, here
-        self._velocity, self._planned, self._number = velocity, planned, number
+        self._before, self._here, self._number = self._here, after, number
         return reference
 
     def fallen(self, sensors: Array) -> bool:
@@ -594,6 +589,7 @@ def scene(robot: Humanoid, plan: WalkPlan, faults: Faults, imperfections: Imperf
     stabilizer = Stabilizer(
         shifted, robot.effectors, robot.gains, strength=strength, weight=weight, where=where
     )
+    control = WalkControl(body, stabilizer, shifted, weight=weight, where=where)
     start = body.configuration[[0, 1, 2, 6, 3, 4, 5, *range(7, model.nq)]]  # MuJoCo has w first
     start[7:] -= faults.offsets(len(robot.drives.joints))
     noise = np.zeros(world.nsensordata)  # the sensors of the base are exact
@@ -603,7 +599,8 @@ def scene(robot: Humanoid, plan: WalkPlan, faults: Faults, imperfections: Imperf
     return Scene(
         model=world,
         start=start,
-        control=WalkControl(body, stabilizer, shifted, weight=weight, where=where),
+        control=control,
+        fallen=control.fallen,
         effectors=len(robot.effectors),
         settling=SETTLING,
         noise=noise,

@@ -1,7 +1,7 @@
 """The simulation loop: one tick of control, then ten samples of drives and physics."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol, Self
 
 import mujoco
@@ -33,11 +33,11 @@ _VELOCITY = np.hstack(
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Reference of the joints from one tick to the next."""
+    """Reference of the joints at the end of a tick, which drives reach from the one before."""
 
-    position: Array  # at the two ticks, shape (2, joints), in [rad]
-    velocity: Array  # at the two ticks, shape (2, joints), in [rad/s]
-    planned: Array  # velocity of the plan alone, at the two ticks, shape (2, joints), in [rad/s]
+    position: Array  # shape (joints,), in [rad]
+    velocity: Array  # shape (joints,), in [rad/s]
+    planned: Array  # velocity of the plan alone, shape (joints,), in [rad/s]
     torque: Array  # feed-forward torque of the model, shape (joints,), in [N m]
     lift: Array  # of the joints per height of each effector, shape (effectors, joints), in [rad/m]
 
@@ -47,10 +47,6 @@ class Control(Protocol):
 
     def tick(self, number: int, sensors: Array) -> Reference:
         """Advance by one tick, with the mean of each sensor over the tick before."""
-        ...
-
-    def fallen(self, sensors: Array) -> bool:
-        """Whether the robot has fallen, by the sensors' means over the tick before."""
         ...
 
 
@@ -66,6 +62,7 @@ class Scene:
     noise: Array  # standard deviation of each sensor's noise per tick, shape (sensors,)
     changes: Mapping[int, Sequence[tuple[int, bool]]] = field(default_factory=dict)
     forces: tuple[Force, ...] = ()
+    fallen: Callable[[Array], bool] = lambda _: False  # by the sensors' means over a tick
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -99,6 +96,13 @@ class Motion:
         return Motion(*(getattr(self, field.name)[sample:] for field in fields(self)))
 
 
+def _between(before: Reference, after: Reference) -> tuple[Array, Array, Array]:
+    """Positions, velocities, and velocities of the plan, at the samples between two ticks."""
+    ends = np.stack((before.position, after.position, before.velocity, after.velocity))
+    planned = (1 - _S) * before.planned + _S * after.planned
+    return _POSITION @ ends, _VELOCITY @ ends, planned
+
+
 def record(
     scene: Scene,
     drives: Drives,
@@ -107,13 +111,10 @@ def record(
     sensor_error: Array,
     overlay: Array | None = None,
 ) -> Motion:
-    """Simulate a robot.
+    """Simulate a robot, with errors of encoders and sensors of shapes (samples or ticks, values).
 
-    Args:
-        encoder_error: Of the encoders, shape (samples, joints), in [rad].
-        sensor_error: Added to the sensor values of the controller, shape (ticks, sensors).
-        overlay: Heights of the effectors and their rates, added to the reference of the
-            drives, shape (samples, effectors, 2), in [m] and [m/s].
+    The overlay is added to the reference of the drives: heights of the effectors and their rates,
+    shape (samples, effectors, 2), in [m] and [m/s].
     """
     model, control = scene.model, scene.control
     data = mujoco.MjData(model)
@@ -124,17 +125,16 @@ def record(
     joint_position, joint_velocity = data.qpos[-joints:], data.qvel[-joints:]
     base_pose, base_velocity = data.qpos[:base], data.qvel[:-joints]
     effector_force, sensed = data.sensordata[: scene.effectors], data.sensordata
-    readings = np.zeros((STEPS, model.nsensordata))
-    sensors = np.zeros(model.nsensordata)
+    readings, sensors = np.zeros((STEPS, model.nsensordata)), np.zeros(model.nsensordata)
+    still, before = np.zeros(joints), None
     for tick, error in enumerate(sensor_error):
         now = slice(tick * STEPS, (tick + 1) * STEPS)
         for geom, present in scene.changes.get(tick - scene.settling, ()):
             set_collision(model, geom, present=present)
         reference = control.tick(tick, sensors + error)
-        ends = np.concatenate((reference.position, reference.velocity))
-        targets, rates = _POSITION @ ends, _VELOCITY @ ends
-        motion.commanded[now] = rates
-        motion.planned[now] = (1 - _S) * reference.planned[0] + _S * reference.planned[1]
+        before = before or replace(reference, velocity=still, planned=still)  # robots start at rest
+        targets, rates, motion.planned[now] = _between(before, reference)
+        motion.commanded[now], before = rates, reference
         if overlay is not None:
             wave = np.einsum("seo,ej->osj", overlay[now], reference.lift)
             targets, rates = targets + wave[0], rates + wave[1]
@@ -159,6 +159,6 @@ def record(
         fastest = np.abs(joint_velocity).max()
         if not fastest < FASTEST:  # also true of NaN
             raise DivergedError(time, f"a joint moved at {fastest:.3g} rad/s")
-        if control.fallen(sensors):
+        if scene.fallen(sensors):
             raise DivergedError(time, "it fell")
     return motion.since(scene.settling * STEPS)

@@ -437,13 +437,9 @@ LOWEST, STEEPEST = 0.5, 0.7
 class StateEstimate:
     """State estimate, updated once per tick.
 
-    Attributes:
-        roll: Low-passed, less the planned one, in [rad].
-        pitch: Low-passed, less the planned one, in [rad].
-        slip: Low-passed velocity of the centre of mass less the planned one, shape (2,), in [m/s].
-        position_correction: Correction of the path towards the plan, shape (2,), in [m].
-        yaw_correction: Correction of the direction towards the plan, in [rad].
-        force: Low-passed contact forces, shape (feet,), in [N].
+    Roll, pitch, in [rad], and slip, the velocity of the centre of mass, in [m/s], are low-passed
+    and less the planned ones; corrections of path and direction lead towards the plan, in [m] and
+    [rad]; forces on the feet are low-passed, in [N].
     """
 
     def __init__(self, robot: Quadruped, sensors: dict[str, slice]) -> None:
@@ -521,10 +517,9 @@ class Feet:
         return places
 
     def _placement(self, number: int, estimate: StateEstimate) -> Array:
-        """Horizontal correction of the feet, shape (feet, 2), in [m].
+        """Horizontal correction of the feet in the air, shape (feet, 2), in [m].
 
-        Feet in the air follow the position correction of the robot, are placed further in the
-        direction of its slip, and compensate the tilt of the body.
+        They follow that of the robot, go further in the direction of its slip, and compensate tilt.
         """
         plan = self._plan
         swing, progress = plan.swing[number], plan.progress[number]
@@ -587,7 +582,7 @@ class TrotControl:
         self._plan, self._rates = plan, _rates(plan)
         self._lean = robot.attitude_gain
         self._configurations = [standing.configuration] * 3  # of the last three ticks
-        self._velocity, self._planned = np.zeros(model.nv), np.zeros(model.nv - 6)
+        self._velocity = np.zeros(model.nv)
 
     def tick(self, number: int, sensors: Array) -> Reference:
         """Advance by one tick."""
@@ -596,15 +591,14 @@ class TrotControl:
             self._configuration(number, sensors),
         ]
         velocity = pin.difference(self._model, before, after) / (2 * TICK)
-        planned = (self._body.inverse @ self._rates[number])[6:]
         reference = Reference(
-            position=np.stack((before[7:], here[7:])),
-            velocity=np.stack((self._velocity[6:], velocity[6:])),
-            planned=np.stack((self._planned, planned)),
+            position=here[7:],
+            velocity=velocity[6:],
+            planned=(self._body.inverse @ self._rates[number])[6:],
             torque=self._torque(number, here, velocity),
             lift=self._body.lift,
         )
-        self._velocity, self._planned = velocity, planned
+        self._velocity = velocity
         return reference
 
     def fallen(self, sensors: Array) -> bool:
@@ -679,6 +673,7 @@ def scene(robot: Quadruped, plan: GaitPlan, faults: Faults, imperfections: Imper
         model=world,
         start=_start(robot, model, standing, faults),
         control=control,
+        fallen=control.fallen,
         effectors=len(robot.effectors),
         settling=SETTLING,
         noise=noise,
