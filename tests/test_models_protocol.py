@@ -85,39 +85,11 @@ def test_a_run_that_is_flagged_throughout_has_all_of_its_ok_time_flagged():
     assert found.alike["class_f1"].value == pytest.approx(2 * 4 / (12 + 8))
 
 
-@pytest.mark.parametrize(
-    ("fault", "start", "stop"), [(2.5, 2.5, 2.6), (2.5, 0.5, 2.5), (0.5, 3.9, 4.9)]
-)
-def test_chance_is_the_share_of_the_time_in_which_a_shifted_finding_meets_the_fault(
-    fault, start, stop
-):
-    # It meets the fault if it ends 0.2 s before its start or later, and begins 0.2 s after its stop
-    # or earlier; what is shifted beyond the end of the run comes at its beginning.
-    around = (0.0, fault - 0.1, "ok"), (fault + 0.2, 5.0, "ok")
-    annotated = blocks(around[0], (fault, fault + 0.1, "impact"), around[1])
-    found = [("impact", start, stop)]
-    runs = [reporting(f"a{number}", annotated, found) for number in range(120)]
-    expected = (stop - start + 0.1 + 2 * 0.2) / 5.0
-    assert measured(runs).by_chance["recall_injected"] == pytest.approx(expected, rel=0.15)
-
-
 def test_a_robot_with_ten_times_as_many_runs_weighs_the_same():
     deaf = [reporting(f"go2/blow-{seed:03d}", IMPACT, []) for seed in range(2)]
     few, lots = measured([*perfect(2), *deaf]), measured([*perfect(20), *deaf])
     assert few.alike["recall_injected"].value == lots.alike["recall_injected"].value == 0.5
     assert few.pooled["recall_injected"].value < lots.pooled["recall_injected"].value
-
-
-def test_how_much_time_a_robot_has_does_not_change_its_weight():
-    def runs(hours):
-        long = blocks((0.0, 5.0 * hours, "ok"))
-        calm = [reporting("panda/good-000", long, [], seconds=5.0 * hours)]
-        return [*calm, reporting("go2/good-000", GOOD, [("impact", 1.0, 1.5)])]
-
-    one, other = measured(runs(1)), measured(runs(20))
-    assert one.alike["false_alarms_per_hour"].value == pytest.approx(3600.0 / 5.0 / 2)
-    assert other.alike["false_alarms_per_hour"].value == pytest.approx(3600.0 / 5.0 / 2)
-    assert other.pooled["false_alarms_per_hour"].value < one.pooled["false_alarms_per_hour"].value
 
 
 def test_two_findings_on_one_fault_are_one_found_and_one_false():
@@ -135,27 +107,6 @@ def test_one_finding_on_two_faults_finds_both_but_matches_one():
     outcome = Outcome.of(reporting("a", GOOD[:0], [("impact", 0.9, 1.7)], faults=faults))
     assert outcome.found.tolist() == [True, True]
     assert outcome.counts["matched"] == 1.0
-
-
-def test_one_to_one_is_the_best_of_all_assignments():
-    random = np.random.default_rng(3)
-    for _ in range(40):
-        met = random.random((1, random.integers(1, 5), random.integers(1, 5))) < 0.4
-        rows, columns = met.shape[1:]
-        wide = met[0] if rows <= columns else met[0].T
-        best = max(
-            sum(wide[row, column] for row, column in enumerate(order))
-            for order in permutations(range(max(rows, columns)), min(rows, columns))
-        )
-        assert one_to_one(met).tolist() == [best]
-    stacked = np.stack([np.eye(3, dtype=bool), np.zeros((3, 3), dtype=bool)])
-    assert one_to_one(stacked).tolist() == [3.0, 0.0]
-
-    boxes = random.random((30, 2, 4)) < 0.4
-    each = [float(one_to_one(box[None])[0]) for box in boxes]
-    assert one_to_one(boxes).tolist() == each
-    assert one_to_one(boxes.swapaxes(1, 2)).tolist() == each
-    assert one_to_one(np.zeros((3, 2, 4), dtype=bool)).tolist() == [0.0] * 3
 
 
 def test_pairs_are_of_one_class_where_that_is_asked_for():

@@ -300,7 +300,7 @@ def table(assessment: Assessment, by: str = "") -> str:
 
 
 def protocol_lines(protocol: Protocol, by: str = "") -> list[list[str]]:
-    """Paragraphs of lines: what it is worth, where it is worst, and by robot and domain."""
+    """Paragraphs of lines: the measures, where they are worst, and by robot and domain."""
     keys = [by] if by else [key for key in ("robot", "domain") if len(protocol.by[key]) > 1]
     parts = [_summary(protocol), _not_answered(protocol), _worst(protocol)]
     parts += [_table(protocol, key, whole=bool(by)) for key in keys]

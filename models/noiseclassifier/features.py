@@ -242,7 +242,7 @@ def feature_count(profile: Profile) -> int:
 
 
 def standard(plain: Real, profile: Profile) -> tuple[Array, Array]:
-    """Mean and scale for the standardisation of features; 0 and 1 if they stay as they are.
+    """Mean and scale for the standardisation of features; 0 and 1 for a profile without it.
 
     Args:
         plain: Features of the training set, NaN where they are missing, shape (frames, features).

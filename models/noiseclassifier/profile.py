@@ -158,7 +158,7 @@ class Profile:
     """Whether a last frame, flush with the end, covers the tail of a signal."""
 
     # What follows is NoisyTest's own, and off in every other profile.
-    # (Its `open_end` is 0.1 s: no sample more, but a short block's middle lies elsewhere.)
+    # (Its `open_end` is 0.1 s: no sample more, but a short block has another middle.)
     single_precision: bool = False
     """Times, samples and features are rounded to 32-bit floats."""
     drop_first_sample: bool = False

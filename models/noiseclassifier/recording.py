@@ -34,7 +34,7 @@ class Block(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A fault that was injected into a recording, whether its effect is felt or not."""
+    """A fault that was injected into a recording, whether it is detectable or not."""
 
     start: float
     """When its cause begins, in [s]."""
@@ -59,8 +59,7 @@ class Recording:
         start: Time of the first sample, in [s].
         valid: False in gaps, shape (samples,); None if there are none.
         sha256: Hash of where the recording comes from; by default, that of its samples.
-        events: All faults that were injected, felt or not; empty if that is not known, or none
-            was.
+        events: All injected faults, detectable or not; empty if none was, or that is not known.
         facts: What else is known, by ``robot``, ``scenario`` and ``domain``.
 
     Raises:

@@ -1,10 +1,10 @@
-"""A reference: what features are relative to, beside being taken as they are.
+"""The reference that features are relative to, beside the same features unchanged.
 
-How loud good motion is differs from robot to robot by orders of magnitude. Relative to a reference,
-it differs far less: each feature less its location there, divided by its spread. The reference is
-the signal itself as far as it has come; of a whole signal, also the rest of it. A failure that
-fills a whole signal is invisible relative to the signal itself; therefore the features as they are
-stay beside.
+How loud fault-free motion is differs from robot to robot by orders of magnitude. Relative to a
+reference, it differs far less: each feature less its location there, divided by its spread. The
+reference is the signal itself so far; of a whole signal, also the rest of it. A failure that fills
+a whole signal is invisible relative to the signal itself; therefore the unchanged features stay
+beside.
 
 Conventions: spreads are those of a normal distribution, 1.48 times a median absolute deviation
 (P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5.1).
@@ -105,7 +105,7 @@ class Rest:
                 failures.
 
         Returns:
-            Places of the flagged frames, and their features as they are and relative to the median
+            Places of the flagged frames, and their features unchanged and relative to the median
             of the others; None if one of both is missing.
         """
         own = flagged[self._place]
