@@ -14,7 +14,7 @@ import noisemodel
 from inspector import cli
 from inspector.cli import app
 from inspector.commands.noise import GEOMETRIES
-from inspector.commands.options import KINDS
+from inspector.commands.options import KINDS, say_assumed
 from noisemodel import surface
 
 
@@ -153,3 +153,18 @@ def test_the_help_of_classify_lists_the_exit_statuses(help_of):
     for status in ("0 ok", "1 findings", "2 wrong usage", "3 bad input", "4 cannot tell", "70 bug"):
         assert status in text
     assert "70 > 5 > 3 > 1 > 4 > 0" in text
+
+
+def test_at_most_100_characters_tell_what_was_assumed_and_v_tells_all(capsys):
+    short, long = (
+        "radians; robot not named",
+        "; ".join(f"column {n} is joint" for n in range(20)),
+    )
+    whole = "a sentence without an end " * 10
+    say_assumed({"a": short, "b": long, "c": whole}, verbose=False)
+    lines = [line.split(": ", 1)[1] for line in capsys.readouterr().err.splitlines()]
+    assert lines[0] == short
+    assert all(len(line) <= 100 and line.endswith("... (-v)") for line in lines[1:])
+    assert lines[2].startswith("a sentence")
+    say_assumed({"b": long})
+    assert long in capsys.readouterr().err

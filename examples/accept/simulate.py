@@ -1,7 +1,8 @@
 """A simulated arm, and what may happen to its code: `python simulate.py runs/ [CHANGE]`.
 
 Four joints make three motions: pick, place and wave, three times each. CHANGE is one of harmless
-(another order of the same noise, begun 0.2 s later), chatter, impact, improvement, missing.
+(another order of the same noise, begun 0.2 s later), chatter, chatter-all, impact, improvement,
+missing.
 """
 
 import sys
@@ -14,7 +15,7 @@ import noisemodel as nm
 
 RATE, JOINTS = 1000.0, ("shoulder", "upperarm", "elbow", "wrist")
 SCENARIOS = {"pick": 1, "place": 2, "wave": 3}
-CHANGES = ("harmless", "chatter", "impact", "improvement", "missing")
+CHANGES = ("harmless", "chatter", "chatter-all", "impact", "improvement", "missing")
 
 
 def planned(scenario: str) -> np.ndarray:
@@ -43,7 +44,7 @@ def run(scenario: str, repetition: int, change: str = "") -> nm.Run:
     ripple = 0.01 * rng.uniform(0.9, 1.1, len(JOINTS)) * (0.5 if change == "improvement" else 1.0)
     velocity += ripple * velocity * np.sin(100 * position)  # gears: the faster, the louder
     velocity += 0.002 * rng.standard_normal(velocity.shape)
-    if change == "chatter" and scenario == "pick":
+    if change == "chatter-all" or (change == "chatter" and scenario == "pick"):
         velocity[:, 2] += 0.03 * np.sin(2 * np.pi * 62 * time)
     if change == "impact" and scenario == "place":
         since = np.maximum(time - 2.5, 0.0)

@@ -1,31 +1,43 @@
 """`inspector accept`: what is normal for a robot's scenarios."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from inspector.commands.options import ModelFiles, NumberOfJobs, Runs, say_assumed
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from inspector.library import Library
+    from inspector.logs.read import Reading, Source
+    from inspector.verdict import Verdict
+
+
+Reason = Annotated[str, typer.Option("--reason", help="Why they are accepted; reviewers read it.")]
+Store = Annotated[
+    Path | None,
+    typer.Option(
+        "--output", "-o", help="The store; by default the nearest reference/, or a new one."
+    ),
+]
+Only = Annotated[
+    list[str] | None,
+    typer.Option("--only", help="Scenarios to accept, such as pick or 'walk*'; repeatable."),
+]
+By = Annotated[str, typer.Option("--by", help="Who accepts them; you by default.")]
+InCI = Annotated[bool, typer.Option("--in-ci", help="Write though CI=true is set.")]
+
 
 def accept(
     ctx: typer.Context,
     runs: Runs,
-    reason: Annotated[
-        str, typer.Option("--reason", help="Why they are accepted; reviewers read it.")
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="The store; by default the nearest reference/, or a new one."
-        ),
-    ] = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option("--only", help="Scenarios to accept, such as pick or 'walk*'; repeatable."),
-    ] = None,
-    by: Annotated[str, typer.Option("--by", help="Who accepts them; you by default.")] = "",
-    in_ci: Annotated[bool, typer.Option("--in-ci", help="Write though CI=true is set.")] = False,
+    reason: Reason,
+    output: Store = None,
+    only: Only = None,
+    by: By = "",
+    in_ci: InCI = False,
     jobs: NumberOfJobs = 1,
     model: ModelFiles = None,
 ) -> None:
@@ -44,18 +56,7 @@ def accept(
     from inspector.errors import InspectorError
     from inspector.library import load_library
     from inspector.logs.read import sources
-    from inspector.progress import progress
-    from inspector.reference.store import (
-        FOLDER,
-        NAME,
-        accept_into,
-        find,
-        measured,
-        wanted_in,
-        who,
-    )
-    from inspector.status import Status
-    from inspector.verdict import classify_files
+    from inspector.reference import store as kept_in
 
     if os.environ.get("CI", "").lower() in ("true", "1") and not in_ci:
         raise typer.BadParameter("CI=true: a person accepts runs, after review (--in-ci overrides)")
@@ -64,32 +65,22 @@ def accept(
     first = runs[0]
     if not first.exists():
         raise InspectorError(f"{first}: no such file or folder")
-    store = (
-        output or find(first) or (first if first.is_file() else first.absolute()).parent / FOLDER
-    )
-    levels = measured(runs, ctx.obj)
+    beside = (first if first.is_file() else first.absolute()).parent / kept_in.FOLDER
+    store = output or kept_in.find(first) or beside
+    levels = kept_in.measured(runs, ctx.obj)
     if only:
         levels = [each for each in levels if any(fnmatchcase(each.name, one) for one in only)]
     if not levels:
         raise InspectorError(f"no run is of {' or '.join(only or [])} (--only)")
-    library = load_library(assets.model_files(model))
-    found = [
-        each
-        for each in sources(runs, ctx.obj)[0]
-        if str(each.shown) in {level.run for level in levels}
-    ]
-    classified = classify_files(found, library, reading=ctx.obj, jobs=jobs)
-    verdicts = list(progress(classified, "accept", total=len(found)))
-    say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
-    for each in verdicts:
-        if each.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
-            raise InspectorError(f"{each.path}: {each.message}; nothing is accepted")
-    after, changes = accept_into(
+    named = {each.run for each in levels}
+    found = [each for each in sources(runs, ctx.obj)[0] if str(each.shown) in named]
+    verdicts = _classified(found, load_library(assets.model_files(model)), ctx.obj, jobs)
+    after, changes = kept_in.accept_into(
         store,
         levels,
-        wanted=wanted_in(levels, {str(each.path): each.events for each in verdicts}),
+        wanted=kept_in.wanted_in(levels, {str(each.path): each.events for each in verdicts}),
         reason=reason.strip(),
-        by=by or who(),
+        by=by or kept_in.who(),
     )
     for each in verdicts:
         for event in each.events:
@@ -99,4 +90,22 @@ def accept(
     for change in changes:
         typer.echo(str(change))
     kept = len(after.scenarios) - len({change.name for change in changes})
-    typer.echo(f"{store / NAME}: written; {kept} other scenarios stay as they were")
+    typer.echo(f"{store / kept_in.NAME}: written; {kept} other scenarios stay as they were")
+
+
+def _classified(
+    runs: "Sequence[Source]", library: "Library", reading: "Reading", jobs: int
+) -> "list[Verdict]":
+    """What the general model says of runs, all of which can be read."""
+    from inspector.errors import InspectorError
+    from inspector.progress import progress
+    from inspector.status import Status
+    from inspector.verdict import classify_files
+
+    classified = classify_files(runs, library, reading=reading, jobs=jobs)
+    verdicts = list(progress(classified, "accept", total=len(runs)))
+    say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
+    for each in verdicts:
+        if each.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
+            raise InspectorError(f"{each.path}: {each.message}; nothing is accepted")
+    return verdicts

@@ -56,32 +56,39 @@ After = Annotated[
 ]
 
 
+OutputFormat = Annotated[Format, typer.Option("--format", help="Output format.")]
+Failing = Annotated[
+    FailOn,
+    typer.Option("--fail-on", help="New or louder findings, scenarios that are worse, or any."),
+]
+LeastMargin = Annotated[
+    float, typer.Option(min=0.0, help="Least margin from which a run is louder, in dB.")
+]
+Report = Annotated[
+    Path | None,
+    typer.Option(
+        "--report", help="Write recording, picture and diff.json of the worst to this folder."
+    ),
+]
+DrawRobot = Annotated[
+    bool, typer.Option("--robot/--no-robot", help="Draw the robot in the recording.")
+]
+
+
 def diff(
     reference: Before,
     candidate: After,
-    format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
-    fail_on: Annotated[
-        FailOn,
-        typer.Option("--fail-on", help="New or louder findings, scenarios that are worse, or any."),
-    ] = FailOn.WORSE,
-    margin: Annotated[
-        float, typer.Option(min=0.0, help="Least margin from which a run is louder, in dB.")
-    ] = 0.0,
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            "--report", help="Write recording, picture and diff.json of the worst to this folder."
-        ),
-    ] = None,
+    format: OutputFormat = Format.TEXT,  # noqa: A002
+    fail_on: Failing = FailOn.WORSE,
+    margin: LeastMargin = 0.0,
+    report: Report = None,
     report_url: ReportUrl = "",
     write: Write = None,
     on_bad_input: OnBadInput = BadInput.FAIL,
     jobs: NumberOfJobs = 1,
     dask: Dask = "",
     model: ModelFiles = None,
-    robot: Annotated[
-        bool, typer.Option("--robot/--no-robot", help="Draw the robot in the recording.")
-    ] = True,
+    robot: DrawRobot = True,
     unknown: UnknownFrames = Unknown.FINDING,
     overwrite: Overwrite = False,
 ) -> None:

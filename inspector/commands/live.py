@@ -16,43 +16,48 @@ class Format(StrEnum):
     JSON = "json"
 
 
+Rate = Annotated[float, typer.Option(min=1.0, help="Sampling rate in [Hz].", show_default=False)]
+Robot = Annotated[
+    str | None,
+    typer.Option(
+        help="The robot to draw: a name that `robots` lists, a URDF or an MJCF (robot.xml)."
+    ),
+]
+Names = Annotated[str, typer.Option(help="Joints in the order of the columns: elbow,wrist,...")]
+Save = Annotated[
+    Path | None, typer.Option("--save", help="Write the recording to this file, open no viewer.")
+]
+Connect = Annotated[
+    str | None,
+    typer.Option(help="Send to the viewer at PORT or HOST:PORT; by default one is opened."),
+]
+OutputFormat = Annotated[
+    Format, typer.Option("--format", help="Of findings: lines of text, or JSON lines.")
+]
+FailFast = Annotated[
+    bool, typer.Option("--fail-fast", help="End at the first finding that counts.")
+]
+ReferenceFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--reference",
+        help="Accepted runs, or a folder of good ones, that the stream is compared with: 6 s"
+        " every 3 s, told at most 4.3 s later, and all of it at its end.",
+    ),
+]
+
+
 def live(
-    rate: Annotated[
-        float, typer.Option(min=1.0, help="Sampling rate in [Hz].", show_default=False)
-    ],
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            help="The robot to draw: a name that `robots` lists, a URDF or an MJCF (robot.xml)."
-        ),
-    ] = None,
+    rate: Rate,
+    robot: Robot = None,
     package_root: PackageRoot = None,
     limit: Limits = None,
-    names: Annotated[
-        str, typer.Option(help="Joints in the order of the columns: elbow,wrist,...")
-    ] = "",
-    save: Annotated[
-        Path | None,
-        typer.Option("--save", help="Write the recording to this file, open no viewer."),
-    ] = None,
-    connect: Annotated[
-        str | None,
-        typer.Option(help="Send to the viewer at PORT or HOST:PORT; by default one is opened."),
-    ] = None,
-    format: Annotated[  # noqa: A002
-        Format, typer.Option("--format", help="Of findings: lines of text, or JSON lines.")
-    ] = Format.TEXT,
-    fail_fast: Annotated[
-        bool, typer.Option("--fail-fast", help="End at the first finding that counts.")
-    ] = False,
-    reference: Annotated[
-        Path | None,
-        typer.Option(
-            "--reference",
-            help="Accepted runs, or a folder of good ones, that the stream is compared with: 6 s"
-            " every 3 s, told at most 4.3 s later, and all of it at its end.",
-        ),
-    ] = None,
+    names: Names = "",
+    save: Save = None,
+    connect: Connect = None,
+    format: OutputFormat = Format.TEXT,  # noqa: A002
+    fail_fast: FailFast = False,
+    reference: ReferenceFolder = None,
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:

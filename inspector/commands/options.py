@@ -294,6 +294,7 @@ def say_assumed(lines: dict[str, str], *, verbose: bool = True) -> None:
     for line, names in together.items():
         told = line
         if len(line) > ASSUMED and not verbose:
-            told = f"{line[: ASSUMED - 10].rpartition('; ')[0]}; ... (-v)"
+            begin = line[: ASSUMED - 10]
+            told = f"{begin.rpartition('; ')[0] or begin}; ... (-v)"
         others = f" and {len(names) - 1} more" if len(names) > 1 else ""
         typer.echo(f"{names[0]}{others}: {told}", err=True)

@@ -24,6 +24,7 @@ from inspector.status import EXIT, Status, Unknown
 from inspector.status import worst as worst_code
 from inspector.verdict import EXPECTED, Evidence, Verdict, classify_files
 from noiseclassifier import Event
+from noiseclassifier.matching import match
 from noisemodel.parallel import Jobs
 
 RARE = 3.0
@@ -420,19 +421,15 @@ def _findings(
 ) -> list[Finding]:
     """Findings of runs that the other side does not have as loud."""
     found = []
+    before = [event for one in earlier.values() for event in one.events]
     for run in runs:
         path = Path(run.run)
         for event in verdicts[path].events:
             known = verdicts[path].evidence.get(event)
             if known is None or known.excused:
                 continue
-            there = any(
-                other.label == event.label
-                and other.start < event.stop + 4 * HOP
-                and other.stop > event.start - 4 * HOP
-                for one in earlier.values()
-                for other in one.events
-            )
+            alike = [other for other in before if other.label == event.label]
+            there = bool(match([event], alike, collar=4 * HOP))
             named = LOUDER if there and kind == NEW else kind
             found.append(Finding(named, path, event, known.db, known.level, known))
     return found

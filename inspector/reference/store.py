@@ -281,59 +281,60 @@ def accepted(
     Args:
         renames: Whether a scenario whose logs are gone may have got another name.
     """
-    home = reference.path.absolute().parent
     kept = {each.name: each for each in reference.scenarios}
-    changes = []
-    for new in of_runs(runs):
+    found, changes = of_runs(runs), []
+    for new in found:
         facts: dict[str, Any] = {"accepted": today, "by": by, "reason": reason}
         facts["wanted"] = tuple(wanted.get(new.name, ()))
         old = kept.get(new.name)
-        if old is None:
-            given = {each.name for each in of_runs(runs)}
-            former = [
-                each
-                for each in kept.values()
-                if each.name not in given
-                and share_of_motion(new.repetitions[-1], each.repetitions[-1]) > 0.8
-                and each.robot == new.robot
-                # A scenario whose logs are still there is another one with the same motion.
-                and renames
-                and not any((home / one.run).exists() for one in each.repetitions)
-            ]
-            if former:
-                old = kept.pop(former[0].name)
-                changes.append(Change(new.name, f"renamed from {old.name}"))
+        if old is None and renames:
+            others = [each for each in kept.values() if each.name not in {e.name for e in found}]
+            old = _former(new, others, reference.path.absolute().parent)
+            if old is not None:
+                del kept[old.name]
                 facts["renamed_from"] = (*old.renamed_from, old.name)
+                changes.append(Change(new.name, f"renamed from {old.name}"))
         if old is None:
+            words = f"new, {counted(len(new.repetitions), 'repetition')}"
             kept[new.name] = replace(new, **facts)
-            changes.append(Change(new.name, f"new, {counted(len(new.repetitions), 'repetition')}"))
-            continue
-        known = {each.sha256 for each in old.repetitions if each.sha256}
-        fresh = [each for each in new.repetitions if each.sha256 not in known]
-        if not fresh:
-            if old.name != new.name:
-                kept[new.name] = replace(old, name=new.name, renamed_from=facts["renamed_from"])
-            else:
-                changes.append(Change(new.name, "unchanged, these runs are accepted already"))
-            continue
-        over = [compare(replace(each, name=old.name), (old,)) for each in fresh]
-        same = all(
-            not each.exceedances and each.scenarios and each.quieter <= _margin(old)
-            for each in over
-        )
-        repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
-        facts["wanted"] = old.wanted if same else facts["wanted"]
-        facts["waived"] = old.waived
-        changed = replace(old, name=new.name, repetitions=repetitions, **facts)
-        kept[new.name] = calibrated(changed)
-        worst = max((each.worst for each in over if isfinite(each.worst)), default=float("nan"))
-        words = f"{counted(len(fresh), 'repetition')} {'added' if same else 'replace the accepted'}"
-        told = f", {worst:+.1f} dB over the reference at most" if isfinite(worst) else ""
-        if not any(set(each.joints) & set(old.repetitions[-1].joints) for each in fresh):
-            told = ", of a robot with other joints"
-        changes.append(Change(new.name, f"{words}{told}, {len(repetitions)} kept"))
+        else:
+            kept[new.name], words = _updated(old, new, facts)
+        changes.append(Change(new.name, words))
     scenarios = tuple(kept[name] for name in sorted(kept))
     return Reference(reference.path, scenarios, stored=True), changes
+
+
+def _former(new: Scenario, others: Sequence[Scenario], home: Path) -> Scenario | None:
+    """The scenario that a new one is under another name: its motion is the same, its logs gone."""
+    for each in others:
+        gone = not any((home / one.run).exists() for one in each.repetitions)
+        same = each.robot == new.robot and gone
+        if same and share_of_motion(new.repetitions[-1], each.repetitions[-1]) > 0.8:
+            return each
+    return None
+
+
+def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Scenario, str]:
+    """An accepted scenario with new runs, which join its repetitions or replace them, in words."""
+    known = {each.sha256 for each in old.repetitions if each.sha256}
+    fresh = [each for each in new.repetitions if each.sha256 not in known]
+    if not fresh:
+        former = facts.get("renamed_from", old.renamed_from)
+        words = "unchanged, these runs are accepted already"
+        return replace(old, name=new.name, renamed_from=former), words
+    over = [compare(replace(each, name=old.name), (old,)) for each in fresh]
+    same = all(
+        not each.exceedances and each.scenarios and each.quieter <= _margin(old) for each in over
+    )
+    repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
+    own = {**facts, "wanted": old.wanted if same else facts["wanted"], "waived": old.waived}
+    changed = calibrated(replace(old, name=new.name, repetitions=repetitions, **own))
+    worst = max((each.worst for each in over if isfinite(each.worst)), default=float("nan"))
+    words = f"{counted(len(fresh), 'repetition')} {'added' if same else 'replace the accepted'}"
+    told = f", {worst:+.1f} dB over the reference at most" if isfinite(worst) else ""
+    if not any(set(each.joints) & set(old.repetitions[-1].joints) for each in fresh):
+        told = ", of a robot with other joints"
+    return changed, f"{words}{told}, {len(repetitions)} kept"
 
 
 def wanted_in(

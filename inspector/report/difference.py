@@ -20,7 +20,7 @@ from inspector.reference.difference import (
 from inspector.report import cases
 from inspector.report.cases import DIFF_MARKER, Case, Job
 from inspector.report.cases import Outcome as OfTest
-from inspector.report.findings import TOGETHER, table
+from inspector.report.findings import TOGETHER, folded, table
 from inspector.status import EXIT, Status
 from inspector.text import counted
 from inspector.version import program_version
@@ -60,14 +60,7 @@ def _told(row: Row) -> list[str]:
 
 def _folded(row: Row, kind: str) -> list[str]:
     """Findings of a kind, one line for what repetitions share, by the class that most have."""
-    groups: list[list[Finding]] = []
-    for each in row.findings:
-        if each.kind == kind:
-            alike = (group for group in groups if _alike(group[0], each))
-            group = next(alike, None)
-            if group is None:
-                groups.append(group := [])
-            group.append(each)
+    groups = folded([each for each in row.findings if each.kind == kind], _alike)
     side = row.before if kind == RESOLVED else row.after
     lines = [f"{kind}: {_line(group, len(side))}" for group in groups[:MOST]]
     left = len(groups) - MOST

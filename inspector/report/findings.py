@@ -2,8 +2,9 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from inspector.report.localisation import words
 from inspector.status import Status
@@ -27,6 +28,7 @@ WORDS = {
 """How people read a status."""
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}
 """How people count them."""
+Item = TypeVar("Item")
 Row = tuple[str, str, str, str, str]
 """Time, class, joints, band, and what else is known of a finding."""
 
@@ -104,17 +106,14 @@ class Group:
 
     def found(self, *, fails: bool) -> list[tuple[Verdict, Event, str]]:
         """Findings that fail their runs, or that do not; repetitions of one finding count once."""
-        folded: list[list[tuple[Verdict, Event]]] = []
-        for verdict in self.verdicts:
-            for event in verdict.failing if fails else verdict.excused:
-                alike = (each for each in folded if _alike(each[0], (verdict, event)))
-                group = next(alike, None)
-                if group is None:
-                    folded.append(group := [])
-                group.append((verdict, event))
+        every = [
+            (verdict, event)
+            for verdict in self.verdicts
+            for event in (verdict.failing if fails else verdict.excused)
+        ]
         several = len(self.verdicts)
         result = []
-        for each in folded:
+        for each in folded(every, _alike):
             number = len({id(verdict) for verdict, _ in each})
             runs = f"{number} of {counted(several, 'run')}" if several > 1 else ""
             (label, _), *_ = Counter(event.label for _, event in each).most_common(1)
@@ -143,6 +142,17 @@ class Group:
     def notes(self) -> list[str]:
         """Sentences on findings that do not."""
         return [sentence(*each) for each in self.found(fails=False)]
+
+
+def folded(items: Sequence[Item], alike: Callable[[Item, Item], bool]) -> list[list[Item]]:
+    """Groups of items that are like the first one of their group, in order."""
+    groups: list[list[Item]] = []
+    for item in items:
+        group = next((each for each in groups if alike(each[0], item)), None)
+        if group is None:
+            groups.append(group := [])
+        group.append(item)
+    return groups
 
 
 def each_missing(verdicts: Sequence[Verdict]) -> list[Verdict]:
