@@ -130,8 +130,9 @@ def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
     found: dict[tuple[str, str], Array] = {}
     for commit, verdicts in enumerate(results):
         for group in groups(verdicts):
-            name = str(Path(group.name).with_suffix(""))
-            runs.setdefault(name, np.full(len(results), np.nan))[commit] = len(group.verdicts)
+            name = group.worst.scenario or str(Path(group.name).with_suffix(""))
+            number = runs.setdefault(name, np.full(len(results), np.nan))
+            number[commit] = np.nansum((number[commit], len(group.verdicts)))
             for verdict in group.verdicts:
                 known = verdict.beside
                 levels = {} if known is None or known.worst is None else {"": known.worst}
