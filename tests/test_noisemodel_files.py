@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from noiseclassifier import modelfile
 from noisemodel import OutputError, files
 from noisemodel.files import (
     _machine,
@@ -23,10 +22,6 @@ from noisemodel.files import (
 )
 
 ROOT = Path(__file__).parents[1]
-
-
-def save_model(path, text, **options):
-    modelfile.write(path, {"text": text}, {}, **options)
 
 
 def write(path, text, **options):
@@ -89,20 +84,18 @@ def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path):
     assert (tmp_path / "target").read_text() == "second"
 
 
-@pytest.mark.parametrize("save", [write, save_model], ids=["file", "model"])
-def test_a_link_to_itself_is_one_error_or_replaced(tmp_path, save):
+def test_a_link_to_itself_is_one_error_or_replaced(tmp_path):
     (tmp_path / "link").symlink_to("link")
     with pytest.raises(ValueError, match="link: exists already"):
-        save(tmp_path / "link", "")
-    save(tmp_path / "link", "whole", overwrite=True)
+        write(tmp_path / "link", "")
+    write(tmp_path / "link", "whole", overwrite=True)
     assert (tmp_path / "link").is_file()
 
 
-@pytest.mark.parametrize("save", [write, save_model], ids=["file", "model"])
-def test_a_pipe_is_not_replaced(tmp_path, save):
+def test_a_pipe_is_not_replaced(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(ValueError, match="pipe: is no regular file; name one"):
-        save(tmp_path / "pipe", "", overwrite=True)
+        write(tmp_path / "pipe", "", overwrite=True)
     assert (tmp_path / "pipe").is_fifo()
 
 
