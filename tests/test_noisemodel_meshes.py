@@ -360,10 +360,11 @@ def test_every_stl_and_obj_of_the_listed_robots_is_as_trimesh_reads_it():
 
 
 @pytest.mark.slow
-def test_every_dae_of_the_listed_robots_fills_the_box_that_pinocchio_finds():
+def test_every_small_dae_of_the_listed_robots_fills_the_box_that_pinocchio_finds():
     import coal  # its boxes are right, its triangles are not
 
     files = [f for f in listed_folders()[-1].rglob("*.*") if f.suffix.lower() == ".dae"]
+    files = [f for f in files if f.stat().st_size < 1e6]
     for file in files:
         mesh = coal.MeshLoader().load(str(file), np.ones(3))
         mesh.computeLocalAABB()
@@ -372,4 +373,4 @@ def test_every_dae_of_the_listed_robots_fills_the_box_that_pinocchio_finds():
         size = np.abs(high - low).max()
         assert np.abs(points.min(axis=0) - low).max() < 1e-6 * size, file
         assert np.abs(points.max(axis=0) - high).max() < 1e-6 * size, file
-    assert len(files) == 286
+    assert len(files) == 211
