@@ -69,18 +69,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
     tracks = _at_rate(path, tracks, options)
     tracks = _with_two_samples(path, tracks, remarks)
     tracks = tuple(_finite(path, _believable(path, tracks, remarks), remarks))
-    if log.units and options.units == "degrees" and not robot:
-        left_out = {joint: None for t in tracks for joint in t.joints if _is_gripper(joint)}
-        remarks += [f"{NO_RANGE}: {listed(list(left_out))}"] if left_out else []
-    tracks, in_degrees = (tracks, ()) if options.units else from_degrees(tracks, robot)
-    tracks = in_radians(path, tracks, robot, options.units, normalised_grippers=bool(log.units))
-    if in_degrees:
-        what = " and ".join(
-            f"{each[:-1]}ies" if each[-1] == "y" else f"{each}s" for each in in_degrees
-        )
-        remarks.append(
-            f"{what} look like degrees: converted to radians (if they are not, --units radians)"
-        )
+    tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks)
     tracks, unordered, order = ordered(path, tracks)
     tracks = _without_frozen(tracks, remarks)
     return replace(
@@ -302,44 +291,43 @@ HINT = (
 )
 
 
-def in_radians(
-    path: Path,
-    tracks: Sequence[Track],
-    robot: Robot | None,
-    units: str,
-    *,
-    normalised_grippers: bool = False,
-) -> tuple[Track, ...]:
-    """Tracks with angles in radians, and which of their columns are angles."""
-    if units:
-        every = (_converted(path, t, robot, units, grippers=normalised_grippers) for t in tracks)
-        tracks = [track for track in every if track is not None]
-    else:
-        for track in tracks:
-            _refuse_degrees(path, track, robot)
-    return tuple(
-        replace(
-            track,
-            angles=[track.signal.startswith("position") and t for t in is_angular(track, robot)],
-        )
-        for track in tracks
-    )
-
-
-def from_degrees(
-    tracks: Sequence[Track], robot: Robot | None
+def _in_si(
+    log: Log, tracks: Sequence[Track], units: str, robot: Robot | None, remarks: list[str]
 ) -> tuple[tuple[Track, ...], tuple[str, ...]]:
-    """Tracks in radians, where positions and velocities tell that they are in degrees.
+    """Tracks in radians that know which columns are angles, and what was found to be in degrees."""
+    grippers = bool(log.units)  # normalised, whatever the unit of the others is
+    in_degrees: tuple[str, ...] = ()
+    found = list(tracks)
+    if units:
+        if grippers and units == "degrees" and not robot:
+            left_out = dict.fromkeys(j for t in tracks for j in t.joints if _is_gripper(j))
+            remarks += [f"{NO_RANGE}: {listed(list(left_out))}"] if left_out else []
+        every = (_converted(log.path, t, robot, units, grippers=grippers) for t in tracks)
+        found = [track for track in every if track is not None]
+    else:
+        in_degrees = _in_degrees(tracks, robot)
+        found = [_to_radians(t, robot) if t.quantity in in_degrees else t for t in tracks]
+        for track in found:
+            _refuse_degrees(log.path, track, robot)
+    if in_degrees:
+        plural = {"position": "positions", "velocity": "velocities"}
+        remarks.append(
+            f"{' and '.join(plural[each] for each in in_degrees)} look like degrees: converted to"
+            " radians (if they are not, --units radians)"
+        )
+    angles = [
+        [track.signal.startswith("position") and each for each in is_angular(track, robot)]
+        for track in found
+    ]
+    return tuple(replace(t, angles=own) for t, own in zip(found, angles, strict=True)), in_degrees
+
+
+def _in_degrees(tracks: Sequence[Track], robot: Robot | None) -> tuple[str, ...]:
+    """What is in degrees, as positions and velocities tell.
 
     Positions are if half of the joints that move reach beyond a turn, to and fro; velocities if
     they match them. Without velocities, positions have to reach beyond ``NORMALISED``.
     """
-    found = _in_degrees(tracks, robot)
-    converted = (_to_radians(t, robot) if t.quantity in found else t for t in tracks)
-    return tuple(converted), found
-
-
-def _in_degrees(tracks: Sequence[Track], robot: Robot | None) -> tuple[str, ...]:
     by_signal = {track.signal: track for track in reversed(tracks)}
     for suffix in ("", "_desired"):
         position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
