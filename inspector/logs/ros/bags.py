@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -162,10 +163,7 @@ def _intact(path: Path) -> Bag:
             connection.topic, connection.msgtype, connection.msgdef.data, count
         )
     seconds = reader.duration * 1e-9 if any(topic.count for topic in topics.values()) else 0.0
-    kind = "ROS 1 bag" if ros1 else "ROS 2 bag"
-    bag = Bag(kind, ros1, topics, lambda names: iter(()), reader.close, seconds)
-    bag.messages = lambda names: _messages(path, reader, names)
-    return bag
+    return Bag(ros1, topics, partial(_messages, path, reader), reader.close, seconds)
 
 
 def _problem(reader: Any) -> str:

@@ -37,12 +37,11 @@ Message: TypeAlias = tuple[str, int, bytes]
 """Topic, time of reception in [ns], and the serialised message."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Bag:
     """A bag that is open for reading, independent of its storage.
 
     Attributes:
-        kind: Name of its kind.
         ros1: Whether messages are serialised in the format of ROS 1.
         topics: Its topics by name.
         messages: Iterates over the messages of some topics.
@@ -51,7 +50,6 @@ class Bag:
         lost: What could not be read, a sentence each; complete after all messages are read.
     """
 
-    kind: str
     ros1: bool
     topics: dict[str, Topic]
     messages: Callable[[Collection[str]], Iterator[Message]]
@@ -139,27 +137,22 @@ def open_bag(path: Path, problem: str) -> Bag:
     storage = storages.pop()
     topics, messages = READERS[storage]
     whole = storage == "MCAP" and all(is_whole_mcap(file) for file in files)
-    kind = storage if whole else f"damaged bag ({storage})"
-    bag = Bag(kind, storage == "ROS 1", {}, lambda names: iter(()))
-    if not whole:
-        bag.lost.append(f"the bag is damaged or cut off ({problem})")
-    for file in files:
-        bag.topics |= {topic.name: topic for topic in topics(file)}
-    if not bag.topics:
+    lost = [] if whole else [f"the bag is damaged or cut off ({problem})"]
+    found = {topic.name: topic for file in files for topic in topics(file)}
+    if not found:
         raise LogError(path, f"no topic of the bag can be read: {problem}")
 
     def chosen(names: Collection[str]) -> Iterator[Message]:
         count = 0
         for file in files:
-            for message in messages(file, bag.lost):
+            for message in messages(file, lost):
                 if message[0] in names:
                     yield message
                     count += 1
         if not whole:
-            bag.lost.append(f"{count} messages were recovered")
+            lost.append(f"{count} messages were recovered")
 
-    bag.messages = chosen
-    return bag
+    return Bag(storage == "ROS 1", found, chosen, lost=lost)
 
 
 def _sqlite_topics(file: Path) -> Iterator[Topic]:
