@@ -511,14 +511,37 @@ def test_units_may_differ_by_column(tmp_path):
     assert np.allclose(read_log(path).run.position, Q6[:, :2], rtol=1e-12)
 
 
-def test_a_counter_with_holes_has_gaps(tmp_path):
+@pytest.mark.parametrize("name", ["step", "n", "k [counts]"])
+def test_a_counter_with_holes_has_gaps_whatever_its_name(tmp_path, name):
     kept = np.delete(np.arange(SAMPLES), slice(200, 300))
-    path = written(
-        tmp_path, f"step,{names('q#', 6)},{names('dq#', 6)}", 7 + kept, Q6[kept], V6[kept]
-    )
-    run = read_log(path, mapping=["time=step"]).run
-    assert run.rate == 125.0
+    path = written(tmp_path, f"state,{name},{names('q#', 2)}", kept // 500, 7 + kept, Q6[kept, :2])
+    expected = rf"{re.escape(repr(name))} counts samples; give the log's rate.*--rate HZ"
+    with pytest.raises(InspectorError, match=expected):
+        read_log(path)
+    run = read_log(path, rate=125).run
     assert np.array_equal(np.flatnonzero(~run.mask), np.arange(200, 300))
+
+
+def test_a_counter_that_starts_again_is_none(tmp_path):
+    place = np.arange(SAMPLES) % 900
+    path = written(tmp_path, f"n,{names('q#', 2)}", place, Q6[:, :2])
+    assert len(read_log(path, rate=125).run.time) == SAMPLES
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "how"),
+    [
+        ("q2 [Nm]", "effort", "'effort.joint_2=q2 [Nm]' or --map 'position.joint_2=q2 [Nm]'"),
+        ("q2 [rad/s]", "velocity", "'velocity.joint_2=q2 [rad/s]'"),
+        ("elbow_torque_deg", "position", "'position.elbow=elbow_torque_deg'"),
+    ],
+)
+def test_a_unit_that_contradicts_its_name_is_one_line(tmp_path, name, unit, how):
+    path = written(tmp_path, f"t,q1 [deg],{name}", T6, DEG * Q6[:, 0], Q6[:, 1])
+    expected = rf"log.csv, row 1: column '{re.escape(name)}' .* unit of {unit};.*{re.escape(how)}"
+    with pytest.raises(InspectorError, match=expected):
+        read_log(path)
+    assert read_log(path, mapping=[re.search("'([^']+=[^']+)'", how)[1]]).run.joint_names
 
 
 def test_a_rate_that_does_not_fit_is_refused_unless_forced(tmp_path):

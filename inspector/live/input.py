@@ -22,6 +22,7 @@ from inspector.logs.names import (
     column_signal,
     factor_of,
     listed,
+    other_quantity,
     time_column,
     without_unit,
 )
@@ -159,7 +160,12 @@ class CsvReader:
         naming = Naming.of(self._header)
         for place, column in enumerate(self._header):
             meaning = column_signal(column, naming)
-            if meaning is not None and meaning[0] in SIGNALS and factor_of(column) == 1.0:
+            if (
+                meaning is not None
+                and meaning[0] in SIGNALS
+                and factor_of(column) == 1.0
+                and not other_quantity(column, meaning)
+            ):
                 joint = meaning[1]
                 known = joint if isinstance(joint, str) else _numbered(joint - naming.first, names)
                 found.setdefault(meaning[0], {})[known] = place

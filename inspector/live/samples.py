@@ -246,7 +246,8 @@ class Clock:
         if len(finite) < AGREE and len(stamps) < 2 * AGREE and not ended:
             return False
         steps = np.diff(finite[:RATE_STEPS])
-        step = float(np.median(steps[steps > 0.0] if (steps > 0.0).any() else 1.0 / self._rate))
+        rising = steps[(steps > 0.0) & (steps < LARGEST)]
+        step = float(np.median(rising)) if len(rising) else 1.0 / self._rate
         power = 3 * round(np.log10(step * self._rate) / 3)
         unit = UNITS.get(power, "") if 0.5 < step * self._rate / 10.0**power < 2.0 else ""
         self._unit = 10.0**-power if unit else 1.0

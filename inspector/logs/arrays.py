@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.clocks import counted_stamps, stamps_of
+from inspector.logs.clocks import counted_stamps, counting, stamps_of
 from inspector.logs.log import SAMPLES, Entry, Field, Log, Stamps
 from inspector.logs.mapping import ReadOptions, pose_of
 from inspector.logs.names import (
@@ -263,7 +263,13 @@ def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
     """Name of the array with the stamps, empty without; a part of one is an array then."""
     rows = [name for name, each in arrays.items() if each.ndim == 1]
     if not options.time:
-        return time_column(rows), arrays
+        samples = max((len(each) for each in arrays.values() if each.ndim), default=0)
+        counters = {
+            name: arrays[name]
+            for name in rows
+            if len(arrays[name]) == samples and not (column_signal(name) or array_signal(name))
+        }
+        return time_column(rows) or counting(counters), arrays
     entry = next(each for each in options.entries if each.signal == "time")
     name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
     if name not in arrays:

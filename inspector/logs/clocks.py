@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.log import SAMPLES, UNIFORM, Stamps, Track
 from inspector.logs.mapping import ReadOptions
-from inspector.logs.names import TIME_UNITS, without_unit
+from inspector.logs.names import TIME_UNITS, time_column, without_unit
 from noisemodel.run import continuous_quaternions, resample
 from noisemodel.types import Array, Indices, Mask, Real
 
@@ -101,6 +101,16 @@ def is_counter(steps: NDArray[Any], first: float) -> bool:
     )
 
 
+def counting(columns: Mapping[str, NDArray[Any]]) -> str:
+    """Name of the first column that counts samples; empty if none does."""
+    for name, values in columns.items():
+        if values.dtype.kind in "iuf" and values.ndim == 1 and len(values) > 2:
+            whole = values.astype(np.float64)
+            if np.isfinite(whole).all() and is_counter(np.diff(whole), whole[0]):
+                return name
+    return ""
+
+
 def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -> Stamps:
     """Stamps from an array of numbers."""
     if values.dtype.kind == "M":
@@ -175,7 +185,7 @@ def counted_stamps(
             f"{what}: {found:g} Hz, at which positions and velocities fit{but}; --rate sets another"
         )
     else:
-        how = "" if stamps.name else ", or name their column: --map time=COLUMN"
+        how = "" if time_column([stamps.name]) else ", or name their column: --map time=COLUMN"
         raise LogError(path, f"{what}; give the log's rate, in samples per second: --rate HZ{how}")
     return replace(stamps, time=stamps.time / rate, unit="seconds", remark=remark)
 

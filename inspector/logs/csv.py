@@ -17,9 +17,9 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, gathered
-from inspector.logs.clocks import is_counter, stamps_since
+from inspector.logs.clocks import counting, is_counter, stamps_since
 from inspector.logs.log import SAMPLES, Field, Log, LogReader, Progress, Stamps
-from inspector.logs.mapping import ReadOptions, no_motion
+from inspector.logs.mapping import ReadOptions, check_unit, no_motion
 from inspector.logs.names import (
     JOINT_SIGNALS,
     TIME_UNITS,
@@ -146,13 +146,17 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
     options = options.for_columns(path, names)
     wanted = _wanted(path, layout, time, rest, options)
     named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
-    known = {time, rest, *wanted, *named}
-    not_read = tuple(name for place, name in enumerate(header) if name and place not in known)
+    counter = None if time is not None else _counter(path, stream, layout, wanted)
+    times = (time if counter is None else counter, rest)
     rows, values, cells, names_of_joints = _table(
-        path, stream, layout, wanted, (time, rest), tuple(named), progress
+        path, stream, layout, wanted, times, tuple(named), progress
     )
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
+    if counter is not None and _counts(cells):
+        time = counter
+    known = {time, rest, *wanted, *named}
+    not_read = tuple(name for place, name in enumerate(header) if name and place not in known)
     if time is None:
         count = np.arange(len(rows), dtype=np.float64)
         stamps = Stamps(Decimal(0), count, rows, SAMPLES)
@@ -172,6 +176,27 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
         time="" if time is None else header[time],
     )
     return gathered(log, options)
+
+
+def _counter(path: Path, stream: TextIO, layout: Layout, wanted: Sequence[int]) -> int | None:
+    """Place of the column that counts the samples in the first rows; None if none does."""
+    lines = list(islice(_lines(path, stream), layout.skip, layout.skip + HEAD))
+    stream.seek(0)
+    rows = []
+    with suppress(LogError):  # the last row may be quoted over more lines
+        rows = [cells for _, cells in _rows(path, "".join(lines), layout.skip, layout)]
+    for place, name in enumerate(layout.header):
+        if name and place not in wanted and _counts([cells[place] for cells in rows]):
+            return place
+    return None
+
+
+def _counts(cells: Sequence[str]) -> bool:
+    """Whether cells are whole numbers that grow, mostly by one."""
+    try:
+        return bool(counting({"cells": np.array(cells, dtype=np.float64)}))
+    except ValueError:
+        return False
 
 
 def _wanted(
@@ -204,6 +229,8 @@ def _wanted(
     for place in [*wanted, *([] if time is None else [time])]:
         if header.count(header[place]) > 1:
             raise LogError(path, f"two columns are named {header[place]!r}", row=row)
+        if place != time and header[place] not in mapped:
+            check_unit(path, header[place], column_signal(header[place], naming), row)
     if not wanted:
         joints = iter(range(1, len(header) + 1))
         names = ",".join(

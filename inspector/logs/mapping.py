@@ -18,11 +18,13 @@ from inspector.logs.log import JOINT, Entry, Field, Log, Track
 from inspector.logs.names import (
     BASE_SIGNALS,
     JOINT_SIGNALS,
+    Meaning,
     Naming,
     array_signal,
     column_signal,
     listed,
     number_of,
+    other_quantity,
     pattern_for,
 )
 from inspector.wrongrobot import WrongRobotError
@@ -312,6 +314,20 @@ def no_motion(path: Path, names: Sequence[str], instead: str = "") -> LogError:
     how = f"no position or velocity of a joint; map columns, such as {example}"
     columns = listed([name for name in names if name])
     return LogError(path, f"{how if example else NO_MOTION + instead}; columns are {columns}")
+
+
+def check_unit(path: Path, name: str, meaning: Meaning | None, row: int | None = None) -> None:
+    """Refuse a column whose unit is that of another quantity than its name tells."""
+    if meaning is None or not (unit := other_quantity(name, meaning)):
+        return
+    signal, number = meaning
+    joint = number if isinstance(number, str) else f"joint_{number}"
+    raise LogError(
+        path,
+        f"column {name!r} is named like {signal} and has the unit of {unit}; say which it is: --map"
+        f" '{unit}.{joint}={name}' or --map '{signal}.{joint}={name}'",
+        row=row,
+    )
 
 
 def _naming_remarks(

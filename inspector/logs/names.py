@@ -305,6 +305,12 @@ def factor_of(column: str) -> float:
     return UNITS.get(without_unit(column)[1], ("", 1.0))[1]
 
 
+def other_quantity(column: str, meaning: Meaning) -> str:
+    """The quantity of a column's unit where its name says another one; empty where they agree."""
+    quantity = UNITS.get(without_unit(column)[1], ("", 1.0))[0]
+    return "" if meaning[0].startswith(quantity) else quantity
+
+
 def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
     """Signal and joint of a column, by its name; None for an unknown name."""
     naming = naming or Naming()

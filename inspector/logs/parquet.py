@@ -20,9 +20,9 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.clocks import stamps_of
+from inspector.logs.clocks import counting, stamps_of
 from inspector.logs.log import SAMPLES, Field, Log, LogReader, Stamps
-from inspector.logs.mapping import ReadOptions
+from inspector.logs.mapping import ReadOptions, check_unit
 from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
 from noisemodel.files import beyond, limit
 from noisemodel.runfile import ArchiveError, check_regular, check_unpacked, one_line
@@ -131,7 +131,8 @@ def listing(path: Path) -> tuple[str, ...]:
 
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
-    names = schema_of(path).names
+    schema = schema_of(path)
+    names = schema.names
     time = options.time if options.time in names else time_column(names)
     options = options.for_columns(path, [name for name in names if name not in (time, EPISODE)])
     mapped = {name for entry in options.entries for name in (entry.source, entry.part()[0])}
@@ -142,7 +143,18 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
         if name in mapped
         or (name not in (time, EPISODE) and (column_signal(name, naming) or array_signal(name)))
     ]
-    table = table_of([path], [*wanted, *([time] if time and time not in wanted else [])], episode)
+    for name in wanted:
+        if name not in mapped:
+            check_unit(path, name, column_signal(name, naming))
+    whole = [
+        each.name
+        for each in schema
+        if pyarrow.types.is_integer(each.type) and each.name not in (*wanted, EPISODE)
+    ]
+    others = [time] if time and time not in wanted else [] if time else whole
+    table = table_of([path], [*wanted, *others], episode)
+    if not time:
+        time = counting({name: table.column(name).to_numpy() for name in whole})
     stamps = Stamps(Decimal(0), np.arange(len(table), dtype=np.float64), unit=SAMPLES)
     if time:
         column = values_of(path, time, table.column(time))
