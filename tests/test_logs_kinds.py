@@ -586,6 +586,24 @@ def test_a_mat_file_with_objects_alone_says_how_to_save_numbers(tmp_path):
         read_log(tmp_path / "a.mat")
 
 
+def test_logsout_of_simulink_says_how_to_save_numbers(tmp_path):
+    import h5py
+
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["logsout"] = np.array([[0xDD000000, 2, 1, 1, 1, 1]], dtype=np.uint32)
+        file["logsout"].attrs["MATLAB_object_decode"] = 3
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file")
+    with pytest.raises(InspectorError, match=r"objects \(logsout\).*ts = logsout{1}.Values"):
+        read_log(path)
+    with h5py.File(path, "a") as file:
+        file["t"], file["q"] = T6[None], Q6[:, :2].T
+    imported = read_log(path)
+    assert np.allclose(imported.run.position, Q6[:, :2])
+    assert imported.not_read == ("logsout",)
+
+
 @pytest.mark.parametrize("day", ["9999-01-01", "1600-01-01"])
 def test_dates_that_no_clock_has_are_one_line(tmp_path, day):
     path = tmp_path / "log.csv"

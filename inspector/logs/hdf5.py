@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from math import inf, prod
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,8 @@ CONTROLLER = re.compile(r'"type": "((?:OSC|IK|JOINT)_\w+)"')
 """Type of the controller of an arm in robosuite's arguments."""
 MATLAB = b"MATLAB 7.3"
 """The first bytes of a file that MATLAB wrote."""
+OBJECT = "MATLAB_object_decode"
+"""An attribute of MATLAB's objects, of which a file holds numbers and references alone."""
 REFERENCES = "#refs#"
 """The group in which MATLAB keeps the cells and objects of a file."""
 
@@ -117,6 +120,8 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str, about: str)
         with h5py.File(path) as file:
             group = _own(path, file[f"{home}/{episode}"], file) if home else file
             datasets, left_out = _wanted(group, options)
+            objects = [name for name, each in datasets if OBJECT in each.attrs]
+            datasets = [(name, each) for name, each in datasets if name not in objects]
             arrays = dict(_values(path, [(n, _own(path, each, file)) for n, each in datasets]))
             attributes = {**_single(file.attrs), **_single(group.attrs)}
     except LogError:
@@ -124,9 +129,11 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str, about: str)
     except DAMAGE as error:
         raise LogError(path, f"{episode or 'it'} is damaged ({one_line(error)})") from error
     if _is_matlab(path):
-        from inspector.logs.matlab import log_of_variables
+        from inspector.logs.matlab import check_numbers, log_of_variables
 
-        return log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
+        check_numbers(path, arrays, objects)
+        log = log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
+        return replace(log, not_read=(*log.not_read, *objects))
     if not home:
         part, samples = episodes_of(arrays)[episode], max(map(len, arrays.values()), default=0)
         arrays = {n: each[part] if len(each) == samples else each for n, each in arrays.items()}

@@ -5,7 +5,7 @@ those of version 7.3 by `inspector.logs.hdf5`.
 """
 
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from io import BytesIO
 from math import prod
 from pathlib import Path
@@ -38,7 +38,7 @@ STAMPS = ("Time", "time", "t")
 
 OBJECTS = (
     "holds MATLAB objects ({}), such as a timeseries or Simulink's logsout, not numbers; in MATLAB:"
-    " t = ts.Time; q = ts.Data; save('log.mat', 't', 'q')"
+    " t = ts.Time; q = ts.Data; save('log.mat', 't', 'q'); of Simulink, ts = logsout{{1}}.Values"
 )
 
 
@@ -96,9 +96,14 @@ def _variables(path: Path) -> dict[str, NDArray[Any]]:
         if not variable.startswith("__")
         for name, each in _flat(variable, value, DEPTH)
     }
-    if objects and not any(each.size > 1 for each in flat.values()):
-        raise LogError(path, OBJECTS.format(", ".join(sorted(set(objects))[:3]) or "unnamed"))
+    check_numbers(path, flat, objects)
     return flat
+
+
+def check_numbers(path: Path, arrays: Mapping[str, NDArray[Any]], objects: Collection[str]) -> None:
+    """Refuse a file of objects alone: what they hold is told by code of MATLAB's only."""
+    if objects and not any(each.size > 1 for each in arrays.values()):
+        raise LogError(path, OBJECTS.format(", ".join(sorted(set(objects))[:3])))
 
 
 def _flat(name: str, value: Any, depth: int) -> Iterator[tuple[str, NDArray[Any]]]:

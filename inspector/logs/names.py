@@ -56,7 +56,7 @@ UNITS = {
 """Quantity and size, in [rad], [rad/s], [m] or [m/s], of units, as names of columns have them."""
 
 UNIT = re.compile(
-    r"(?P<name>.*?)(?:\s*[\[(]\s*(?P<bracketed>[^\])]*[^\d\s\])][^\])]*)[\])]"
+    r"(?P<name>.*?)(?:\s*+[\[(]\s*+(?P<bracketed>(?=[^\])]*[^\d\s\])])[^\])]*+)[\])]"
     r"|[_ ](?P<suffix>m?s|sec|secs|seconds|msec|us|usec|ns|nsec"
     r"|rad|rads|radps|rad_s|deg|degs|degps|deg_s|dps|rpm|nm))",
     re.IGNORECASE,
@@ -77,7 +77,7 @@ DESIRED = (
 MEASURED = r"actual|act|feedback|fbk|measured|meas|msr|present|ist"
 JOINT_WORD = r"joints?|dof|motor|axis|actuator"
 
-GAP = r"(?:[ _./-]+|(?-i:(?<=[a-z0-9])(?=[A-Z])))"
+GAP = r"(?:[ _./-]++|(?-i:(?<=[a-z0-9])(?=[A-Z])))"
 QUANTITY = rf"(?P<quantity>{'|'.join(QUANTITIES.values())})"
 BEFORE = rf"(?:(?P<before>{DESIRED}|{MEASURED}){GAP})?"
 WITHIN = rf"(?:(?P<within>{DESIRED}|{MEASURED}){GAP})?"
