@@ -1,6 +1,9 @@
 """Small files that ask for much memory or time end in one line, soon."""
 
+import os
+import struct
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +145,38 @@ def test_an_mjcf_of_more_than_any_robot_has_is_one_line(tmp_path, apart, element
     with pytest.raises(RobotError, match="r.xml: (MuJoCo |30002 bodies and geoms)") as caught:
         Robot.load(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["gmsh", "mesh"])
+def test_a_flex_of_a_pipe_is_refused_unopened(tmp_path, kind):
+    os.mkfifo(tmp_path / "f.msh")
+    flex = f'<body name="b"><flexcomp name="f" type="{kind}" file="f.msh"/></body>'
+    (tmp_path / "r.xml").write_text(f"<mujoco><worldbody>{flex}</worldbody></mujoco>")
+    with pytest.raises(RobotError, match=r"r.xml: names 'f.msh', which is no regular file"):
+        Robot.load(tmp_path / "r.xml")
+
+
+@pytest.mark.parametrize("element", ["hfield", "texture"])
+def test_a_tiny_png_that_states_a_huge_size_is_one_line_or_not_read(tmp_path, element):
+    (tmp_path / "a.png").write_bytes(png(60_000, 60_000))
+    more = 'type="2d"' if element == "texture" else 'size="1 1 1 1"'
+    asset = f'<asset><{element} name="a" file="a.png" {more}/></asset>'
+    (tmp_path / "r.xml").write_text(f"<mujoco>{asset}<worldbody/></mujoco>")
+    if element == "texture":
+        assert Robot.load(tmp_path / "r.xml").joints == ()
+    else:
+        with pytest.raises(RobotError, match=r"r.xml: MuJoCo cannot read the MJCF .*PNG"):
+            Robot.load(tmp_path / "r.xml")
+
+
+def png(width, height):
+    """A picture that states a size and holds a thousand bytes."""
+    parts = {b"IHDR": struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)}
+    parts |= {b"IDAT": zlib.compress(bytes(1000)), b"IEND": b""}
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in parts.items()
+    )
 
 
 def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):

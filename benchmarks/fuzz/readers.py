@@ -412,11 +412,11 @@ def _check_clock(batches: Iterator[Array]) -> None:
     clock, waiting, last = Clock(100.0, Warnings(lambda line: None)), np.empty(0), -np.inf
     for batch in chain(batches, [None]):
         stamps = waiting if batch is None else np.concatenate((waiting, batch))
-        taken = clock.take(stamps, ended=batch is None)
-        waiting = stamps[len(taken.kept) :]
-        if len(waiting) != taken.waiting or not (np.diff(taken.time, prepend=last) > 0).all():
+        kept, _, time, count = clock.take(stamps, ended=batch is None)
+        waiting = stamps[len(kept) :]
+        if len(waiting) != count or not (np.diff(time, prepend=last) > 0).all():
             raise AssertionError("times do not increase, or samples are lost")
-        last = taken.time[-1] if len(taken.time) else last
+        last = time[-1] if len(time) else last
 
 
 def _read_stamps(path: Path) -> None:

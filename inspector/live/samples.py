@@ -214,6 +214,7 @@ class Clock:
             shape (kept,); their times, always increasing, shape (kept,), in [s]; and how many
             samples at the end wait, since only those that follow can decide about them.
         """
+        stamps = np.where(np.abs(stamps) < 1e100, stamps, np.nan)  # differences would overflow
         if not self._unit and not self._begin(stamps, ended=ended):
             return np.zeros(0, dtype=bool), np.empty(0), np.empty(0), len(stamps)
         known = stamps * self._unit
@@ -246,10 +247,11 @@ class Clock:
         if len(finite) < AGREE and len(stamps) < 2 * AGREE and not ended:
             return False
         steps = np.diff(finite[:RATE_STEPS])
-        rising = steps[(steps > 0.0) & (steps < LARGEST)]
+        rising = steps[steps > 0.0]
         step = float(np.median(rising)) if len(rising) else 1.0 / self._rate
         power = 3 * round(np.log10(step * self._rate) / 3)
-        unit = UNITS.get(power, "") if 0.5 < step * self._rate / 10.0**power < 2.0 else ""
+        near = power in UNITS and 0.5 < step * self._rate / 10.0**power < 2.0
+        unit = UNITS[power] if near else ""
         self._unit = 10.0**-power if unit else 1.0
         if unit:
             self._warnings.emit(f"timestamps count {unit} at {self._rate:g} Hz: read as such")
