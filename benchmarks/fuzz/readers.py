@@ -15,7 +15,7 @@ from functools import cache
 from io import BytesIO
 from itertools import chain
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 
@@ -481,7 +481,8 @@ def compile_in_fork() -> None:
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         return subprocess.CompletedProcess(command, status, (Path(cwd) / "said").read_bytes(), b"")
 
-    mjcf.subprocess.run = run
+    # Of this module alone: others start processes too.
+    mjcf.subprocess = SimpleNamespace(run=run, TimeoutExpired=subprocess.TimeoutExpired)
 
 
 def _read_resume(path: Path) -> None:
