@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -290,7 +291,7 @@ class Comparison:
 
         A heat map of it shows where the run is louder than its reference.
         """
-        return _largest(self.over.reshape(*self.over.shape[:2], -1))
+        return _largest(self.over.reshape(*self.over.shape[:2], prod(self.over.shape[2:])))
 
     @property
     def peaks(self) -> Array:
