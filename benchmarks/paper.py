@@ -31,7 +31,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import noiseclassifier as nc
-from inspector.train import PARTS, classified, of_run, train
+from inspector.training.train import PARTS, classified, of_run, train
 from noiseclassifier.assessment import measure, number, percent, predict
 from noiseclassifier.matching import Predictions
 from noiseclassifier.scenarios.robots import limbs

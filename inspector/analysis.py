@@ -15,10 +15,9 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector.audit import Audit, audit, shortcomings, summary
-from inspector.audit_signals import without_placeholder
+from inspector.audit.audit import Audit, audit, shortcomings, summary
+from inspector.audit.signals import without_placeholder
 from inspector.errors import InspectorError
-from inspector.hold import without_hold
 from inspector.levels import FLOOR_DB, STEP, velocity_levels
 from inspector.library import (
     CannotTellError,
@@ -29,6 +28,7 @@ from inspector.library import (
     load_library,
 )
 from inspector.localisation.extent import extent
+from inspector.logs.hold import without_hold
 from inspector.logs.read import Opened, open_run
 from inspector.status import IGNORED, Status, Unknown
 from noiseclassifier import Event

@@ -10,7 +10,7 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector import assets
 from inspector.errors import InspectorError
-from inspector.hold import without_hold
+from inspector.logs.hold import without_hold
 from noiseclassifier.profile import NOMINAL
 from noisemodel.run import pieces_of
 from noisemodel.types import Array, Mask, Real

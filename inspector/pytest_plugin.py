@@ -179,7 +179,7 @@ class Noise:
         reason: str,
     ) -> None:
         """Accept runs as repetitions of a scenario."""
-        from inspector.audit_signals import without_placeholder
+        from inspector.audit.signals import without_placeholder
         from inspector.reference.levels import levels
         from inspector.reference.store import accept_into, digest, wanted_in, who
 

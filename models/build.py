@@ -23,7 +23,7 @@ import numpy as np
 
 import noiseclassifier as nc
 from inspector.progress import progress
-from inspector.train import ANY_RATE, evaluate, train
+from inspector.training.train import ANY_RATE, evaluate, train
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
 from noiseclassifier.scenarios.dataset import Folder, Side, Task, choose, scenario_tasks, wide_tasks

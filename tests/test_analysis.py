@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from inspector.analysis import Analysis, analyse, analyse_noise, with_links
 from inspector.assets import demo_run, model_files
-from inspector.audit import audit
-from inspector.audit_signals import without_placeholder
+from inspector.audit.audit import audit
+from inspector.audit.signals import without_placeholder
 from inspector.library import load_library
 from inspector.report import html, markdown
 from inspector.report.findings import WORDS

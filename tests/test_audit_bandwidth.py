@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, savgol_filter, sosfilt
 
-from inspector.audit_signals import (
+from inspector.audit.signals import (
     CENTRAL,
     ENCODER_NOISE,
     SMOOTH,
@@ -11,7 +11,7 @@ from inspector.audit_signals import (
     spectrum,
     step_of,
 )
-from inspector.hold import hold_length
+from inspector.logs.hold import hold_length
 from noisemodel import Run
 
 RATES = [200.0, 1000.0, 10_000.0]

@@ -5,7 +5,7 @@ from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
 from inspector.assets import demo_run, model_files
-from inspector.audit import (
+from inspector.audit.audit import (
     OSCILLATIONS,
     Observability,
     audit,

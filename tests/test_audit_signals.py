@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.audit import excerpt, gaps_of
-from inspector.audit_signals import copies, unit_warnings
+from inspector.audit.audit import excerpt, gaps_of
+from inspector.audit.signals import copies, unit_warnings
 
 
 def warnings(velocity, position=None, rate=1000.0):

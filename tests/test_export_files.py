@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 
 from inspector.analysis import estimate
 from inspector.assets import demo_run, model_files
-from inspector.export import collect, export
+from inspector.export.tables import collect, export
 from inspector.library import load_library
 from noisemodel import Block, Run, simplified
 

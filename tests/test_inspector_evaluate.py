@@ -8,7 +8,7 @@ import pytest
 from commandline import call
 from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
 
-from inspector import train
+from inspector.training import train
 from noiseclassifier.assessment import measure
 from noiseclassifier.recording import group_of
 

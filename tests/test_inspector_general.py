@@ -12,12 +12,12 @@ from scipy.signal import butter, sosfilt
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import analyse
-from inspector.audit import Observability, audit
-from inspector.hold import without_hold
+from inspector.audit.audit import Observability, audit
 from inspector.library import CannotTellError, label_run, signals_of
+from inspector.logs.hold import without_hold
 from inspector.report.markdown import report
 from inspector.status import Status
-from inspector.train import classified
+from inspector.training.train import classified
 
 LIBRARY = {"general": trained()}
 FIXED = {"fixed": fixed()}

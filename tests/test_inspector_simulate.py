@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from commandline import call as inspector
 
-from inspector.train import classified
+from inspector.training.train import classified
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
 from noiseclassifier.scenarios.simulation import digest, look_up

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from inspector.assets import demo_run
 from inspector.errors import InspectorError
-from inspector.labelfiles import FORMATS, read_labels, write_labels
+from inspector.export.labels import FORMATS, read_labels, write_labels
 from noiseclassifier import Event, noisytest
 from noisemodel import Block, OutputError, Run, RunError
 

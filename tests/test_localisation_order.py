@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from inspector.analysis import Analysis
-from inspector.audit import audit
+from inspector.audit.audit import audit
 from inspector.localisation.order import Order, best_lines, order
 from inspector.report.formats import as_json, github, junit, text
 from inspector.report.html import found

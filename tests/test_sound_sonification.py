@@ -12,7 +12,7 @@ from commandline import call as inspector
 import noisemodel as nm
 from inspector.analysis import estimate
 from inspector.errors import InspectorError
-from inspector.sound import Settings, clip, common_gain, mix, output_paths, save, sonify
+from inspector.export.sound import Settings, clip, common_gain, mix, output_paths, save, sonify
 from noisemodel import Run
 
 RATE = 10_000.0
@@ -268,7 +268,7 @@ def test_a_clip_has_the_whole_run_or_the_part_around_its_worst_moment(monkeypatc
     run = run_of(0.01 * tone(440), 0.01 * tone(300))
     whole = clip(run)
     assert (whole.start, whole.stop) == (0.0, 2.0)
-    monkeypatch.setattr("inspector.sound.MOST_VELOCITIES", 10_000)
+    monkeypatch.setattr("inspector.export.sound.MOST_VELOCITIES", 10_000)
     part = clip(run, around=1.5)
     assert (part.start, part.stop) == (1.25, 1.75)
     samples, rate = read(part.data)
@@ -283,7 +283,7 @@ def test_a_run_without_audible_frequencies_has_no_clip():
 
 
 def test_sounds_need_no_library_that_is_slow_to_import():
-    code = "import sys, inspector.sound; print('scipy.signal' in sys.modules)"
+    code = "import sys, inspector.export.sound; print('scipy.signal' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 

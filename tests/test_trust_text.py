@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from inspector import tune, verdict
+from inspector import verdict
 from inspector.errors import InspectorError
-from inspector.labelfiles import read_labels
+from inspector.export.labels import read_labels
 from inspector.live import LiveError, LiveSession
 from inspector.live.input import reader_of
 from inspector.logs.mapping import ReadOptions
@@ -18,6 +18,7 @@ from inspector.logs.read import read_log
 from inspector.reference import store
 from inspector.status import Status
 from inspector.text import counted, plain
+from inspector.training import tune
 from inspector.verdict import classify_file
 from noiseclassifier import jsontext, noisytest
 from noiseclassifier.scenarios import DatasetError

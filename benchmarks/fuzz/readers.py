@@ -23,11 +23,11 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector import tune, verdict
+from inspector import verdict
 from inspector.analysis import analyse
 from inspector.assets import model_files
 from inspector.errors import InspectorError
-from inspector.labelfiles import read_labels
+from inspector.export.labels import read_labels
 from inspector.library import load_library
 from inspector.live import input as feeding
 from inspector.live.samples import Clock, Warnings
@@ -47,6 +47,7 @@ from inspector.logs.ros.messages import STATE, STATES, Topic, decoder
 from inspector.reference.judging import Expected
 from inspector.reference.levels import levels
 from inspector.reference.store import Reference, of_runs, save
+from inspector.training import tune
 from noiseclassifier import noisytest
 from noiseclassifier.scenarios import ScenarioError
 from noiseclassifier.scenarios.dataset import Folder, Task

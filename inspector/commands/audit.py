@@ -38,7 +38,7 @@ def audit(
       4  cannot tell: a log can show no failure class
     """
     from inspector import assets
-    from inspector.audit import as_json, audit_all, text
+    from inspector.audit.audit import as_json, audit_all, text
     from inspector.library import load_library
 
     reading: Reading = ctx.obj

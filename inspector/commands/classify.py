@@ -213,7 +213,7 @@ def _labels(
     """What writes the findings as label files, if a folder is named; its files are checked."""
     if folder is None:
         return []
-    from inspector.labelfiles import label_paths, write_findings
+    from inspector.export.labels import label_paths, write_findings
 
     shown = [each.shown for each in runs]
     targets = label_paths(shown, folder, format_name=form, overwrite=overwrite)

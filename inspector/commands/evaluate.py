@@ -42,7 +42,8 @@ def evaluate(
     overwrite: Overwrite = False,
 ) -> None:
     """Evaluate a model on annotated runs that it was not trained on."""
-    from inspector import assets, train
+    from inspector import assets
+    from inspector.training import train
     from noiseclassifier.assessment import table
     from noisemodel.files import refuse_existing, replacing
 

@@ -64,8 +64,8 @@ def export(
     CSV and Parquet; annotation tools and spreadsheets read label files.
     """
     from inspector import assets
-    from inspector.export import LAYOUTS
-    from inspector.export import export as write
+    from inspector.export.tables import LAYOUTS
+    from inspector.export.tables import export as write
     from inspector.library import load_library
     from noisemodel.files import refuse_existing
 
@@ -80,7 +80,7 @@ def export(
     recorded = opened(run, reading).run
     if labels:
         from inspector.analysis import analyse
-        from inspector.labelfiles import write_labels
+        from inspector.export.labels import write_labels
 
         findings = labels is Labels.FINDINGS
         spans = analyse(recorded, library).findings if findings else recorded.blocks
@@ -102,7 +102,7 @@ def _annotated(run: "Run", labels: Path, output: Path, *, overwrite: bool) -> No
     """Write a run whose annotated blocks are the labels of a file."""
     from dataclasses import replace
 
-    from inspector.labelfiles import read_labels
+    from inspector.export.labels import read_labels
 
     blocks = read_labels(labels, run)
     replace(run, blocks=blocks).save(output, overwrite=overwrite)

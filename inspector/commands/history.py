@@ -24,7 +24,7 @@ def history(
     Files are in order of their names, and named after their commit behind the last dash:
     0061-3f2a1c9.json. The exit status is 3 if one cannot be read; the others are shown.
     """
-    from inspector.history import page, read
+    from inspector.report.history import page, read
     from noisemodel.files import refuse_existing, replacing
 
     if output:

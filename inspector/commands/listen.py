@@ -40,7 +40,7 @@ def listen(
     overwrite: Overwrite = False,
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
-    from inspector import sound as sonification
+    from inspector.export import sound as sonification
 
     reading: Reading = ctx.obj
 

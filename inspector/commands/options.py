@@ -117,7 +117,7 @@ Floor = Annotated[
     typer.Option("--floor", help="Darkest level of spectrograms, in dB re 1 rad/s.", max=0.0),
 ]
 PARTS = ("all", "training", "test")
-"""Those of ``inspector.train``, which would take too long to import here."""
+"""Those of ``inspector.training.train``, which would take too long to import here."""
 InPart = Annotated[
     str,
     typer.Option(
@@ -274,7 +274,7 @@ def one_at_a_time(reading: "Reading", runs: int) -> None:
 
 def say_warnings(run: "Run") -> None:
     """Print what hints at another robot than the run names on standard error."""
-    from inspector.wrongrobot import check_joints, limit_warnings
+    from inspector.logs.wrongrobot import check_joints, limit_warnings
 
     check_joints(run.joint_names, run.robot)
     for warning in limit_warnings(run):

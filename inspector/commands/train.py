@@ -29,7 +29,7 @@ def train(
     overwrite: Overwrite = False,
 ) -> None:
     """Train a model on annotated runs."""
-    from inspector.train import train as train_model
+    from inspector.training.train import train as train_model
 
     measures, left_out = train_model(inputs, profile, rate, output, part=part, overwrite=overwrite)
     typer.echo(f"{measures}\n{left_out}")

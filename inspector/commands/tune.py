@@ -91,8 +91,8 @@ def tune(
     from json import dumps
 
     from inspector.compare.picture import require
-    from inspector.tune import Search
-    from inspector.tune import tune as tune_profile
+    from inspector.training.tune import Search
+    from inspector.training.tune import tune as tune_profile
     from noisemodel.files import refuse_existing
 
     if picture:

@@ -173,9 +173,9 @@ def _check(paths: list[Path], target: Path, request: Request) -> None:
 
 def _picture(run: Path, output: Path, request: Request) -> None:
     """Write a PNG of what the viewer shows, without a display."""
+    from inspector.export.sound import worst_time
     from inspector.recording import picture as screenshot
     from inspector.recording.run import write
-    from inspector.sound import worst_time
 
     screenshot.require()
     points, at = screenshot.parse_size(request.size), request.at
@@ -202,7 +202,7 @@ def _picture(run: Path, output: Path, request: Request) -> None:
 
 def _page(run: Path, output: Path, request: Request) -> None:
     """Write one HTML page about a run: pictures, tables, sound."""
-    from inspector.audit import text
+    from inspector.audit.audit import text
     from inspector.report import html
 
     html.require()
@@ -287,9 +287,9 @@ def _analysed(
 
 def _one(runs: list["Opened"], target: Path, request: Request) -> float:
     """Write the recording of a run; returns the time of its worst moment, in [s]."""
+    from inspector.export.sound import of_recording, worst_time
     from inspector.recording.run import write
     from inspector.report import findings, markdown
-    from inspector.sound import of_recording, worst_time
 
     (run,) = runs
     found, verdict, beside = _analysed(run, request)

@@ -28,6 +28,7 @@ from inspector.compare.changes import (
 )
 from inspector.compare.pair import Pair
 from inspector.errors import InspectorError
+from inspector.export.sound import SMALL_RATE, common_gain, sound_of
 from inspector.levels import LINKS, SPECTRUM, link_levels
 from inspector.recording import axes, robot, unstable
 from inspector.recording.axes import TIMELINE, Label, Panel
@@ -55,7 +56,6 @@ from inspector.recording.panels import (
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.markdown import classes_of, spoken
-from inspector.sound import SMALL_RATE, common_gain, sound_of
 from inspector.thinning import extremes
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.run import part

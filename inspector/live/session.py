@@ -28,10 +28,10 @@ from inspector.live.samples import (
     widths_of,
 )
 from inspector.live.sink import Sink
+from inspector.logs.wrongrobot import LONG, LimitWatch, check_joints
 from inspector.recording.camera import Camera
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from inspector.status import Status
-from inspector.wrongrobot import LONG, LimitWatch, check_joints
 from noiseclassifier import Event, merged
 from noisemodel.files import beyond, limit
 from noisemodel.robot import joint_limits

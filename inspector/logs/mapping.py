@@ -27,7 +27,7 @@ from inspector.logs.names import (
     other_quantity,
     pattern_for,
 )
-from inspector.wrongrobot import WrongRobotError
+from inspector.logs.wrongrobot import WrongRobotError
 from noiseclassifier.jsontext import from_toml, text_of, toml_shown
 from noisemodel import Robot, RobotError
 from noisemodel.files import replacing

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.hold import hold_length, updates
 from inspector.logs.clocks import (
     Offset,
     common_time,
@@ -24,6 +23,7 @@ from inspector.logs.clocks import (
     resampled,
     synchronise,
 )
+from inspector.logs.hold import hold_length, updates
 from inspector.logs.log import SAMPLES, UNIFORM, Log, Stamps, Track
 from inspector.logs.mapping import ReadOptions, tracks_of
 from inspector.logs.names import listed

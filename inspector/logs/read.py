@@ -22,8 +22,8 @@ from inspector.logs.log import LogReader, Progress, without_progress
 from inspector.logs.mapping import ReadOptions, read_options
 from inspector.logs.motion import Imported, contradictions, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
+from inspector.logs.wrongrobot import check_joints, limit_warnings, named
 from inspector.text import counted, printable
-from inspector.wrongrobot import check_joints, limit_warnings, named
 from noiseclassifier.jsontext import from_json
 from noisemodel import NoiseModelError, OutputError, Robot, RobotError, Run, RunFileError, runfile
 from noisemodel.files import also_reading, refuse_existing, replacing

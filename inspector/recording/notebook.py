@@ -107,9 +107,9 @@ def widget_class() -> Any:
 
 def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:
     from inspector.analysis import analyse_file
+    from inspector.export.sound import of_recording
     from inspector.library import load_library
     from inspector.recording.run import write
-    from inspector.sound import of_recording
 
     library = load_library()
     with tempfile.TemporaryDirectory() as folder:

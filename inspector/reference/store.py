@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from inspector.audit_signals import without_placeholder
+from inspector.audit.signals import without_placeholder
 from inspector.errors import FileError, InspectorError
 from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.reference.judging import (

@@ -12,10 +12,10 @@ import numpy as np
 
 from inspector.analysis import Analysis
 from inspector.errors import InspectorError
+from inspector.export.sound import clip, worst_time
 from inspector.reference.judging import Comparison
 from inspector.report.findings import excused
 from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
-from inspector.sound import clip, worst_time
 from inspector.verdict import Verdict
 from noisemodel.extended import vibrating_pieces
 from noisemodel.files import replacing

@@ -408,7 +408,7 @@ def _weighted_twists(run: nm.Run, kind: str, link: str) -> Iterator[Array]:
 
 
 def _remarks(run: nm.Run, speed: float) -> Iterator[str]:
-    from inspector.audit_signals import bandwidth
+    from inspector.audit.signals import bandwidth
 
     reach = bandwidth(run)
     span = f"{plain(LOWEST_AUDIBLE / speed)} Hz to {plain(reach.usable, 4)} Hz"

@@ -12,14 +12,14 @@ import numpy as np
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import extents
-from inspector.audit_signals import without_placeholder
+from inspector.audit.signals import without_placeholder
 from inspector.colors import SERIES, Color, of_classes
 from inspector.compare import picture
 from inspector.errors import InspectorError, OptionError
-from inspector.hold import without_hold
+from inspector.logs.hold import without_hold
+from inspector.logs.wrongrobot import check_joints
 from inspector.progress import progress
 from inspector.text import counted
-from inspector.wrongrobot import check_joints
 from noiseclassifier import Assessment
 from noiseclassifier.profile import HIGHEST, LOWEST, NOMINAL
 from noisemodel.files import also_reading, refuse_existing, replacing

@@ -29,7 +29,7 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector import colors
 from inspector.analysis import Analysis, analyse, estimate, robot_known
-from inspector.audit import summary
+from inspector.audit.audit import summary
 from inspector.errors import InspectorError, OptionError
 from inspector.library import Library
 from inspector.text import cell, counted

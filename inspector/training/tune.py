@@ -24,7 +24,7 @@ import noiseclassifier as nc
 from inspector.compare.picture import require
 from inspector.errors import InspectorError
 from inspector.progress import progress
-from inspector.train import LeftOut, Simulators, classified, profile_at
+from inspector.training.train import LeftOut, Simulators, classified, profile_at
 from noiseclassifier.jsontext import from_json
 from noiseclassifier.modelfile import versions
 from noiseclassifier.recording import check_apart, folds, group_of
@@ -70,7 +70,7 @@ class Search:
         validation: Recordings of a validation set; without any, the training set is folded.
         part: The part of all these recordings to read.
         folds: Number of folds without a validation set.
-        profile: One of ``inspector.train.PROFILES``.
+        profile: One of ``inspector.training.train.PROFILES``.
         rate: Rate of the model, in [Hz], to which faster runs are decimated.
         grid: Texts that `Grid.of` reads.
     """

@@ -1,0 +1,1 @@
+"""What a log can show: rates, quantisation, bands, copies."""
