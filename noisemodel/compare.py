@@ -629,7 +629,7 @@ def compare(
     Args:
         robots: One or many: a ``Robot``, a name, or the path of a URDF or an MJCF; or a
             ``Run``, or the path of a run file (a ``Path``, or text that ends in ``.npz``), for the
-            robot that it names and the motion that it holds. Of a run with gaps the longest stretch
+            robot that it names and the motion that it holds. If a run has gaps, the longest stretch
             without one is compared. What is no run moves by the `excitation`, for which mimic
             joints of named robots are coupled.
         kinds: "simplified", or kinds of ``surface_speed``.

@@ -1,4 +1,4 @@
-"""A recorder for a loop of one's own: samples are pushed one by one and become a run."""
+"""A recorder for your own loop: you push samples one by one, and they become a run."""
 
 from array import array
 from collections.abc import Mapping, Sequence

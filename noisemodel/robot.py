@@ -243,7 +243,7 @@ class Robot:
                 ``menagerie/NAME/ENTRY`` for a robot of MuJoCo Menagerie, or the path of a URDF
                 (``*.urdf``) or of an MJCF (``*.xml``).
             floating_base: Whether the base moves freely; unless given, as listed, False for a URDF
-                of one's own, and as an MJCF has it.
+                of its own, and as an MJCF has it.
             mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
             package_root: A further folder that meshes may lie in, see `package_roots`.
 

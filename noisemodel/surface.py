@@ -43,7 +43,7 @@ SLENDEREST = 1e-3
 """Thinner than this share of its length, a surface counts as that thin."""
 
 CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float64)
-"""Of a tetrahedron: mean 0 and covariance 1 in all directions."""
+"""Points of a tetrahedron: mean 0 and covariance 1 in all directions."""
 
 SIDE = 96
 """Cells along one side of the table of turning; between its nodes it is right to about 3e-4."""

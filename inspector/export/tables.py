@@ -113,7 +113,7 @@ def arrow_table(content: Content) -> Any:
     """Exported data as an Arrow table.
 
     Columns are time, simplified, extended (with a robot), annotated (with blocks), and with labels
-    frame_start, frame_stop, label and a score_<class> each: those of the frame whose middle is
+    frame_start, frame_stop, label and a score_<class> each: from the frame whose middle is
     nearest, and null before the first and after the last frame's share.
     """
     import pyarrow as pa

@@ -149,7 +149,7 @@ class CsvReader:
     """Reads rows under a header such as ``time,elbow.velocity,elbow.position``.
 
     Args:
-        names: Names of the joints in the order that is wanted; by default that of the columns.
+        names: Names of the joints in the order that is wanted; by default the columns' order.
     """
 
     def __init__(self, head: bytes, names: tuple[str, ...]) -> None:

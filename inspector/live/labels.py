@@ -1,4 +1,4 @@
-"""Labels while samples arrive, and the findings that they make, as those of a whole run."""
+"""Labels while samples arrive, and the findings that they make, as for a whole run."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ from noisemodel.run import EDGE
 from noisemodel.types import Array, Mask
 
 BETA = 5.0
-"""Of the Kaiser window, as that of SciPy's polyphase resampling."""
+"""Shape of the Kaiser window, as in SciPy's polyphase resampling."""
 
 
 class Decimator:
@@ -70,7 +70,7 @@ def noise_signal(name: str, motion: Array, base: int, joints: int) -> Array:
         name: A noise signal.
         motion: Velocities, shape (samples, columns), in [rad/s] and [m/s].
         base: Columns of the base, which are first.
-        joints: Columns of the joints, after which come those of desired velocities, if any.
+        joints: Columns of the joints, followed by the columns of desired velocities, if any.
 
     Returns:
         Shape (samples,), or (joints, samples), in [rad/s].
@@ -209,7 +209,7 @@ class Labeller:
 
 
 SETTLED = 3
-"""Hops after the start of an event by which its class is told from that of its edge."""
+"""Hops after the start of an event until its class is known apart from its edge's."""
 
 
 class Findings:

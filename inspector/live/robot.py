@@ -287,5 +287,5 @@ def _range(limits: Limits) -> tuple[float, float]:
 
 
 def _known(pose: Array) -> Array:
-    """A pose, or that of a base in the origin where it is not known."""
+    """A pose; of a base in the origin where it is not known."""
     return pose if np.isfinite(pose).all() else np.concatenate((np.zeros(3), UPRIGHT))

@@ -176,7 +176,7 @@ RATE_TOLERANCE = 0.05
 RATE_STEPS = 20
 """Steps from which a rate is estimated."""
 UNITS = {3: "milliseconds", 6: "microseconds", 9: "nanoseconds"}
-"""Of timestamps, by the power of ten by which their steps are larger than those of the rate."""
+"""Units of timestamps, by the power of ten by which their steps exceed the rate's."""
 BACKWARDS, TIMELESS = "samples out of order", "samples without time"
 OUTLYING = "outlying timestamps"
 DROPPED = (BACKWARDS, TIMELESS, OUTLYING, "malformed rows")

@@ -313,7 +313,7 @@ class Summary:
         delays: From a frame's last sample to its label in the recording, of the latest labels,
             in [s].
         where: Where it was shown.
-        status: The same as that of `inspector classify` for these labels.
+        status: The status that `inspector classify` gives these labels.
         findings: From the start of the first frame of each to the end of its last.
         reason: Why nothing can be told; empty otherwise.
         frame: Duration of a frame, by which findings may begin too early, in [s].

@@ -18,7 +18,7 @@ from inspector.recording.viewer import HOST, free_port
 from noisemodel.files import replacing
 
 APPLICATION = "inspector-live"
-"""Not that of recordings of whole runs: the viewer keeps a layout for each application."""
+"""Another than recordings of whole runs have: the viewer keeps a layout for each application."""
 PORT = int(viewer.PORT)
 ADDRESS = re.compile(r"(?:rerun\+http://)?(?:(?P<host>[^:/]+):)?(?P<port>\d{1,5})(?:/proxy)?")
 START_TIMEOUT = 20.0

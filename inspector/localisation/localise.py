@@ -143,7 +143,7 @@ def fault_links(
     jump spreads over the whole robot within a step, so that only its beginning counts. Even then
     a light foot is louder than the limb that was hit, hence a second criterion: the joints of the
     largest innovation. Named is the link of the largest excess; of each such joint that moves none
-    of those that are named, the link of the largest excess that it moves; and then those of the
+    of the named ones, the link of the largest excess that it moves; and then the links of the
     largest excess.
 
     Args:

@@ -216,7 +216,7 @@ def episodes_of(arrays: Arrays) -> dict[str, slice]:
     """Episodes of a file that has them one after the other, of two samples or more.
 
     Args:
-        arrays: Arrays by name, of which those of ``EPISODE_ENDS`` are looked at.
+        arrays: Arrays by name; only ``EPISODE_ENDS`` are used.
     """
     ends = [each.ravel() for name, each in arrays.items() if name.lower() in EPISODE_ENDS]
     if not ends or len({len(each) for each in ends}) > 1:
@@ -300,7 +300,7 @@ def _roles(arrays: Arrays, mapped: set[str]) -> dict[str, str]:
 
 
 def _unpacked(arrays: Arrays) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Arrays, those of PyBullet's joint states taken apart, and stamps in a column as a row."""
+    """Arrays, with PyBullet's joint states taken apart, and stamps in a column as a row."""
     for name, each in arrays.items():
         last = name.rpartition("/")[2].lower()
         if each.ndim == 3 and last in JOINT_STATES and each.shape[2] in PARTS:
@@ -394,7 +394,7 @@ def _floating(qpos: Real, count: int) -> list[int]:
 def _base_of_isaac(
     arrays: Arrays, roles: Mapping[str, str], stamps: Stamps, remarks: list[str]
 ) -> Iterator[Entry]:
-    """Mapping of a root that moves; that of a robot on a table stands still and is left out."""
+    """Mapping of a root that moves; the root of a robot on a table stands still and is left out."""
     found = {match["what"]: name for name in roles if (match := STATES.fullmatch(name))}
     pose = arrays.get(found.get("root_pose", ""))
     if pose is None or pose.shape != (len(stamps.time), 7):

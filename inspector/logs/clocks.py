@@ -547,7 +547,7 @@ def _common_tracks(
 
 
 def _search(measured: Track, desired: Track, rate: float) -> tuple[float, float, float]:
-    """Best offset in [s], its correlation, and that of the next best."""
+    """Best offset in [s], its correlation, and the next best's correlation."""
     from scipy import fft
 
     times = measured.stamps.time, desired.stamps.time

@@ -47,11 +47,11 @@ MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
 HEAD = 200
 """Lines among which the first row of numbers is looked for."""
 EXAMINED = 20_000
-"""Lines of a log without a header by which its columns are told apart."""
+"""Lines of a log without a header from which its columns are recognised."""
 SPARSE = 0.5
 """Share of rows without a number from which a column has another clock."""
 LONGEST_LINE = 4 * 2**20
-"""Characters of a line: far more than those of so many columns as are read."""
+"""Characters of a line: far more than all columns that are read can have."""
 DIGITS = 30
 """Stamps have at most so many digits before or after the point."""
 PIECE = 2**20

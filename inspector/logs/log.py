@@ -68,7 +68,7 @@ class Stamps:
         rows: Line number of each sample, if the file has lines.
         unit: Unit of the stamps in the log; ``SAMPLES`` until the rate is known.
         remark: On their source, if it is not the expected one.
-        held: Whether values apply between stamps however far apart, as those of a planned
+        held: Whether values apply between stamps however far apart, as in a planned
             trajectory do.
         rate: The rate that the log is said to have, in [Hz].
         name: Their column.
@@ -250,7 +250,7 @@ class Log:
         remarks: What was lost or decided, a sentence each.
         units: Why the unit of angles is not known, if the format does not define it.
         urdf: Text of the URDF in the log, may be empty.
-        suggested: Mapping that the format defines; that of the options takes precedence.
+        suggested: Mapping that the format defines; the options' mapping takes precedence.
         meta: Further metadata of the log.
         time: Name of the column or array with the stamps, if it has one.
         tracks: Its signals, in SI units, with increasing stamps.

@@ -317,7 +317,7 @@ def no_motion(path: Path, names: Sequence[str], instead: str = "") -> LogError:
 
 
 def check_unit(path: Path, name: str, meaning: Meaning | None, row: int | None = None) -> None:
-    """Refuse a column whose unit is that of another quantity than its name tells."""
+    """Refuse a column whose unit belongs to another quantity than its name says."""
     if meaning is None or not (unit := other_quantity(name, meaning)):
         return
     signal, number = meaning

@@ -56,7 +56,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 def log_of_variables(
     path: Path, variables: Mapping[str, NDArray[Any]], options: ReadOptions
 ) -> Log:
-    """Log of variables, whose samples are along either axis, as those of MATLAB."""
+    """Log of variables, whose samples are along either axis, as in MATLAB."""
     flat = {name: each.ravel() if 1 in each.shape else each for name, each in variables.items()}
     named = {_plain(name): each for name, each in flat.items() if each.dtype.kind in "iuf"}
     time = options.time or time_column([name for name, each in named.items() if each.ndim == 1])
@@ -70,7 +70,7 @@ def log_of_variables(
 
 
 def _plain(name: str) -> str:
-    """Name of a signal for that of its field: ``q/Data`` is ``q``, its stamps are ``Time``."""
+    """Name of a signal from the name of its field: ``q/Data`` is ``q``, its stamps are ``Time``."""
     for field in DATA:
         if name.endswith(f"/{field}") and name != f"/{field}":
             return name.removesuffix(f"/{field}")
@@ -101,7 +101,7 @@ def _variables(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def check_numbers(path: Path, arrays: Mapping[str, NDArray[Any]], objects: Collection[str]) -> None:
-    """Refuse a file of objects alone: what they hold is told by code of MATLAB's only."""
+    """Refuse a file of objects alone: only MATLAB's own code reads what they hold."""
     if objects and not any(each.size > 1 for each in arrays.values()):
         raise LogError(path, OBJECTS.format(", ".join(sorted(set(objects))[:3])))
 

@@ -33,7 +33,7 @@ from noisemodel.run import METHOD, base_velocity, joint_velocity
 from noisemodel.types import Array, Indices, Mask, Real
 
 LARGEST_RATE_RATIO = 1.5
-"""Largest ratio of the specified rate to that of the stamps, or the inverse."""
+"""Largest ratio of the specified rate to the stamps' rate, or the inverse."""
 SAME_RATE = 1.01
 """Ratio of two rates up to which no band is lost from one to the other."""
 MOST_SAMPLES_PER_STAMP = 20
@@ -387,7 +387,7 @@ def is_angular(track: Track, robot: Robot | None) -> list[bool]:
 
 
 def _to_radians(track: Track, robot: Robot | None, but: Mask | None = None) -> Track:
-    """Track with all angles converted from degrees, but those of some columns."""
+    """Track with all angles converted from degrees, except in some columns."""
     angular = np.array(is_angular(track, robot), dtype=bool)
     if but is not None:
         angular &= ~but
@@ -476,7 +476,7 @@ def _kinds(robot: Robot | None) -> dict[str, str]:
 # Targets that are held
 
 SLOWER = 1.5
-"""Least ratio of the targets' hold to that of the measured values."""
+"""Least ratio of the targets' hold to the measured values'."""
 
 
 def without_held_targets(tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tuple[str, ...]]:
@@ -628,7 +628,7 @@ def _with_desired(measured: Log, desired: Log) -> list[Log]:
 
 
 def _main(log: Log, options: ReadOptions) -> Track:
-    """The track whose stamps the run's time is made of: those of the most joints."""
+    """The track whose stamps become the run's time: the one with the most joints."""
     moving = [track for track in log.tracks if track.signal in ("position", "velocity")]
     if not moving:
         raise LogError(log.path, "holds no measured motion, only desired")

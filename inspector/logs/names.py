@@ -179,7 +179,7 @@ UNLIKELY = re.compile(
 """Names that an example of what to type leaves out."""
 
 LONGEST = 300
-"""Characters of a name from which on it is that of no signal: patterns take their square."""
+"""Characters of a name from which on it names no signal: patterns take their square."""
 
 SIDES = ("before", "within", "after", "last")
 """Parts of a name that tell whether it is desired."""

@@ -178,7 +178,7 @@ TRUE, FALSE, BYTE, DOUBLE, BINARY, LIST, SET, STRUCT = 1, 2, 3, 7, 8, 9, 10, 12
 NUMBERS = (4, 5, 6)
 """Types of Thrift's compact protocol; the last are integers of 16, 32 and 64 bits."""
 DEPTH = 12
-"""Structs and lists within each other; those of the end of a file are eight."""
+"""Structs and lists within each other; the end of a file has eight."""
 MAGIC = b"PAR1"
 LARGEST_END = 32 * 2**20
 """Most bytes of the end of a file, which has some hundred for each column of a row group."""

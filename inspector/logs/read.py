@@ -210,7 +210,7 @@ def readers_of(
     episodes: Sequence[str] | None = None,
     progress: Progress = without_progress,
 ) -> dict[str, Callable[[], Imported]]:
-    """What reads each run of a log, by its episode; arguments and errors are those of `read_logs`.
+    """What reads each run of a log, by its episode; arguments and errors as for `read_logs`.
 
     The name of a log without episodes is empty.
     """
@@ -340,7 +340,7 @@ class Opened:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of its file; of a folder or an episode that of the run's velocities."""
+        """SHA-256 of its file; for a folder or an episode, of the run's velocities."""
         if self.source.episode or not self.source.path.is_file():
             return hashlib.sha256(self.run.velocity.tobytes()).hexdigest()
         with self.source.path.open("rb") as file:

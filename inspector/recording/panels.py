@@ -322,7 +322,7 @@ class Curve:
 def log_curves(
     recording: rr.RecordingStream, analysis: Analysis, beside: Comparison | None = None
 ) -> list[Curve]:
-    """Log the noise, its level and that of repetitions, and the probability of a failure."""
+    """Log the noise, its level and the repetitions' level, and the probability of a failure."""
     curves = [_log_noise(recording, analysis), _log_level(recording, analysis, beside)]
     if analysis.labels is not None and analysis.alarm is not None:
         curves.append(_log_probability(recording, analysis, analysis.alarm))

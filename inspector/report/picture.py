@@ -219,7 +219,7 @@ def _level(axes: "Axes", analysis: Analysis, beside: Comparison | None) -> None:
 
 
 def _band(axes: "Axes", beside: Comparison) -> None:
-    """Draw the level of the noise, and that of the repetitions behind it."""
+    """Draw the level of the noise, and the repetitions' level behind it."""
     low, high = beside.band.T
     axes.fill_between(beside.time, low, high, color=INK, alpha=0.25, linewidth=0)
     axes.plot(beside.time, high, color=INK, alpha=0.5, linewidth=0.6)

@@ -86,7 +86,7 @@ class Assessment:
         seen: Recordings that the model was trained on, and what of them, by name.
         protocol: Measures of the findings as they are reported, robots weighed alike.
         evaluation: All frames that are cut from blocks.
-        frames: Its measures with intervals, by name, and those of each class by class.
+        frames: Its measures with intervals, by name, and the measures of each class by class.
         reliability: Confidence beside truth in bins; None if the scores are no probabilities.
         calibration_error: Expected calibration error; None likewise.
     """

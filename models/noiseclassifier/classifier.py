@@ -174,13 +174,13 @@ class Classifier:
         start: float = 0.0,
         whole: bool = False,
     ) -> Labels:
-        """Label all frames of a signal that comes in pieces, the same as those of the whole one.
+        """Label all frames of a signal that comes in pieces, as of the whole one.
 
         Memory does not grow with the signal, but for the labels.
 
         Features are relative to the past of the signal, which is silent before a robot's first
-        step. Where the signal is whole, what is found has to stand out from the rest of it, too: of
-        the decisions relative to the past and to the rest, that of the lower failure score counts.
+        step. Where the signal is whole, what is found has to stand out from the rest of it, too:
+        relative to the past and to the rest, the decision with the lower failure score counts.
 
         Args:
             pieces: Signals and their validity as `classify` takes them, one piece or more.
@@ -302,7 +302,7 @@ class Classifier:
 class Stream:
     """A classifier of samples one by one, or in chunks of any size.
 
-    Its labels are those of `Classifier.classify` for the whole signal: both have the same features
+    `Classifier.classify` gives the same labels for the whole signal: both have the same features
     and decision values of each frame, bit for bit (of support vector machines, decision values up
     to rounding: one product of matrices is faster for many frames, but its rounding depends on how
     many they are). The label of a frame comes with its last sample.

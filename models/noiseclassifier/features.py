@@ -72,7 +72,7 @@ def features(frames: Real, profile: Profile) -> Array:
 
     Returns:
         Features, not yet standardised, shape (frames, features). Relative to a reference they are
-        0, as those of the first frame of a signal.
+        0, as in the first frame of a signal.
 
     Raises:
         SignalError: If the frames have another shape or values that are not finite.
@@ -520,7 +520,7 @@ class FrameFeatures:
         self.count += count
 
     def _advance(self, chunk: int) -> list[Frames]:
-        """Transform the windows that are complete, and pool those of the frames that are.
+        """Transform the windows that are complete, and pool the windows of complete frames.
 
         Args:
             chunk: Samples of the last chunk; the next one is expected to have as many.

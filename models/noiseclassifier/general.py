@@ -214,7 +214,7 @@ def load(path: str | Path) -> Model:
 def nearest(
     models: Mapping[str, Model], rate: float, signals: Collection[str] = (NOISE,)
 ) -> tuple[str, Classifier]:
-    """Model of the nearest rate at or below that of the signals, bound to them.
+    """Model of the nearest rate at or below the signals' rate, bound to them.
 
     Of models of one rate, it is the one of most signals. A general model has any rate.
 

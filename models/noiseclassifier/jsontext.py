@@ -12,7 +12,7 @@ MAX_CHARACTERS = 64 * 2**20
 """Longest text that is parsed: a hundred times the longest manifest."""
 
 DIGITS = 20
-"""Most digits of an integer: those of 64 bits."""
+"""Most digits of an integer: enough for 64 bits."""
 
 PARTS = 100
 """Most parts of a TOML key; `tomllib` takes memory by their square."""

@@ -112,7 +112,7 @@ def match(
     collar: float = COLLAR,
     same: Callable[[int, int], bool] | None = None,
 ) -> list[tuple[int, int]]:
-    """Match findings with faults, or findings of one run with those of another, one to one.
+    """Match findings with faults, or findings of two runs, one to one.
 
     Args:
         found: Whatever has a start and a stop in [s].
@@ -245,7 +245,7 @@ class Predictions:
         labels: Predictions on the whole recording.
         events: All injected faults; empty where they are not known.
         facts: Robot, scenario and domain of the recording.
-        located: Findings by their frames, and from onset to end; those of the labels unless given.
+        located: Findings by their frames, and from onset to end; by default the labels' findings.
     """
 
     name: str
@@ -399,7 +399,7 @@ def run_score(labels: Labels) -> float:
 
 
 def failure_score(scores: Array, classes: Sequence[str]) -> Array:
-    """Score of any failure: 1 - P(ok), or the largest score of a failure less that of `ok`."""
+    """Score of any failure: 1 - P(ok), or the largest score of a failure less the score of `ok`."""
     ok = list(classes).index(OK)
     if are_probabilities(scores):
         return 1.0 - scores[:, ok]

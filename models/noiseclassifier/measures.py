@@ -329,7 +329,7 @@ class Resampling:
         return Estimate(value, low, high, runs, groups)
 
     def _mean(self, part: Array, whole: Array, of: Sequence[Mask]) -> tuple[float, Array]:
-        """Mean ratio of sets of recordings, and that of each resample, shape (resamples,)."""
+        """Mean ratio of sets of recordings, and of each resample, shape (resamples,)."""
         value = np.mean([part[own].sum() / whole[own].sum() for own in of])
         shares = [ratio(self.weights @ (part * own), self.weights @ (whole * own)) for own in of]
         each = np.array(shares)

@@ -2,8 +2,8 @@
 
 Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the estimator, as
 its ``DIMENSIONS`` list them. Nothing in it is ever unpickled; sizes are checked before an array is
-made. The same model is the same bytes. Of a general model, ``recipe`` is in the manifest, and the
-profile is that of its highest rate. Versions 4 and 5 are read too: they know no missing features
+made. The same model is the same bytes. A general model has ``recipe`` in the manifest, and its
+profile is for its highest rate. Versions 4 and 5 are read too: they know no missing features
 and no reference.
 """
 
@@ -35,7 +35,7 @@ from noiseclassifier.types import Array
 FORMAT = "noise-model/6"
 OLD_FORMATS = ("noise-model/4", "noise-model/5")
 LARGEST = 512 * 1024**2
-"""Bytes that a model file may have: a thousand times those of the shipped ones."""
+"""Bytes that a model file may have: a thousand times as many as the shipped ones."""
 
 ACCEPT = "that is replaced; accept these runs (`inspector accept`), and classify without this model"
 """What becomes of models that earlier versions learnt from good runs alone."""

@@ -17,7 +17,7 @@ from noiseclassifier.recording import Block, Recording
 from noiseclassifier.types import Array
 
 LONGEST_LINE = 2**16
-"""Characters of a line: far more than those of two numbers and a comment."""
+"""Characters of a line: far more than two numbers and a comment have."""
 
 
 def read_log(path: str | Path) -> tuple[Array, Array]:
@@ -144,7 +144,7 @@ def read_recording(log: str | Path, *, rate: float | None = None) -> Recording:
 
     Args:
         log: The ``.log``; the annotations are in the ``.toml`` of the same name.
-        rate: Sample rate that it must have, in [Hz]; by default, that of its times.
+        rate: Sample rate that it must have, in [Hz]; by default, from its times.
     """
     log = Path(log)
     blocks = read_annotations(log.with_suffix(".toml"))

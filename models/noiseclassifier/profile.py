@@ -24,7 +24,7 @@ MOST_LEAVES = 16
 TOLERANCE = 1e-3
 """Two sample rates are the same if they differ by less than this share."""
 NOMINAL = 0.02
-"""Two nominal rates, such as those of jittering timestamps, are the same up to this share; what is
+"""Two nominal rates, such as from jittering timestamps, are the same up to this share; what is
 computed of the spectrum is off by as much."""
 STATISTICS = ("mean", "maximum", "deviation")
 """Statistics over a frame of each log-band energy. Beside a reference, the last one adds nothing on

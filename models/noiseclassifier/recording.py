@@ -58,7 +58,7 @@ class Recording:
         blocks: Annotations; what overlaps must agree.
         start: Time of the first sample, in [s].
         valid: False in gaps, shape (samples,); None if there are none.
-        sha256: Hash of where the recording comes from; by default, that of its samples.
+        sha256: Hash of where the recording comes from; by default, of its samples.
         events: All injected faults, detectable or not; empty if none was, or that is not known.
         facts: What else is known, by ``robot``, ``scenario`` and ``domain``.
 

@@ -6,8 +6,8 @@ reference is the signal itself so far; of a whole signal, also the rest of it. A
 a whole signal is invisible relative to the signal itself; therefore the unchanged features stay
 beside.
 
-Conventions: spreads are those of a normal distribution, 1.48 times a median absolute deviation
-(P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5.1).
+Conventions: a spread is 1.48 times a median absolute deviation, the standard deviation of a normal
+distribution (P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5.1).
 """
 
 import numpy as np

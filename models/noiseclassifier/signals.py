@@ -2,7 +2,7 @@
 
 A signal is a norm, shape (samples,), or what the norm is of, joint by joint, shape
 (joints, samples), by its name. Stacked, they are rows: norms first, and then all joints of
-one signal after those of the other.
+one signal after the joints of the other.
 """
 
 from collections.abc import Collection, Mapping, Sequence

@@ -142,8 +142,8 @@ def _has_probabilities(classifier: "NoiseClassifier") -> bool:
 class NoiseClassifier(ClassifierMixin, _Framed):  # type: ignore[misc]
     """Classifier of frames: features of a profile, standardised, and its estimator.
 
-    The class of a frame is that of the highest score: the alarm threshold, the unknown frames and
-    the debouncing of `noiseclassifier.Classifier` are for the frames of a whole signal.
+    A frame has the class with the highest score: the alarm threshold, the unknown frames and the
+    debouncing of `noiseclassifier.Classifier` are for the frames of a whole signal.
 
     Args:
         rate: Sample rate of the frames, in [Hz].

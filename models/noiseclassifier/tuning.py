@@ -128,7 +128,7 @@ class Grid:
             yield dict(zip(self.axes, values, strict=True))
 
     def profiles(self, base: Profile) -> list[Profile]:
-        """Profile of each point; all other settings are those of ``base``."""
+        """Profile of each point; all other settings are as in ``base``."""
         estimator = base.estimator if base.estimator in OWN else "support vector machines"
         for name in self.axes:
             idle: str = ""
@@ -303,7 +303,7 @@ def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
     """Train points, and decide on all test frames by each.
 
     Args:
-        profiles: Points that share their features; it pays if those of one gamma follow each other.
+        profiles: Points that share their features; those of one gamma should follow each other.
     """
     known = trial.examples(profiles[0], training=True)
     fresh = trial.examples(profiles[0], training=False)

@@ -1,7 +1,7 @@
 """Bags of any storage read record by record, as damaged ones are, and no more than they may hold.
 
-An MCAP file that was cut off has lost the index at its end; one with other messages beside those of
-ROS, as Foxglove writes it, rosbags refuses. https://mcap.dev/spec
+An MCAP file that was cut off has lost the index at its end; rosbags refuses one with other messages
+than ROS has, as Foxglove writes it. https://mcap.dev/spec
 A record of ROS 1 is a header of ``name=value`` fields and data, each with its length before it;
 chunks hold records in turn, perhaps compressed. http://wiki.ros.org/Bags/Format/2.0
 """

@@ -90,7 +90,7 @@ STATES = (
 
 
 def _fields_in(definition: str) -> list[str]:
-    """Names of the fields of a definition, without those of the types in it."""
+    """Names of the fields of a definition, without the fields of the types in it."""
     lines = (
         line.partition("#")[0].split() for line in definition.partition("\n===")[0].splitlines()
     )
@@ -301,7 +301,7 @@ class MotionReader:
     def _add(
         self, joints: tuple[str, ...], logged: int, received: int, parts: Mapping[str, Numbers]
     ) -> None:
-        """Append a row; arrays whose length is not that of the joints are ignored."""
+        """Append a row; arrays with another length than the joints are ignored."""
         present = tuple(
             name
             for name, numbers in parts.items()
@@ -328,7 +328,7 @@ class MotionReader:
                 group.arrays[name].extend(numbers)
 
     def fields(self) -> Iterator[Field]:
-        """Fields of the messages; of several transforms, that of the smoothest fixed frame."""
+        """Fields of the messages; of several transforms, the one with the smoothest fixed frame."""
         groups = [group for group in self._groups.values() if group.arrays]
         if self._topic.type in TRANSFORMS:
             groups = sorted(groups, key=lambda group: FRAMES.index(next(iter(group.arrays))))[:1]

@@ -128,7 +128,7 @@ def svm_count(classes: int, multiclass: Multiclass) -> int:
 
 
 def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:
-    """Class of each frame: that of most votes of the pairs, or of the largest decision value."""
+    """Class of each frame: with most votes of the pairs, or with the largest decision value."""
     ballot = decisions
     if multiclass == "one-vs-one":
         ballot = _votes(decisions, classes)

@@ -35,7 +35,7 @@ moment of the contact, unlike a damper beside a spring."""
 
 @dataclass(frozen=True)
 class Force:
-    """A force on the robot from outside, other than that of contacts."""
+    """A force on the robot from outside, other than contact forces."""
 
     apply: Callable[[Any, float], None]
     """Add to ``qfrc_applied`` of MuJoCo's data at a time since the recording began, in [s]."""

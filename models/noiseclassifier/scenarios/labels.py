@@ -43,7 +43,7 @@ from noisemodel.types import Array, Mask, Real
 
 Span = tuple[int, int]  # first sample and the one after the last
 CONTRAST = 10 ** (3 / 10)
-"""Least ratio of the power of a fault to that of the twin's log in a band: 3 dB."""
+"""Least ratio of the power of a fault to the twin's log in a band: 3 dB."""
 FRAME, HOP = 0.4, 0.1
 """Frames in which both are compared, as the classifier's (paper, Sec. III-A), in [s]."""
 LOWEST = 10.0  # lowest frequency of the bands, in [Hz]; each is a third of an octave wide
@@ -172,7 +172,7 @@ def annotate(
 
 
 def _louder(velocity: Array, twin: Array, rate: float) -> Mask:
-    """Samples in frames that are louder than those of the twin around them."""
+    """Samples in frames that are louder than the twin's frames around them."""
     found = np.zeros(len(velocity), dtype=bool)
     for number in np.flatnonzero(visible(velocity, twin, rate=rate, near=AROUND)).tolist():
         first = round(number * HOP * rate)

@@ -66,7 +66,7 @@ def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
 
 
 def _louder(log: Run, twin: Run) -> Mask:
-    """Frames that are louder in a band than those of the twin around them.
+    """Frames that are louder in a band than the twin's frames around them.
 
     Where two walks part, steps that come later make a difference, but no noise of their own.
     """
@@ -113,7 +113,7 @@ def _pushes(run: Run) -> tuple[Block, ...]:
 
 
 def _joined(blocks: Sequence[Block]) -> tuple[Block, ...]:
-    """Blocks in order, those of one label that overlap as one."""
+    """Blocks in order; blocks of one label that overlap become one."""
     joined: list[Block] = []
     for block in sorted(blocks):
         last = joined[-1] if joined else None

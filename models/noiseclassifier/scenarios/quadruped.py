@@ -519,7 +519,7 @@ class Feet:
     def _placement(self, number: int, estimate: StateEstimate) -> Array:
         """Horizontal correction of the feet in the air, shape (feet, 2), in [m].
 
-        They follow that of the robot, go further in the direction of its slip, and compensate tilt.
+        They follow the robot's, go further in the direction of its slip, and compensate tilt.
         """
         plan = self._plan
         swing, progress = plan.swing[number], plan.progress[number]

@@ -17,7 +17,7 @@ UPPER = {
     "stiffness": 0.2, "damping": 0.2, "torque": 0.25,
     "armature": 0.2, "friction": 0.2, "viscous": 0.2,
 }  # fmt: skip
-"""Drives of an upper body, relative to those of the legs."""
+"""Drives of an upper body, relative to the legs' drives."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,7 +161,7 @@ def _drives(joints: tuple[str, ...], given: Mapping[str, Any]) -> Drivetrain:
 def _nominal(joints: tuple[str, ...], given: Mapping[str, Any]) -> Drivetrain:
     """Nominal drives of an arm of which no better ones are known.
 
-    Inertia and friction of drives grow with their torque, as those of Panda and the UR arms do;
+    Inertia and friction of drives grow with their torque, as in Panda and the UR arms;
     gains give each joint alone, with all others at rest, a natural frequency of 8 Hz and half the
     critical damping.
     """
@@ -182,7 +182,7 @@ def _nominal(joints: tuple[str, ...], given: Mapping[str, Any]) -> Drivetrain:
 def similar_drives(model: Drivetrain, length: float, force: float) -> dict[str, Any]:
     """Drives of a dynamically similar robot, by the ratios of lengths and of forces.
 
-    Two robots of one shape have the same motion if times are those of a pendulum of their length
+    Two robots of one shape have the same motion if times scale as a pendulum's of their length
     (Alexander and Jayes, A dynamic similarity hypothesis for the gaits of quadrupedal mammals, J.
     Zoology 1983); gains, limits and losses follow from their units.
     """

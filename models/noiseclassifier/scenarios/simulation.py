@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 RECIPE, WIDE_RECIPE, FIRST_WIDE_RECIPE = 3, 3, 2
 """Versions of the simulations; they increase whenever a seed gives another run than before.
 
-The third of wide domains only adds faults of whole runs: others are those of the second.
+The third of wide domains only adds faults of whole runs: others are as in the second.
 """
 SHORTEST = 3.0  # least duration of a scenario, in which every defect can act, in [s]
 GOOD = "good"
@@ -105,7 +105,7 @@ def simulate(
         robot: One of `ROBOTS`; in wide domains one of more robots.
         scenario: Name or number of one of `SCENARIOS`; in wide domains "good" or a fault.
         seed: Draws motion, robot, sensors and fault, and in wide domains the domain.
-        duration: Duration of the run, in [s]; by default that of the motion.
+        duration: Duration of the run, in [s]; by default the motion's.
         wide: Whether to draw body, drives, control and motion as domains.toml says. Such a run is
             kept at 2 kHz or at 10 kHz; ``effort`` is the torque of the drives after gears, limits
             and delays, before the friction of the joints, in [N m].
