@@ -36,7 +36,7 @@ def test_settings_hold_for_commands_and_the_command_line_wins(project):
     assert call("audit", "../log.csv")[0] == 3  # which signal is elbow?
     (project / "pyproject.toml").write_text(
         '[tool.noise-inspector]\nmap = ["velocity.elbow=elbow"]\nrate = 90.0\n'
-        '[tool.noise-inspector.audit.audit]\nformat = "json"\n'
+        '[tool.noise-inspector.audit]\nformat = "json"\n'
         '[tool.noise-inspector.classify]\nruns = ["log.csv"]\nmin-duration = 0.5\n'
     )
     status, out, err = call("audit", "../log.csv")
