@@ -151,9 +151,10 @@ JOINT_POINTS = 400.0
 NOISE_POINTS = 4000.0
 SEND_INTERVAL = 0.1
 """Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
-FILE_INTERVAL, FILE_LONGEST, FILE_SHARE = 2.0, 60.0, 0.01
-"""The same for a file without a viewer: a hundredth of the time so far, within these ends, in [s].
-For each message, rerun keeps some hundred bytes until the file is closed."""
+FILE_INTERVAL, FILE_LONGEST, FILE_SHARE = 2.0, 20.0, 0.05
+"""The same for a file without a viewer: a twentieth of the time so far, within these ends, in [s].
+For each message, rerun keeps some hundred bytes until the file is closed; longer messages take more
+memory while they are written."""
 SHOWN = 10.0
 """Time that plots reach back, in [s]."""
 NOISE, BANDS_PATH, SCORES, FOUND_PATH = (

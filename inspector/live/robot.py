@@ -101,8 +101,8 @@ KEY = axes.Panel("key", 360.0)
 """The scale beside the robot."""
 ROOM = 1.3
 """What the camera sees of a robot that moves its base, by its size as it stands at first."""
-MOST_POSES = 1200
-"""Poses in a message to a file without a viewer, at last: a minute."""
+MOST_POSES = 400
+"""Poses in a message to a file without a viewer, at last: 20 s."""
 POSES = 200
 """Random poses within the limits of the joints, of which the camera sees all."""
 AROUND = np.array([[-20.0, -20.0], [20.0, 20.0]])
@@ -242,7 +242,7 @@ class LiveRobot:
         if len(self._waiting) >= self._at_once:
             self._shown += len(self._waiting)
             if self._at_once > 1:  # fewer messages in long files, as of the lines
-                self._at_once = min(max(self._shown // 100, self._at_once), MOST_POSES)
+                self._at_once = min(max(self._shown // 20, self._at_once), MOST_POSES)
             self.flush()
 
     def flush(self) -> None:
