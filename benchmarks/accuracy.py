@@ -15,7 +15,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "accuracy.md"
 HEAD = """# Accuracy
 
 Written by `python -m benchmarks.accuracy`. [Metrics](metrics.md) defines the measures. The shipped
-model has learnt from none of this. All motion is simulated unless it says "real": no repeated
+model was trained on none of this. All motion is simulated unless it says "real": no repeated
 motion of a real robot was available.
 """
 OTHERS = """

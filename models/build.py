@@ -4,7 +4,7 @@
 
 The model learns from logs of wide domains at many rates and from a few seeds of the scenarios at
 home: the training part of the sources, none of the targets (robots, control and sensing that are
-never learnt from). It is measured on the held-out part of the sources, on the targets, and at home,
+never trained on). It is measured on the held-out part of the sources, on the targets, and at home,
 each with a section of its card. Every step is kept in the folder: killed and started again, this
 goes on where it was; only at the end are the files that ship replaced.
 """
@@ -39,18 +39,18 @@ DOMAINS = 10  # seeds of every robot in wide domains: a good run, two with fault
 THROUGHOUT = 1  # and one with a fault of the whole run
 FAST = 10_018  # a further one, the first whose runs are kept at 10 kHz
 HOME = ("panda", "go2", "solo12", "anymal", "g1")
-"""Robots whose scenarios at home are learnt from, too."""
+"""Robots whose scenarios are in the training data, too."""
 SEEDS = 2  # their seeds in every scenario, from 0
 TEST, FIRST = ("panda", "go2", "talos"), 55
 """Robots whose scenarios at home are measured on, and their seed."""
 RATES = (10_000.0, 2000.0, 1000.0, 500.0, 250.0, 125.0, 80.0)
-"""Rates of the logs that are learnt from, in [Hz]."""
+"""Rates of the logs in the training data, in [Hz]."""
 SHOWN = (1000.0, 500.0, 250.0, 125.0)
 """Rates of the logs of targets, in [Hz]."""
 COPIES = 2
 """Logs of each run at 1 kHz and above, each of another logger; below, one."""
 EVERY = 3
-"""One log in so many is also learnt from in a piece that begins anywhere, and one good log with a
+"""One log in so many is also trained on as a piece that begins anywhere, and one good log with a
 fault throughout: every frame of these is a failure, and all of them would outnumber the rest."""
 ADDED = {"tone": "oscillations", "noise": "oscillations", "blow": "impact"}
 """Faults that are added to good logs, and the class of each kind."""
@@ -75,10 +75,10 @@ domains (recipe {wide}, {domains} seeds of every source robot) at {rates} Hz, wi
 and of the whole run; copies of the good ones with faults added (models/build.py), of a while and
 throughout (one in {every}); pieces of one log in {every} that begin anywhere; and {seeds} seeds of
 every scenario at home (recipe {recipe}) of {home}, each without the part that is held out by hash.
-The model file has the hashes of all of them. Their licences allow anyone anything (docs/robots.md).
+The model file has the hashes of all of them. Their licences are permissive (docs/robots.md).
 
-Never learnt from: {targets}; impedance control, encoders of 13 bit or fewer, samples held four
-times or more; any real robot; any other simulator. Measures are defined in docs/metrics.md.
+Not in the training data: {targets}; impedance control, encoders of 13 bit or fewer, samples held
+four times or more; any real robot; any other simulator. Measures are defined in docs/metrics.md.
 
 {sections}"""
 
@@ -113,9 +113,9 @@ def main() -> None:
         timed("train", train, inputs, ANY_RATE, None, model, part="training")
     sections = {"Other seeds of the same robots, in wide domains, at 1 kHz": sources[2]}
     for rate in SHOWN:
-        title = f"Robots and control that were never learnt from, at {rate:g} Hz"
+        title = f"Robots and controllers not in the training data, at {rate:g} Hz"
         sections[title] = logs(wide, build, rate, "target")
-    title = "Loggers that were never learnt from, other seeds of the same robots"
+    title = "Loggers not in the training data, other seeds of the same robots"
     sections[title] = logs(wide, build, 1000.0, "logger")
     sections[f"The scenarios at home, seed {FIRST}"] = test.path
     texts = [timed(title, measured, model, title, path) for title, path in sections.items()]

@@ -66,7 +66,7 @@ def trained():
 
 @cache
 def fixed(names=(NOISE,), rate=1000.0):
-    """A model of one rate that has learnt from a Panda, by the noise alone unless told."""
+    """A model of one rate trained on a Panda, by the noise alone unless told."""
     profile = replace(ONE_RATE, signals=names).at(rate)
     recordings = [
         recording(rate, label, seed, names)

@@ -1,4 +1,4 @@
-"""The licences of what ships, and of the robots that it learnt from."""
+"""The licences of what ships, and of the robots that it was trained on."""
 
 import re
 import tomllib

@@ -38,7 +38,7 @@ LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times as many as the shipped ones."""
 
 ACCEPT = "that is replaced; accept these runs (`inspector accept`), and classify without this model"
-"""What becomes of models that earlier versions learnt from good runs alone."""
+"""What becomes of models that earlier versions trained on good runs alone."""
 _ADAPTED = {"location": 1, "spread": 1}
 
 _KINDS = [

@@ -51,8 +51,8 @@ _NAMES = re.compile(r"([a-z0-9_]+)/(.+)-(\d{3,})")
 
 Choice: TypeAlias = Mapping[str, tuple[str, ...]]  # names of the scenarios of each robot
 Side: TypeAlias = Literal["all", "source", "target", "logger"]
-"""All logs; those that are learnt from; those of robots and domains that never are; and of robots
-and domains that are, those of loggers that never are."""
+"""All logs; logs to train on; logs of robots and domains that are never trained on; and logs of the
+other robots and domains, from loggers that are never trained on."""
 
 
 @dataclass(frozen=True, order=True)

@@ -23,9 +23,9 @@ Control: TypeAlias = Literal["pd", "computed-torque", "impedance", "policy"]
 Velocity: TypeAlias = Literal["measured", "filtered", "differentiated"]
 Desired: TypeAlias = Literal["commanded", "planned", "zero", "missing"]
 Effort: TypeAlias = Literal["missing", "torque", "current"]
-TARGET_CONTROL: Control = "impedance"  # control that is never learnt from
-TARGET_BITS = 13  # encoders of so many bits or fewer are never learnt from, in any kind of log
-TARGET_HOLD = 4  # logs whose samples are held so many times or more are never learnt from
+TARGET_CONTROL: Control = "impedance"  # control that is never trained on
+TARGET_BITS = 13  # encoders of so many bits or fewer are never trained on, in any kind of log
+TARGET_HOLD = 4  # logs whose samples are held so many times or more are never trained on
 RESONANCES = 2  # most resonances of one robot
 PRESENT = 0.5  # share of the robots that have a given imperfection of gears at all
 CURRENTS = 0.5  # share of the logs with efforts whose efforts are currents
@@ -75,7 +75,7 @@ class Domain:
 
     @property
     def target(self) -> bool:
-        """Whether it lies in a part of the distribution that is never learnt from."""
+        """Whether it lies in a part of the distribution that is never trained on."""
         return self.control == TARGET_CONTROL
 
     def as_dict(self) -> dict[str, Any]:
@@ -145,7 +145,7 @@ class Logger:
 
     @property
     def target(self) -> bool:
-        """Whether it lies in a part of the distribution that is never learnt from."""
+        """Whether it lies in a part of the distribution that is never trained on."""
         return self.bits <= TARGET_BITS or self.hold >= TARGET_HOLD
 
     @classmethod

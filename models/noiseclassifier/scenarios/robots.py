@@ -329,7 +329,7 @@ ROBOTS: Mapping[str, Simulated] = MappingProxyType(
 )
 """The robots of the scenarios, by name."""
 TARGETS = ("xarm7", "tiago_no_hand", "a1", "hyq", "talos")
-"""Robots that nothing is learnt from, by choice or by licence (docs/robots.md)."""
+"""Robots that are never trained on, by choice or by licence (docs/robots.md)."""
 
 
 @lru_cache(maxsize=8)
