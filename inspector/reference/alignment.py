@@ -105,30 +105,25 @@ def _paths(run: Array, held: Sequence[Array], pad: int) -> list[NDArray[np.int64
         for outside in (slice(pad), slice(-pad, None)):
             square[:, outside] = np.minimum(square[:, outside], OUTSIDE)
         distance[:, place, : len(other)] = np.maximum(square, 0.0)
-    every = np.arange(count)[:, None]
-    edges = np.array([[0, len(other) - 1] for other in held])
+    edges = np.array([[0, len(other) - 1] for other in held]) + width * np.arange(count)[:, None]
     # moved: the path came from another frame; stayed: from the same one, which it may only once.
     moved = distance[0] + STEP_COST * np.abs(np.arange(width) - pad)
     stayed = np.full((count, width), np.inf)
     came = np.zeros((rows, count, width), dtype=np.uint8)
+    # Two columns before the first frame, so that the frames before one are parts of these.
+    before = np.full((count, width + 2), np.inf)
+    was_held = np.zeros((count, width + 2), dtype=np.uint8)
     for row in range(1, rows):
-        best, from_stay = np.minimum(moved, stayed), stayed < moved
-        one = np.full((count, width), np.inf)
-        two = one.copy()
-        one[:, 1:] = best[:, :-1]
-        two[:, 2:] = best[:, :-2] + STEP_COST
-        skips = two < one
-        source = np.zeros((count, width), dtype=np.uint8)
-        source[:, 1:] = from_stay[:, :-1]
-        skipped = np.zeros((count, width), dtype=np.uint8)
-        skipped[:, 2:] = from_stay[:, :-2]
-        came[row] = np.where(skips, 2 + skipped, source)
-        held_on = (distance[row] + moved)[every, edges] + STEP_COST
+        np.minimum(moved, stayed, out=before[:, 2:])
+        np.less(stayed, moved, out=was_held[:, 2:])
+        one, two = before[:, 1:-1], before[:, :-2] + STEP_COST
+        came[row] = np.where(two < one, 2 + was_held[:, :-2], was_held[:, 1:-1])
         stayed = distance[row] + moved + STEP_COST
         moved = distance[row] + np.minimum(one, two)
-        longer = held_on < moved[every, edges]
-        moved[every, edges] = np.where(longer, held_on, moved[every, edges])
-        came[row][every, edges] = np.where(longer, len(STEPS) - 1, came[row][every, edges])
+        at_edges, steps = moved.ravel(), came[row].ravel()
+        longer = stayed.ravel()[edges] < at_edges[edges]
+        at_edges[edges[longer]] = stayed.ravel()[edges[longer]]
+        steps[edges[longer]] = len(STEPS) - 1
     stay = stayed.min(axis=1) < moved.min(axis=1)
     at = np.where(stay, stayed.argmin(axis=1), moved.argmin(axis=1))
     path = np.zeros((rows, count), dtype=np.int64)

@@ -41,8 +41,8 @@ OTHERS_FLOOR = 0.3
 """`FLOOR_SHARE` beside other motions, whose contacts are at other speeds."""
 APART = 1.0
 """Time from which moments of one motion stand for moments of another, in [s]."""
-ROWS = 256
-"""Frames that are compared at once."""
+ROWS, LEVELS = 256, 8192
+"""Frames that are compared at once, and frames times joints."""
 POOL = 12_000
 """Most frames of other motions that are looked at."""
 ASSUMED_DB = 6.0
@@ -348,12 +348,11 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     matched: list[Scenario] = []
     quieter, slope, count, band = 0.0, float("nan"), 0, np.full((frames, 2), np.nan)
     if frames and joints and octaves:
-        matched, told = _matching(run, known, joints)
+        matched, aligned, told = _matching(run, known, joints)
         remarks += told
         references = [each for scenario in matched for each in scenario.repetitions]
         count = len(references)
         if references:
-            aligned = align(*_guides(run, references, joints))
             quieter = _quieter(run, references, aligned, joints, octaves)
             band = _band(references, aligned, joints, octaves)
             over, covered = _over_repetitions(run, references, aligned, joints, octaves)
@@ -526,21 +525,40 @@ def _guides(
 
 def _matching(
     run: Levels, known: Sequence[Scenario], joints: Sequence[str]
-) -> tuple[list[Scenario], list[str]]:
-    """Scenarios of the run's motion: of several, the one with its name."""
+) -> tuple[list[Scenario], list[Aligned], list[str]]:
+    """Scenarios of the run's motion, of several the one with its name; all their repetitions."""
     usable = [each for each in known if len(each.repetitions[-1].guide)]
+    named = [each for each in usable if run.name in each.names]
+    aligned = _aligned(run, named, joints)
+    # A run that lies on the motion of its name needs no other scenario.
+    newest = np.cumsum([len(each.repetitions) for each in named], dtype=int) - 1
+    if named and aligned and all(_share(aligned[place]) >= SAME_NAME for place in newest):
+        return named, aligned, []
     own, others = _guides(run, [each.repetitions[-1] for each in usable], joints)
     if not own.shape[1]:
-        return [], []
-    shares = [float(np.mean(each.residual <= RESIDUAL)) for each in align(own, others)]
+        return [], [], []
+    shares = [_share(each) for each in align(own, others)]
     pairs = list(zip(usable, shares, strict=True))
     best = max(shares, default=0.0)
     found = [each for each, share in pairs if share >= max(SAME_MOTION, ALIKE * best)]
     named = [each for each, share in pairs if run.name in each.names and share >= SAME_NAME]
+    told = []
     if len(found) > 1 and not named:
         names = ", ".join(each.name for each in found)
-        return found, [f"its motion is that of {names}, and its name is of none: all count"]
-    return named or found, []
+        told.append(f"its motion is that of {names}, and its name is of none: all count")
+    return named or found, _aligned(run, named or found, joints), told
+
+
+def _aligned(run: Levels, scenarios: Sequence[Scenario], joints: Sequence[str]) -> list[Aligned]:
+    """Where the run lies in each repetition of some scenarios; nothing if they share no joint."""
+    references = [each for scenario in scenarios for each in scenario.repetitions]
+    own, others = _guides(run, references, joints)
+    return align(own, others) if own.shape[1] else []
+
+
+def _share(aligned: Aligned) -> float:
+    """Share of a run that lies on a motion."""
+    return float(np.mean(aligned.residual <= RESIDUAL))
 
 
 def share_of_motion(run: Levels, other: Levels) -> float:
@@ -549,7 +567,7 @@ def share_of_motion(run: Levels, other: Levels) -> float:
         return 0.0
     own, (guide,) = _guides(run, [other], run.joints)
     (aligned,) = align(own, [guide])
-    return float(np.mean(aligned.residual <= RESIDUAL))
+    return _share(aligned)
 
 
 def floor_of(
@@ -579,6 +597,12 @@ def _spread(level: NDArray[np.float32]) -> NDArray[np.float32]:
     return loud
 
 
+def _parts(joints: Sequence[str], *runs: Levels) -> list[slice]:
+    """Joints that are compared at once: of long runs, all levels take several times the memory."""
+    count = max(1, LEVELS // max(1, *(len(each.level) for each in runs)))
+    return [slice(first, first + count) for first in range(0, len(joints), count)]
+
+
 def _unknown(
     frames: int, joints: Sequence[str], octaves: Sequence[tuple[float, float]]
 ) -> NDArray[np.float32]:
@@ -596,16 +620,15 @@ def _over_repetitions(
     """Exceedance over the loudest repetition, NaN without one, and frames that one covers."""
     over = _unknown(len(run.guide), joints, octaves)
     covered = np.any([path.residual <= RESIDUAL for path in aligned], axis=0)
-    # Joint by joint: of long runs, all levels at once take several times the memory.
-    for place, joint in enumerate(joints):
-        views = [_view(each, [joint], octaves) for each in references]
-        floor, loudest = floor_of(views), _unknown(len(over), [joint], octaves)
+    for part in _parts(joints, run, *references):
+        views = [_view(each, joints[part], octaves) for each in references]
+        floor, loudest = floor_of(views), _unknown(len(over), joints[part], octaves)
         for view, path in zip(views, aligned, strict=True):
             loud = _spread(view)[path.frame]
             loud[path.residual > RESIDUAL] = np.nan
             loudest = np.fmax(loudest, loud)
-        own = _raised(_view(run, [joint], octaves), floor) - _raised(loudest, floor)
-        over[covered, place] = own[covered, 0]
+        own = _raised(_view(run, joints[part], octaves), floor) - _raised(loudest, floor)
+        over[covered, part] = own[covered]
     return over, covered
 
 
@@ -671,14 +694,16 @@ def _quieter(
     octaves: Sequence[tuple[float, float]],
 ) -> float:
     """By how much the run is quieter than each repetition in its loudest joint, in [dB]."""
-    margins = []
+    parts, margins = _parts(joints, run, *references), []
+    floors, own = [], _unknown(len(run.guide), joints, octaves)
+    for part in parts:
+        floors.append(floor_of([_view(each, joints[part], octaves) for each in references]))
+        own[:, part] = _raised(_spread(_view(run, joints[part], octaves)), floors[-1])
     for repetition, path in zip(references, aligned, strict=True):
         over, same = _unknown(len(run.guide), joints, octaves), path.residual <= RESIDUAL
-        for place, joint in enumerate(joints):
-            floor = floor_of([_view(each, [joint], octaves) for each in references])
-            view = _view(repetition, [joint], octaves)[path.frame]
-            louder = _spread(_view(run, [joint], octaves))
-            over[same, place] = (_raised(view, floor) - _raised(louder, floor))[same, 0]
+        for part, floor in zip(parts, floors, strict=True):
+            level = _raised(_view(repetition, joints[part], octaves)[path.frame], floor)
+            over[same, part] = (level - own[:, part])[same]
         margins.append(_top(scores_of(over)))
     known = [each for each in margins if np.isfinite(each)]
     return max(0.0, min(known)) if known else 0.0
@@ -687,8 +712,9 @@ def _quieter(
 def _noise(run: Levels, joints: Sequence[str], octaves: Sequence[tuple[float, float]]) -> Array:
     """Level of the velocities of all joints in all octaves, shape (frames,); NaN where none is."""
     power = np.zeros(len(run.guide))
-    for joint in joints:
-        power += np.nansum(10.0 ** (_view(run, (joint,), octaves)[:, 0, 0] / 10), axis=1)
+    for part in _parts(joints, run):
+        level = _view(run, joints[part], octaves)[:, :, 0]
+        power += np.nansum(10.0 ** (level / 10), axis=(1, 2), dtype=np.float64)
     return np.asarray(10 * np.log10(np.where(power > 0.0, power, np.nan)))
 
 
