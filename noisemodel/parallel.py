@@ -1,7 +1,8 @@
-"""One call per item, by joblib: here, in several processes, or on the workers of a Dask scheduler.
+"""One call per item: here, in several processes by joblib, or on the workers of a Dask scheduler.
 
 An item with which a process dies is named, and the others get their results: joblib loses all that
-is not done with a process that dies, so what was in work then is tried again, item by item.
+is not done with a process that dies, so what was in work then is tried again, item by item. Dask
+tries again by itself.
 """
 
 import logging
@@ -76,21 +77,40 @@ def as_done(
             with _cluster(jobs) as client:
                 variables = {k: v for k, v in os.environ.items() if k.startswith("NOISE_")}
                 there = partial(_there, function, str(Path.cwd()), variables)
-                yield from _results(there, items, died, backend="dask", client=client)
+                yield from _on_cluster(client, there, items, died)
         return
     jobs = min(jobs, len(items))
     if jobs < 2 or work < FRESH:
         yield from enumerate(map(function, items))
         return
-    begin = {"initializer": _begin, "initargs": (os.getpid(),)}
-    yield from _results(function, items, died, backend="loky", n_jobs=jobs, **begin)
+    yield from _in_processes(function, items, died, jobs)
 
 
-def _results(
+def _on_cluster(
+    client: Any,
     function: Callable[[Item], Result],
     items: Sequence[Item],
     died: Callable[[Item], Result],
-    **settings: Any,
+) -> Iterator[tuple[int, Result]]:
+    from distributed import KilledWorker, as_completed
+
+    futures = client.map(function, items, pure=False)
+    index = {future.key: place for place, future in enumerate(futures)}
+    for future in as_completed(futures, loop=client.loop):
+        place = index[future.key]
+        try:
+            result = future.result()
+        except KilledWorker:
+            result = died(items[place])
+        yield place, result
+        future.release()
+
+
+def _in_processes(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    died: Callable[[Item], Result],
+    jobs: int,
 ) -> Iterator[tuple[int, Result]]:
     from joblib import Parallel, delayed, parallel_config
     from joblib.externals.loky.process_executor import BrokenProcessPool
@@ -108,7 +128,8 @@ def _results(
                 running.append(index)
                 yield call(function, items[index], index)
 
-        with parallel_config(**settings):
+        begin = {"initializer": _begin, "initargs": (os.getpid(),)}
+        with parallel_config(backend="loky", n_jobs=jobs, **begin):
             parallel = Parallel(batch_size=1, return_as="generator_unordered")
         broken = False
         done = set()
@@ -156,7 +177,7 @@ def _cluster(address: str) -> Iterator[Any]:
         )
     if not re.fullmatch(r"\w+://.+:\d+", address):
         raise NoiseModelError(f"{address!r} is no address of a Dask scheduler, tcp://HOST:PORT")
-    from distributed import CancelledError, Client, KilledWorker
+    from distributed import CancelledError, Client
 
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -178,8 +199,6 @@ def _cluster(address: str) -> Iterator[Any]:
         _check_software(client, address)
         try:
             yield client
-        except KilledWorker as error:
-            raise NoiseModelError(f"{address}: {DIED}; what it worked on is not known") from error
         except (OSError, CancelledError) as error:
             if isinstance(error, OSError) and client.status == "running":
                 raise

@@ -142,7 +142,7 @@ def test_a_worker_without_the_clients_folder_is_refused(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory):
-    """The address of a scheduler with two workers."""
+    """The address of a scheduler with one worker, which does one thing at a time."""
     pytest.importorskip("distributed")
     folder = tmp_path_factory.mktemp("cluster")
     file = folder / "scheduler.json"
@@ -167,8 +167,7 @@ def cluster(tmp_path_factory):
             assert time.monotonic() < until
             time.sleep(0.1)
         address = json.loads(file.read_text())["address"]
-        for _ in range(2):
-            start("worker", address, "--nthreads", "1")
+        start("worker", address, "--nthreads", "1")
         yield address
     finally:
         for process in reversed(processes):
@@ -187,6 +186,13 @@ def test_items_are_done_on_a_cluster_and_errors_are_raised_here(cluster):
     assert os.getpid() not in {process for _, process in found}
     with pytest.raises(ZeroDivisionError):
         list(in_order(invert, [1, 0, 2], jobs=cluster, died=dead))
+
+
+@pytest.mark.slow
+def test_an_item_with_which_workers_of_a_cluster_die_costs_only_itself(cluster):
+    found = list(in_order(square_or_die, range(5), jobs=cluster, died=dead))
+    assert [number for number, *_ in found] == list(range(5))
+    assert [number for number, result, _ in found if result == "died"] == [3]
 
 
 @pytest.mark.slow
