@@ -12,12 +12,12 @@ def die():
 def simulate(monkeypatch):
     """Let processes be this one, which survives what would kill them."""
 
-    def results(function, items, died, **_):
+    def results(function, items, died, jobs):
         for index, item in enumerate(items):
             try:
                 yield index, function(item)
             except SystemExit:
                 yield index, died(item)
 
-    monkeypatch.setattr(parallel, "_results", results)
+    monkeypatch.setattr(parallel, "_in_processes", results)
     monkeypatch.setattr(parallel, "FRESH", 0.0)
