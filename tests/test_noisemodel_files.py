@@ -35,6 +35,12 @@ def test_a_file_appears_with_its_contents_and_nothing_else(tmp_path):
     assert os.listdir(tmp_path) == ["out.txt"]
 
 
+def test_nothing_exists_under_the_name_before_the_end(tmp_path):
+    with replacing(tmp_path / "out.txt") as temporary:
+        temporary.write_text("half")
+        assert not (tmp_path / "out.txt").exists()
+
+
 @pytest.mark.parametrize("mask", [0o022, 0o027, 0o077])
 def test_the_file_has_the_permissions_of_any_new_file(tmp_path, mask):
     before = os.umask(mask)
@@ -136,8 +142,10 @@ def without_links(*_):
     raise PermissionError(1, "Operation not permitted")
 
 
-def test_without_hard_links_the_second_of_two_writers_fails_as_well(tmp_path, monkeypatch):
-    monkeypatch.setattr(os, "link", without_links)
+@pytest.mark.parametrize("links", [True, False])
+def test_of_two_that_write_one_file_at_once_the_second_fails(tmp_path, monkeypatch, links):
+    if not links:
+        monkeypatch.setattr(os, "link", without_links)
     with pytest.raises(OutputError, match=r"out\.txt: exists already"):
         write_late(tmp_path / "out.txt")
     assert (tmp_path / "out.txt").read_text() == "first"
@@ -192,10 +200,13 @@ def test_a_file_is_abandoned_after_a_minute_here_and_after_a_day_elsewhere(
 ):
     machine = _machine() if machine == "own" else machine
     temporary = tmp_path / f".noise-inspector-{machine}4567abcd"
-    temporary.touch()
-    os.utime(temporary, (time.time() - age,) * 2)
+    others = [tmp_path / ".other-4567abcd", tmp_path / "a.txt"]
+    for each in (temporary, *others):
+        each.touch()
+        os.utime(each, (time.time() - age,) * 2)
     write(tmp_path / "out.txt", "")
     assert temporary.exists() == kept
+    assert all(each.exists() for each in others)
 
 
 def test_without_locks_age_alone_decides(tmp_path, monkeypatch):
@@ -273,6 +284,16 @@ def test_without_an_absolute_folder_it_is_the_one_in_the_home_folder(tmp_path, m
     assert cache_folder() == tmp_path / ".cache" / "noise-inspector" / "surfaces"
 
 
+@pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x05\x06" + b"\0" * 18])
+def test_a_damaged_file_is_made_anew(home, content):
+    make = Maker()
+    cached("a-1", make)
+    (home / "a-1.npz").write_bytes(content)
+    cached("a-1", make)
+    assert_made(cached("a-1", make))
+    assert make.calls == 2
+
+
 def test_a_file_with_one_byte_changed_anywhere_is_made_anew(home):
     make = Maker()
     cached("a-1", make)
@@ -302,6 +323,29 @@ def test_arrays_that_cannot_be_made_are_not_cached(home):
         cached("a-1", fail)
     assert not home.exists()
     assert_made(cached("a-1", Maker()))
+
+
+def test_the_secret_is_the_users_alone(home):
+    make, secret = Maker(), home.parent / "secret"
+    cached("a-1", make)
+    assert (secret.stat().st_mode & 0o777, len(secret.read_bytes())) == (0o600, 32)
+    for bit in (0o1, 0o2, 0o4, 0o10, 0o20, 0o40):
+        secret.chmod(0o600 | bit)
+        assert_made(cached("a-1", make))
+    assert make.calls == 7
+    for mode in (0o400, 0o600, 0o700):
+        secret.chmod(mode)
+        cached("a-1", make)
+    assert make.calls == 7
+
+
+@pytest.mark.parametrize("difference", [-1, 1])
+def test_the_secret_of_another_user_is_not_taken(monkeypatch, difference):
+    make, user = Maker(), os.getuid()
+    cached("a-1", make)
+    monkeypatch.setattr(os, "getuid", lambda: user + difference)
+    assert_made(cached("a-1", make))
+    assert make.calls == 2
 
 
 @pytest.mark.parametrize("length", [0, 31, 33])

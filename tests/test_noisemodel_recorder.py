@@ -37,6 +37,19 @@ def test_pushed_samples_are_the_run_at_the_recorders_rate(tmp_path):
     recorder.save(tmp_path / "run.npz", overwrite=True)
 
 
+def test_values_by_name_are_put_in_the_recorders_order():
+    recorder = nm.Recorder(None, 100, joint_names=["a", "b"], desired_joint_names=["b"])
+    for _ in range(3):
+        recorder.push(velocity={"b": 2.0, "a": 1.0}, velocity_desired={"b": 3.0})
+    run = recorder.run()
+    assert np.array_equal(run.velocity, [[1.0, 2.0]] * 3)
+    assert np.array_equal(run.velocity_desired, [[3.0]] * 3)
+    with pytest.raises(RunError, match=r"velocity: no joint 'c'; expected a, b"):
+        recorder.push(velocity={"a": 1.0, "c": 1.0}, velocity_desired={"b": 3.0})
+    with pytest.raises(RunError, match=r"velocity: missing for a; joint_names=… names fewer"):
+        recorder.push(velocity={"b": 1.0}, velocity_desired={"b": 3.0})
+
+
 def test_missing_velocities_are_differentiated_from_positions():
     recorder = nm.Recorder(None, 100)
     for step in range(300):
@@ -224,6 +237,16 @@ def test_samples_are_interpolated_between_stamps_and_not_in_gaps_or_at_single_sa
         )
 
 
+@pytest.mark.parametrize(("step", "missing", "most"), [(5, 0, 4), (5.25, 5, 0.25)])
+def test_a_step_of_five_medians_is_no_gap_yet(step, missing, most):
+    """Where it is a gap, only the other step, of 0.75 medians, deviates."""
+    stamps = [*range(10), 9 + step, *range(15, 20)]
+    run = stamped(stamps, velocity=ramp)
+    assert (~run.mask).sum() == missing
+    assert run.meta["jitter"]["max"] == most * STEP
+    np.testing.assert_allclose(run.velocity[run.mask], [*map(ramp, run.time[run.mask])])
+
+
 @pytest.mark.parametrize(("share", "kept"), [(0.9e-3, True), (1.1e-3, False)])
 def test_stamps_are_kept_that_lie_a_thousandth_of_a_step_apart(share, kept):
     stamps = np.arange(20.0)
@@ -250,6 +273,13 @@ def test_stamps_that_jitter_have_the_recorders_rate_unless_theirs_is_another_by_
     np.testing.assert_allclose(run.velocity[run.mask], [*map(ramp, run.time[run.mask])])
 
 
+def test_a_rate_of_stamps_has_six_digits():
+    recorder = nm.Recorder(None, 100)
+    for step in (0, 1, 2, 3, 5, 6, 7):
+        recorder.push(velocity=[1.0], time=step / 300.1234567)
+    assert recorder.run().rate == 300.123
+
+
 def test_a_sample_that_is_not_finite_is_a_gap_in_all_signals_and_the_base_does_not_turn_there():
     recorder = nm.Recorder(None, 0.5)
     for step in range(4):
@@ -273,6 +303,25 @@ def test_a_rate_is_one_that_a_run_may_have(rate):
         nm.Recorder(None, rate)
 
 
+@pytest.mark.parametrize(("joints", "named"), [(10, 10), (11, 10)])
+def test_a_sample_of_another_width_names_ten_joints(joints, named):
+    names = [f"j{number}" for number in range(joints)]
+    recorder = nm.Recorder(None, 100, joint_names=names, desired_joint_names=names[:3])
+    known = ", ".join(names[:named]) + (", …" if joints > named else "")
+    with whole(f"effort: shape (2,), expected ({joints},) ({known}); joint_names=… names others"):
+        recorder.push(velocity=np.zeros(joints), effort=[1, 2])
+    with whole("velocity_desired: shape (), expected (3,) (j0, j1, j2)"):
+        recorder.push(velocity=np.zeros(joints), velocity_desired=1.0)
+    with whole("base_pose: shape (6,), expected (7,)"):
+        recorder.push(velocity=np.zeros(joints), base_pose=np.zeros(6))
+    with whole("base_velocity: shape (2, 6), expected (6,)"):
+        recorder.push(velocity=np.zeros(joints), base_velocity=np.zeros((2, 6)))
+    with whole("velocity: missing, and position too; the sample has effort, time"):
+        recorder.push(effort=np.zeros(joints), time=0.0)
+    with whole("position_desired: missing for j0, j2; joint_names=… names fewer"):
+        recorder.push(velocity=np.zeros(joints), position_desired={"j1": 0.0})
+
+
 def test_without_names_the_first_sample_names_the_joints():
     recorder = nm.Recorder(None, 100)
     with whole("velocity: shape (), expected (joints,)"):
@@ -288,3 +337,29 @@ def test_without_names_the_first_sample_names_the_joints():
     run = recorder.run()
     assert run.joint_names == run.desired_joint_names == ("b", "a")
     assert run.velocity.tolist() == [[1.0, 2.0]] * 2
+
+
+def test_the_desired_joints_are_the_robots_too():
+    with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'"):
+        nm.Recorder("panda", 100, joint_names=PANDA, desired_joint_names=[PANDA[0], "elbow"])
+    recorder = nm.Recorder("panda", 100, joint_names=PANDA[:2], desired_joint_names=PANDA[4:5])
+    for _ in range(2):
+        recorder.push(velocity=[0, 0], velocity_desired=[0])
+    run = recorder.run()
+    assert (run.joint_names, run.desired_joint_names) == (tuple(PANDA[:2]), (PANDA[4],))
+
+
+def test_a_loop_that_ends_replaces_what_an_earlier_one_has_saved(tmp_path):
+    for samples in (10, 20):
+        with nm.Recorder(None, 100, path=tmp_path / "a.npz") as recorder:
+            pushed(recorder, samples)
+    assert len(nm.Run.load(tmp_path / "a.npz").time) == 20
+    assert nm.Run.load(tmp_path / "a.npz").meta == {}
+
+
+def test_desired_joints_keep_their_names_where_the_others_have_none():
+    recorder = nm.Recorder(None, 100, desired_joint_names=["b"])
+    for _ in range(2):
+        recorder.push(velocity=[1.0, 2.0], velocity_desired=[3.0])
+    run = recorder.run()
+    assert (run.joint_names, run.desired_joint_names) == (("joint1", "joint2"), ("b",))

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from noisemodel import Block, Run, RunError, decimated, runfile
+from noisemodel import Block, Run, RunError, RunFileError, decimated, runfile
 from noisemodel.run import (
     METHOD,
     NotUniformError,
     base_velocity,
     check_blocks,
+    check_names,
     check_quaternions,
     check_signal,
     check_time,
@@ -47,6 +48,11 @@ def test_the_rate_is_the_nominal_one(rate):
     recorded = run(time=1.7e4 + np.arange(100) / rate)
     assert recorded.rate == pytest.approx(rate, rel=1e-6)
     assert run(time=np.arange(100) / rate).rate == pytest.approx(rate, rel=1e-9)
+
+
+def test_stamps_of_a_day_in_unix_time_are_uniform():
+    """Their own spacing is 2.4e-7 s, which is coarser than a thousandth of 0.1 ms."""
+    assert run(time=1.8e9 + np.arange(100) / 10_000).rate == pytest.approx(10_000, rel=3e-3)
 
 
 def test_blocks_are_sorted():
@@ -105,12 +111,21 @@ def shifted(row, by):
         ({"joint_names": ("a", "a")}, "joint_names: a named twice"),
         ({"joint_names": ("a", "")}, "joint_names: '' is no name"),
         ({"desired_joint_names": ("c", "c")}, "desired_joint_names: c named twice"),
+        ({"blocks": (Block(0.05, 0.02, "ok"),)}, "block 'ok': starts at 0.05 s, stops at 0.02 s"),
+        ({"blocks": (Block(np.nan, 0.05, "ok"),)}, "block 'ok': starts at nan s"),
+        ({"blocks": (Block(0.0, 0.102, "ok"),)}, "block 'ok': 0 s to 0.102 s lies outside"),
     ],
 )
 def test_signals_that_do_not_fit_are_refused(changes, message):
     with pytest.raises(RunError, match=message) as caught:
         run(**changes)
     assert "\n" not in str(caught.value)
+
+
+def test_quaternions_in_gaps_are_not_checked():
+    pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (100, 1))
+    pose[50] = 0.0
+    assert run(base_pose=pose, valid=np.arange(100) != 50).base_pose is not None
 
 
 def filled():
@@ -149,6 +164,12 @@ def same(one, other):
         else:
             assert left == right
     return True
+
+
+@pytest.mark.parametrize("stretch", [(-np.inf, np.inf), (0.0, 1.0), (-5.0, 0.0991)])
+def test_a_cut_of_everything_is_the_run(stretch):
+    whole = filled()
+    assert same(whole.cut(*stretch), whole)
 
 
 @given(
@@ -200,6 +221,7 @@ def test_blocks_are_clipped_to_a_cut():
 def test_an_empty_cut_is_refused(stretch, message):
     with pytest.raises(RunError, match=message):
         filled().cut(*stretch)
+    assert len(filled().cut(0.05, 0.0511).time) == 2
 
 
 def test_a_run_is_represented_in_one_line():
@@ -310,6 +332,35 @@ def test_stamps_far_from_zero_may_lie_two_of_their_own_spacings_from_the_median(
         check_time(-time[::-1] if mirrored else time)
 
 
+def test_names_that_repeat_are_all_named(monkeypatch):
+    with refused("joint_names: a, c named twice"):
+        check_names("joint_names", ["c", "b", "a", "c", "a", "a"])
+    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "3")
+    check_names("joint_names", ["a", "b", "c"])
+    with refused("joint_names: 4 joints, the limit is 3 (--limit joints=N raises it)"):
+        check_names("joint_names", ["a", "b", "c", "d"])
+
+
+@pytest.mark.parametrize(
+    ("shape", "turned"),
+    [
+        ((2, 5), True),
+        ((7, 5), True),
+        ((2, 4), False),
+        ((5, 5), False),
+        ((5, 3), False),
+        ((5,), False),
+        ((1, 5, 1), False),
+        ((2, 2, 5), False),
+        ((2, 5, 2), False),
+    ],
+)
+def test_signals_of_another_shape_are_refused_and_samples_that_come_last_are_named(shape, turned):
+    hint = "; samples come first, is it transposed?" if turned else ""
+    with refused(f"effort: shape {shape}, expected (5, 2){hint}"):
+        check_signal("effort", np.zeros(shape), (5, 2))
+
+
 def test_signals_are_of_floating_point_numbers_of_any_size():
     for kind in (np.float16, np.float32, np.float64):
         check_signal("effort", np.ones((5, 2), dtype=kind), (5, 2))
@@ -401,6 +452,16 @@ def run_of(hertz, *, rate=10_000, seconds=3.0, **fields):
     time = 5.0 + np.arange(round(rate * seconds)) / rate
     velocity = np.sin(2 * np.pi * hertz * (time - 5.0))[:, None]
     return Run(time=time, velocity=velocity, joint_names=("elbow",), **fields)
+
+
+@pytest.mark.parametrize("rate", [5000.0, 1000.0, 2500.0, 300.0])
+def test_a_slow_motion_is_unchanged(rate):
+    slow = decimated(run_of(20.0), rate)
+    assert slow.rate == pytest.approx(rate)
+    inner = slice(20, -20)
+    expected = np.sin(2 * np.pi * 20.0 * (slow.time - 5.0))
+    np.testing.assert_allclose(slow.velocity[inner, 0], expected[inner], atol=3e-3)
+    assert slow.time[0] == 5.0
 
 
 def test_frequencies_above_the_lower_nyquist_frequency_are_removed_not_folded():
@@ -518,6 +579,14 @@ def test_quaternions_that_flip_their_sign_give_no_spike():
     assert np.allclose(base_velocity(LONG, pose), twist, rtol=0, atol=1e-6)
 
 
+def test_a_half_turn_between_two_samples_does_not_silence_the_rest():
+    pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (20, 1))
+    pose[5:, 3:] = [1.0, 0, 0, 0]
+    pose[:, 0] = np.arange(20) / RATE
+    linear = base_velocity(LONG[:20], pose)[:, :3]
+    assert np.allclose(np.linalg.norm(linear, axis=1), 1.0, atol=1e-9)
+
+
 def test_a_run_of_positions_alone_has_velocities_and_states_their_source(tmp_path):
     position, velocity = swing(LONG)
     pose, twist = tumble(LONG)
@@ -534,6 +603,65 @@ def test_a_run_of_positions_alone_has_velocities_and_states_their_source(tmp_pat
         "velocity_desired": METHOD,
         "base_velocity": METHOD,
     }
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"position": np.ones((3, 2))}, r"position: shape \(3, 2\), expected \(2000, 2\)"),
+        (
+            {"position": np.where(LONG == 0.003, np.nan, 1.0)[:, None]},
+            "position: nan in row 3, column 0; mark gaps with valid = false",
+        ),
+        (
+            {"velocity": np.ones((2000, 1)), "base_pose": np.ones((2000, 6))},
+            r"base_pose: shape \(2000, 6\), expected \(2000, 7\)",
+        ),
+        (
+            {"velocity": np.ones((2000, 1)), "base_pose": np.zeros((2000, 7))},
+            "the quaternion in row 0 has norm 0, expected 1",
+        ),
+    ],
+)
+def test_positions_that_cannot_be_differentiated_are_refused(tmp_path, arrays, message):
+    np.savez(tmp_path / "run.npz", time=LONG, **arrays)
+    with pytest.raises(RunFileError, match=message):
+        Run.load(tmp_path / "run.npz")
+
+
+@pytest.mark.parametrize("derivative", [joint_velocity, base_velocity])
+def test_rows_that_are_differentiated_on_demand_are_those_of_the_whole(derivative):
+    time, read = LONG[:60], []
+    pose, _ = tumble(time)
+    pose[30:, 3:] *= -1
+    valid = np.ones(60, dtype=bool)
+    valid[[7, 20, 23, 40, 41]] = False
+    whole = derivative(time, pose, valid)
+
+    def rows(first, stop):
+        assert 0 <= first <= stop <= 60
+        read.append((first, stop))
+        return pose[first:stop]
+
+    kept = derivative(time, OnDemand((60, 7), np.float64, rows), valid)
+    assert isinstance(kept, OnDemand)
+    assert (kept.shape, kept.dtype) == (whole.shape, np.float64)
+    for first in range(0, 60, 3):
+        for stop in (first + 1, first + 5, 60):
+            found = kept[first:stop]
+            np.testing.assert_allclose(found, whole[first:stop], atol=1e-9)
+    assert max(stop - first for first, stop in read[::3]) <= 1 + 2 * 7
+    without = derivative(time, OnDemand((60, 7), np.float64, rows))
+    np.testing.assert_allclose(without[10:20], derivative(time, pose)[10:20], atol=1e-9)
+
+
+def test_a_base_on_a_straight_and_level_way_has_the_velocity_along_its_own_axes():
+    """A quarter turn about z: what is x in the world is -y of the base."""
+    pose = np.tile([0, 0, 0, 0, 0, np.sqrt(0.5), np.sqrt(0.5)], (20, 1))
+    pose[:, :3] = np.outer(LONG[:20], [2.0, 3.0, 5.0])
+    expected = np.tile([3.0, -2.0, 5.0, 0, 0, 0], (20, 1))
+    np.testing.assert_allclose(base_velocity(LONG[:20], pose), expected, atol=1e-9)
+    np.testing.assert_allclose(base_velocity(LONG[:20], 1.005 * pose), 1.005 * expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("samples", [2, 3, 6, 7, 8])

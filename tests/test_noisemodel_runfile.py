@@ -22,6 +22,12 @@ TIME = np.arange(40) / 1000
 VELOCITY = np.ones((40, 2))
 BASE = {"time": TIME, "velocity": VELOCITY}
 TURNED = "expected (40, 2); samples come first, is it transposed?"
+KNOWN = (
+    "a run file has time, and velocity or position, and of time, velocity, position,"
+    " velocity_desired, position_desired, effort, valid, joint_names, desired_joint_names,"
+    " base_pose, base_velocity, robot, block_start, block_stop, block_label, format, meta and"
+    " stage_<name> what there is; anything else belongs into meta"
+)
 NAMES = st.text(st.characters(categories=("L", "M", "N", "P", "S")), min_size=1, max_size=8)
 IN_PLACE = settings(
     deadline=None,
@@ -135,9 +141,13 @@ def test_a_listed_robot_is_kept_by_its_name(tmp_path):
     assert Run.load(tmp_path / "run.npz").robot == "talos"
 
 
-def test_a_robot_that_is_none_is_named(tmp_path):
-    np.savez(tmp_path / "run.npz", **BASE, robot=None)
-    with pytest.raises(RunFileError, match="robot holds a Python object, such as None; .* text"):
+@pytest.mark.parametrize(
+    ("name", "kind"), [("robot", "text"), ("valid", "booleans"), ("stage_x", "numbers")]
+)
+def test_an_array_that_is_none_should_hold_its_own_kind(tmp_path, name, kind):
+    np.savez(tmp_path / "run.npz", **BASE, **{name: None})
+    text = f"{name} holds a Python object, such as None; leave it out, or save {kind}$"
+    with pytest.raises(RunFileError, match=text):
         Run.load(tmp_path / "run.npz")
 
 
@@ -175,6 +185,15 @@ def test_a_file_of_another_kind_is_refused(tmp_path, contents, message):
     (tmp_path / "run.npz").write_bytes(contents)
     with pytest.raises(RunFileError, match=message):
         Run.load(tmp_path / "run.npz")
+
+
+def test_a_truncated_file_is_refused(tmp_path):
+    path = saved(tmp_path)
+    whole = path.read_bytes()
+    for length in range(0, len(whole), 97):
+        path.write_bytes(whole[:length])
+        with pytest.raises(RunFileError, match=r"run.npz: (not a run file|damaged): "):
+            Run.load(path)
 
 
 @settings(IN_PLACE, max_examples=300)
@@ -261,6 +280,34 @@ def test_a_csv_log_is_said_to_need_an_import(tmp_path, name, hint):
             "array 'velocity' is missing, and 'position' to differentiate too;"
             " the file has time, effort",
         ),
+        (
+            {"time": TIME, "velocty": VELOCITY},
+            f"unknown array 'velocty' (did you mean 'velocity'?); {KNOWN}",
+        ),
+        (BASE | {"camera": TIME}, f"unknown array 'camera'; {KNOWN}"),
+        (BASE | {"velocity": TIME}, "velocity has shape (40,), expected (samples, joints)"),
+        (BASE | {"velocity": 3.0}, "velocity has shape (), expected (samples, joints)"),
+        ({"time": TIME, "position": 3.0}, "position has shape (), expected (samples, joints)"),
+        (BASE | {"time": 3.0}, "time has shape (), expected (samples)"),
+        (BASE | {"velocity": VELOCITY.astype(str)}, "velocity holds <U32, expected numbers"),
+        (BASE | {"velocity": VELOCITY * 1j}, "velocity holds complex128, expected numbers"),
+        (BASE | {"valid": TIME}, "valid holds float64, expected booleans"),
+        (BASE | {"joint_names": [1, 2]}, "joint_names holds int64, expected text"),
+        (BASE | {"joint_names": ["a"]}, "velocity: shape (40, 2), expected (40, 1)"),
+        (
+            BASE | {"velocity": VELOCITY * np.nan},
+            "velocity: nan in row 0, column 0; mark gaps with valid = false and zeros",
+        ),
+        (BASE | {"time": TIME[::-1]}, "time: runs backwards in row 1 (0.039 s, then 0.038 s)"),
+        (
+            BASE | {"meta": "{"},
+            "meta: not JSON (Expecting property name enclosed in double quotes:"
+            " line 1 column 2 (char 1))",
+        ),
+        (
+            BASE | {"block_start": [0.02], "block_stop": [0.01], "block_label": ["ok"]},
+            "block 'ok': starts at 0.02 s, stops at 0.01 s",
+        ),
     ],
 )
 def test_a_file_with_wrong_arrays_is_told_in_these_words(tmp_path, arrays, message):
@@ -268,6 +315,7 @@ def test_a_file_with_wrong_arrays_is_told_in_these_words(tmp_path, arrays, messa
     with pytest.raises(RunFileError) as caught:
         Run.load(tmp_path / "run.npz")
     assert str(caught.value) == f"{tmp_path / 'run.npz'}: {message}"
+    assert caught.value.path == tmp_path / "run.npz"
 
 
 def test_lists_that_are_empty_are_no_names_and_no_blocks(tmp_path):
@@ -302,6 +350,14 @@ def test_signals_of_64_megabytes_stay_in_the_file_only_if_that_is_asked(tmp_path
     found = runfile.read(path, on_demand=True)
     assert isinstance(found["velocity"], OnDemand)
     assert isinstance(found["position"], np.ndarray)
+
+
+def test_a_run_is_in_memory_unless_it_is_asked_otherwise(tmp_path, monkeypatch):
+    monkeypatch.setattr(runfile, "LARGE", 0)
+    path = saved(tmp_path)
+    assert isinstance(Run.load(path).velocity, np.ndarray)
+    assert isinstance(runfile.read(path)["velocity"], np.ndarray)
+    assert isinstance(Run.load(path, on_demand=True).velocity, OnDemand)
 
 
 def test_a_file_that_is_gone_when_its_rows_are_read_is_named(tmp_path, monkeypatch):
@@ -348,6 +404,28 @@ def small(monkeypatch):
     monkeypatch.setattr(runfile, "MARKS", 7)
 
 
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("method", [STORED, DEFLATED])
+def test_arrays_are_read_in_pieces_and_larger_ones_on_demand_by_their_rows(
+    tmp_path, small, method, order
+):
+    cube = np.asarray(CUBE, order=order)
+    size = len(content(cube))
+    path = packed(tmp_path / "a.npz", method, long=np.arange(1000), cube=cube, text=np.array("a"))
+    assert runfile.names_in(path) == ("long", "cube", "text")
+    assert list(runfile.read_npz(path, ["cube", "other"])) == ["cube"]
+    for limit, stays in ((float("inf"), False), (size, False), (size - 1, True), (0, True)):
+        found = runfile.read_npz(path, on_demand=limit)
+        assert list(found) == ["long", "cube", "text"]
+        assert isinstance(found["long"], np.ndarray)
+        np.testing.assert_array_equal(found["long"], np.arange(1000))
+        assert str(found["text"]) == "a"
+        stays = stays and order == "C"
+        assert isinstance(found["cube"], OnDemand) == stays
+        for first, stop in ((0, 60), (57, 60), (3, 4), (20, 40), (7, 7), (0, 1), (59, 60)):
+            np.testing.assert_array_equal(found["cube"][first:stop], CUBE[first:stop])
+
+
 def test_whatever_is_read_of_a_packed_array_has_the_bytes_of_the_whole(tmp_path, small):
     """Marks lie apart, and there are so many at most."""
     random = np.random.default_rng(0)
@@ -369,10 +447,46 @@ def test_whatever_is_read_of_a_packed_array_has_the_bytes_of_the_whole(tmp_path,
         member.read(len(raw) - 5, len(raw) + 1)
 
 
+def test_a_wrong_checksum_is_found_when_an_array_was_read_in_order(tmp_path, small):
+    raw = content(np.tile(CUBE, (9, 1, 1)))
+    path = packed(tmp_path / "a.npz", cube=raw)
+    damaged = bytearray(path.read_bytes())
+    damaged[damaged.index(raw) + len(raw) - 1] ^= 1  # the last byte of the last row
+    path.write_bytes(damaged)
+    with refused("Bad CRC-32 for file 'cube.npy'"):
+        runfile.read_npz(path)
+    cube = runfile.read_npz(path, on_demand=0)["cube"]
+    cube[10:540]  # the sum of a part is unknown
+    cube[0:20], cube[20:300]
+    with refused("damaged: wrong checksum of cube"):
+        cube[300:540]
+
+
 def packed_again(path, raw):
     """The member of a file that was damaged, by what stood in the file before."""
     with zipfile.ZipFile(io.BytesIO(raw)) as file:
         return runfile._Member(path, "table", file.getinfo("table.npy"))
+
+
+@pytest.mark.parametrize("method", [STORED, DEFLATED])
+def test_a_file_that_is_cut_or_damaged_later_is_refused(tmp_path, small, monkeypatch, method):
+    """Where nothing else shows that it was changed."""
+    monkeypatch.setattr(runfile, "_identity", lambda file: ())
+    table = np.random.default_rng(0).normal(size=(300, 2))
+    path = packed(tmp_path / "a.npz", method, table=table)
+    raw = path.read_bytes()
+    found = runfile.read_npz(path, on_demand=0)["table"]
+    assert isinstance(found, OnDemand)
+    path.write_bytes(raw[:2000])
+    np.testing.assert_array_equal(found[3:50], table[3:50])
+    with refused("damaged: table is cut off"):
+        found[100:300]
+    if method == DEFLATED:
+        begin = raw.index(b"table.npy") + len("table.npy")
+        path.write_bytes(raw[:begin] + b"\xff" * 5000)  # 7: a block of no known type
+        found = packed_again(path, raw)
+        with pytest.raises(ArchiveError, match=r"^damaged: Error -3 while decompressing data"):
+            found.read(0, 10)
 
 
 @pytest.mark.parametrize(
@@ -406,6 +520,15 @@ def test_headers_of_version_one_and_two_are_read_and_no_others(tmp_path):
         runfile.read_npz(packed(tmp_path / "a.npz", a=objects))
     assert isinstance(caught.value, runfile.ObjectArrayError)
     assert caught.value.name == "a"
+
+
+def test_an_array_that_ends_early_is_cut_off(small):
+    raw = content(np.arange(100.0))
+    np.testing.assert_array_equal(
+        runfile.read_array(io.BytesIO(raw), "a", len(raw)), np.arange(100.0)
+    )
+    with refused("damaged: a is cut off"):
+        runfile.read_array(io.BytesIO(raw[:-1]), "a", len(raw))
 
 
 @pytest.mark.parametrize(
@@ -504,6 +627,17 @@ def test_only_rows_that_are_needed_are_read_some_at_once(array, read, key, parts
 def test_whatever_else_is_asked_reads_the_whole_once(array, read, key):
     for _ in range(2):
         np.testing.assert_array_equal(array[key], VALUES[key])
+    assert read == [(0, 100)]
+
+
+def test_what_was_read_whole_is_not_read_again(array, read):
+    assert float(array.max()) == 299.0
+    np.testing.assert_array_equal(array + array[4:5], VALUES + VALUES[4])
+    np.testing.assert_array_equal(np.add.reduce(array, axis=1), VALUES.sum(axis=1))
+    np.testing.assert_array_equal(array[5:9], VALUES[5:9])
+    assert np.asarray(array) is np.asarray(array)
+    assert np.asarray(array, dtype=np.float32).dtype == np.float32
+    assert np.asarray(array, dtype=np.float64) is np.asarray(array)
     assert read == [(0, 100)]
 
 
