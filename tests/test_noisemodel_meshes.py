@@ -89,6 +89,9 @@ NODE_H = NODE.replace("#g", "#h")
         ("brick.obj", obj(BRICK)),
         ("brick.dae", dae(geometry(BRICK), NODE)),
         ("brick.DAE", dae(geometry(BRICK), NODE)),
+        ("two.stl", ascii_stl(BRICK[:5], "a") + ascii_stl(BRICK[5:], "b")),
+        ("two.dae", dae(geometry(BRICK[:5]) + geometry(BRICK[5:], "h"), NODE + NODE_H)),
+        ("two.obj", obj(BRICK).replace(b"f 7", b"o second\nusemtl paint\nf 7")),
     ],
 )
 def test_one_brick_is_the_same_in_every_kind_of_file(tmp_path, name, content):
@@ -97,6 +100,13 @@ def test_one_brick_is_the_same_in_every_kind_of_file(tmp_path, name, content):
     assert np.array_equal(triangles, BRICK)
     assert area(triangles) == 22.0
     assert np.array_equal(meshes.read(tmp_path / name), BRICK)  # now from the cache
+
+
+def test_digits_beyond_single_precision_are_kept(tmp_path):
+    fine = BRICK * 0.1234567890123
+    for name, content in (("a.obj", obj(fine)), ("a.dae", dae(geometry(fine), NODE))):
+        assert np.array_equal(read(tmp_path, name, content), fine)
+        assert np.array_equal(meshes.read(tmp_path / name), fine)
 
 
 def test_what_is_cached_belongs_to_the_content_not_to_the_name(tmp_path, cache):
@@ -165,10 +175,19 @@ INPUTS = """<input semantic="NORMAL" source="#none" offset="0"/>
         f"<polygons>{INPUTS}<p>9 0 9 1 9 2</p><p>9 0 9 2 9 3 9 4</p></polygons>",
         f"<trifans>{INPUTS}<p>9 0 9 1 9 2 9 3 9 4</p></trifans>",
         f"<tristrips>{INPUTS}<p>9 1 9 2 9 0 9 3 9 4</p></tristrips>",
+        f"<tristrips>{INPUTS}<p>9 1 9 2 9 0 9 3</p><p>9 4 9 0 9 3</p></tristrips>",
         f"<lines>{INPUTS}<p>9 0 9 1</p></lines>"
         f"<triangles>{INPUTS}<p>9 0 9 1 9 2 9 0 9 2 9 3 9 0 9 3 9 4</p></triangles>",
     ],
-    ids=["polylist", "mixed polylist", "polygons", "fan", "strip", "lines beside triangles"],
+    ids=[
+        "polylist",
+        "mixed polylist",
+        "polygons",
+        "fan",
+        "strip",
+        "strips",
+        "lines beside triangles",
+    ],
 )
 def test_a_pentagon_has_the_same_area_however_it_is_cut(tmp_path, part):
     triangles = read(tmp_path, "a.dae", dae(geometry(PENTAGON, part=part), NODE))
@@ -185,6 +204,7 @@ def test_the_hull_of_a_dented_brick_is_the_brick(tmp_path):
 
 
 ASCII = ascii_stl(BRICK)
+NEGATIVE = "<vcount>4 -1</vcount><p>9 0 9 1 9 2</p>"
 BAD_NODE = '<node id="n"><instance_node url="#n"/></node>'
 
 
@@ -239,6 +259,19 @@ BAD_NODE = '<node id="n"><instance_node url="#n"/></node>'
             "a.dae",
             dae(geometry(BRICK, part=f"<polylist>{INPUTS}<vcount>4</vcount></polylist>"), NODE),
             "a <polylist> of 4 corners has 0",
+        ),
+        ("a.obj", b"# nothing\n", "has no triangles"),
+        ("a.obj", b"f 1 1 1\n", "a face names point 1 of 0"),
+        ("a.obj", b"v 0 0\n", "'v 0 0' is no point"),
+        ("a.obj", b"v 1 " + b"0" * 80, f"'v 1 {'0' * 56}' is no point"),
+        ("a.obj", b"f 0 " + b"1" * 80, f"'f 0 {'1' * 56}' names a point"),
+        ("a.stl", ASCII.replace(b"endfacet", b"vertex 1 2 3\nendfacet", 1), "not three"),
+        ("a.stl", ASCII.replace(b"endfacet\n", b"", 1), "not three corners"),
+        ("a.dae", dae("", "<node><lookat>1 2 3</lookat></node>"), "it has a <lookat>"),
+        (
+            "a.dae",
+            dae(geometry(BRICK, part=f"<polylist>{INPUTS}{NEGATIVE}</polylist>"), NODE),
+            "a <polylist> of 3 corners has 3",
         ),
         ("a.step", b"x", "of kind '.step', expected .dae, .obj, .stl"),
     ],
@@ -323,6 +356,15 @@ def test_the_limit_of_triangles_counts_points_and_instances(monkeypatch):
         monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", str(most - 1))
         with pytest.raises(ValueError, match=f"triangles or points, the limit is {most - 1}"):
             meshes.READERS[".dae"](content)
+
+
+def test_faces_of_an_obj_that_name_nothing_are_passed_over(tmp_path):
+    content = b"f\n\nvn 1 0 0\n" + obj(TRIANGLE) + b"f 1 2\nf 1\n#\n"
+    assert np.array_equal(read(tmp_path, "a.obj", content), TRIANGLE)
+    quad = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
+    (one, other) = read(tmp_path, "b.obj", quad)
+    assert np.array_equal(one, [[0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    assert np.array_equal(other, [[0, 0, 0], [1, 1, 0], [0, 1, 0]])
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed"])

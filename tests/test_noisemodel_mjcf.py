@@ -16,6 +16,7 @@ import noisemodel as nm
 from noisemodel import MeshError, Robot, RobotError, Run, UnknownRobotError, mjcf
 from noisemodel.compare import excitation
 from noisemodel.extended import link_noise
+from noisemodel.robot import limits_of
 from noisemodel.surface import Surface, link_names, triangles
 from noisemodel.urdf import Mimic, capsule
 
@@ -130,10 +131,40 @@ def test_joints_are_those_that_pinocchio_reads_itself(tmp_path):
     np.testing.assert_allclose(*found, atol=1e-12)
 
 
+def test_joints_are_of_the_kinds_that_pinocchio_makes_of_them(tmp_path):
+    text, kinds = "", []
+    for slide, name in (("", "R"), ('type="slide"', "P")):
+        long = "Revolute" if name == "R" else "Prismatic"
+        for axis, kind in (
+            *(("1 0 0", f"{name}X"), ("0 2 0", f"{name}Y"), ("0 0 3", f"{name}Z")),
+            *(("0 0 -1", f"{long}Unaligned"), ("1 2 0", f"{long}Unaligned")),
+        ):
+            text += f'<body><joint {slide} axis="{axis}"/>{BALL}</body>'
+            kinds.append(f"JointModel{kind}")
+    path = written(tmp_path, f"<mujoco><worldbody>{text}</worldbody></mujoco>")
+    assert [joint.shortname() for joint in Robot.load(path).model.joints][1:] == kinds
+
+
+def test_two_joints_of_a_body_without_names_are_numbered(tmp_path):
+    joints = '<joint axis="0 0 1"/><joint axis="1 0 0"/>'
+    text = LEGS.replace('<joint name="hip"', f'{joints}<joint name="hip"')
+    robot = Robot.load(written(tmp_path, text))
+    assert robot.joint_names == ("leftJoint_0", "leftJoint_1", "hip", "knee")
+
+
 def test_joints_without_a_name_are_named_after_their_body(tmp_path):
     robot = Robot.load(written(tmp_path, ARM))
     assert robot.joint_names == ("lift", "turn", "body3Joint_0", "wrist")
     assert Robot.load(written(tmp_path, LEGS)).joints[0].name == "trunk_free"
+
+
+def test_limits_are_those_of_the_file(tmp_path):
+    found = limits_of(Robot.load(written(tmp_path, ARM)))
+    ranges = [each.upper - each.lower for each in found.values()]
+    np.testing.assert_allclose(ranges, [np.inf, np.radians(190), np.inf, np.inf])
+    centres = [each.centre for each in found.values()]
+    np.testing.assert_allclose(centres, [0.0, np.radians(5), 0.0, 0.0])
+    assert all(np.isinf(each.velocity) for each in found.values())
 
 
 def test_a_free_joint_that_comes_first_makes_the_base_float(tmp_path):
@@ -152,6 +183,26 @@ def test_objects_that_move_freely_stay_where_the_file_puts_them(tmp_path):
     robot = Robot.load(written(tmp_path, text))
     assert not robot.floating_base
     assert robot.nv == 4
+
+
+def test_of_two_free_joints_the_second_is_an_objects(tmp_path):
+    text = LEGS.replace(
+        "</worldbody>", f'<body name="cup" pos="1 2 3"><freejoint/>{BALL}</body></worldbody>'
+    )
+    robot = Robot.load(written(tmp_path, text))
+    assert (robot.floating_base, robot.nv, len(robot.joints)) == (True, 8, 3)
+    frame = robot.model.frames[robot.model.getFrameId("cup")]
+    assert frame.parentJoint == 0
+    np.testing.assert_array_equal(frame.placement.translation, [1.0, 2.0, 3.0])
+
+
+def test_bodies_without_joints_are_not_merged_and_what_is_only_drawn_is_kept(tmp_path):
+    fixed = (
+        '<body name="shell" pos="0 0 1"><geom size="0.2" group="1" contype="0" conaffinity="0"/>'
+        "</body>"
+    )
+    text = one_body(BALL + fixed, head='<compiler fusestatic="true" discardvisual="true"/>')
+    assert [each.link for each in Robot.load(written(tmp_path, text)).mjcf.visual] == ["shell"]
 
 
 def test_included_files_belong_to_the_robot(tmp_path):
@@ -212,6 +263,19 @@ def test_an_equality_of_a_joint_of_many_axes_is_refused(tmp_path, kind):
             Robot.load(written(tmp_path, text))
 
 
+def test_an_equality_that_couples_no_joints_hides_none_that_follows(tmp_path):
+    pairs = (
+        '<connect body1="left" body2="shin" anchor="0 0 0"/>',
+        '<joint joint1="knee" joint2="hip" polycoef="0 1 2 0 0"/>',  # not linear
+        '<joint joint1="knee" joint2="hip" polycoef="0 1 0 0 2"/>',
+        '<joint joint1="knee" polycoef="0 1 0 0 0"/>',  # held
+        '<joint joint1="knee" joint2="hip" polycoef="0 1 0 0 0" active="false"/>',
+        '<joint joint1="knee" joint2="hip" polycoef="0.1 -2 0 0 0"/>',
+    )
+    text = LEGS.replace("</mujoco>", f"<equality>{''.join(pairs)}</equality></mujoco>")
+    assert Robot.load(written(tmp_path, text), mimic=True).mimics == {"knee": Mimic("hip", -2, 0.1)}
+
+
 def test_a_file_that_only_an_included_one_is_beside_is_included(tmp_path):
     written(tmp_path, ARM, "parts/arm.xml")
     written(tmp_path, '<mujoco><include file="arm.xml"/></mujoco>', "parts/both.xml")
@@ -219,10 +283,36 @@ def test_a_file_that_only_an_included_one_is_beside_is_included(tmp_path):
     assert "wrist" in Robot.load(scene).joint_names
 
 
+def test_of_two_files_of_a_name_the_one_beside_the_model_is_included(tmp_path):
+    scene = written(tmp_path, '<mujoco><include file="parts/both.xml"/></mujoco>')
+    written(tmp_path, LEGS, "legs.xml")
+    written(tmp_path, '<mujoco><include file="legs.xml"/></mujoco>', "parts/both.xml")
+    written(tmp_path, "no XML", "parts/legs.xml")
+    assert Robot.load(scene).joint_names == ("hip", "knee")
+
+
 def test_a_urdf_is_known_by_its_root_after_a_long_beginning(tmp_path):
     text = f'<?xml version="1.0"?>\n<!-- {"a licence " * 20} -->\n<robot name="r"/>'
     assert not mjcf.is_mjcf(written(tmp_path, text, "r.xml"))
     assert mjcf.is_mjcf(written(tmp_path, text.replace("robot", "mujoco"), "m.xml"))
+
+
+@pytest.mark.parametrize(
+    ("geom", "area"),
+    [
+        ('type="sphere" size="0.5"', np.pi),
+        ('type="box" size="0.5 1 1.5"', 22.0),
+        ('type="cylinder" size="0.5 1"', 2.5 * np.pi),
+        ('type="capsule" size="0.5 1"', 3 * np.pi),
+        ('type="capsule" size="0.5 0.75"', 2.5 * np.pi),
+        ('type="cylinder" size="0.5 0.75"', 2.0 * np.pi),
+        ('type="capsule" fromto="0 0 0 0 2 0" size="0.5"', 3 * np.pi),
+        ('type="ellipsoid" size="0.5 0.5 0.5"', np.pi),
+    ],
+)
+def test_a_primitive_has_its_area(tmp_path, geom, area):
+    surface = nm.Surface.of(Robot.load(written(tmp_path, one_body(f"<geom {geom}/>"))))
+    assert surface.area[0] == pytest.approx(area, rel=2.5e-3)
 
 
 def test_planes_and_what_is_fixed_to_the_world_have_no_surface(tmp_path):
@@ -261,6 +351,19 @@ def test_a_mesh_is_scaled_and_placed_as_mujoco_does(tmp_path):
     found = triangles(Robot.load(path))[0].reshape(-1, 3)
     distance = np.linalg.norm(found[:, None] - expected, axis=2).min(axis=1)
     assert distance.max() < 1e-5  # MuJoCo has single precision
+
+
+def test_meshes_are_read_wherever_they_stand_among_other_geoms(tmp_path):
+    write_stl(tmp_path / "part.stl")
+    head = '<asset><mesh name="m" file="part.stl"/></asset>'
+    mesh = '<geom type="mesh" mesh="m"/>'
+    for other in ('type="box" size="1 1 1"', 'type="box" mesh="m"'):
+        box, areas = f'<geom {other} pos="9 0 0"/>', []
+        for geoms in (box, mesh, mesh + box, box + mesh, box + mesh + box + mesh):
+            robot = Robot.load(written(tmp_path, one_body(geoms, head=head)))
+            areas.append(nm.Surface.of(robot).area.sum())
+        both = areas[0] + areas[1]
+        assert areas[2:] == pytest.approx([both, both, 2 * both])
 
 
 def test_a_geom_keeps_its_own_colour_where_a_material_has_another(tmp_path):
@@ -408,6 +511,21 @@ def test_visual_geoms_are_those_that_are_drawn(tmp_path, geoms, visual, collisio
         assert [len(shape.body) for shape in shapes] == [count[kind] for kind in expected]
 
 
+def test_a_geom_that_collides_in_one_of_the_two_ways_collides(tmp_path):
+    text = '<geom size="1" contype="{}" conaffinity="{}"/>'
+    for ways in ((1, 0), (0, 1), (2, 2)):
+        robot = Robot.load(written(tmp_path, one_body(text.format(*ways))))
+        assert len(robot.mjcf.collision) == 1
+
+
+def test_a_black_geom_and_one_that_is_half_transparent_are_drawn(tmp_path):
+    geoms = "".join(
+        f'<geom size="1" rgba="{rgba}"/>' for rgba in ("0 0 0 1", "1 1 1 0", "0 0 1 .5")
+    )
+    drawn = Robot.load(written(tmp_path, one_body(geoms))).mjcf.visual
+    assert [shape.colour for shape in drawn] == [(0, 0, 0, 1), (0, 0, 1, 0.5)]
+
+
 def test_without_its_meshes_a_robot_has_joints_and_no_surface(tmp_path):
     head = '<asset><mesh name="m" file="gone.stl"/></asset>'
     geom = '<geom type="mesh" mesh="m"/>'
@@ -531,6 +649,11 @@ def test_a_path_that_is_not_utf_8_is_named(tmp_path):
         mjcf.read(path, [tmp_path])
 
 
+def test_a_file_that_does_not_exist_is_named(tmp_path):
+    with pytest.raises(RobotError, match=r"gone\.xml: there is no such MJCF file"):
+        Robot.load(tmp_path / "gone.xml")
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -555,6 +678,13 @@ def test_textures_and_skins_are_not_opened(tmp_path):
     )
     robot = Robot.load(written(tmp_path, one_body('<geom size="1" material="m"/>', head=head)))
     assert robot.mjcf.visual[0].colour == (1.0, 0.0, 0.0, 1.0)
+
+
+def test_a_urdf_may_be_called_xml(tmp_path):
+    write_stl(tmp_path / "part.stl")
+    robot = Robot.load(written(tmp_path, f"<!-- <mujoco> -->{URDF}", "urdf.xml"))
+    assert robot.mjcf is None
+    assert robot.joint_names == ("one", "two")
 
 
 def test_a_run_names_an_mjcf_relative_to_its_own_folder(tmp_path):

@@ -300,6 +300,11 @@ def test_single_precision_is_computed_in_double():
     assert np.array_equal(link_twists(robot, q, v), exact)
 
 
+def test_no_samples_have_no_twists():
+    robot = Robot.load("panda")
+    assert link_twists(robot, np.empty((0, 9)), np.empty((0, 9))).shape == (0, 10, 6)
+
+
 @pytest.mark.parametrize("name", ["talos", "kinova", "pr2", "tiago", "romeo", "hyq", "iris"])
 def test_twists_are_those_of_pinocchio(name):
     """kinova and tiago have continuous joints, tiago and pr2 prismatic ones."""
@@ -417,3 +422,8 @@ def test_a_range_is_as_it_is_written_and_none_if_it_is_empty_or_without_end(
 )
 def test_a_speed_is_as_it_is_written_and_none_if_no_joint_moves_so(tmp_path, written, speed):
     assert limits(tmp_path, f"lower='-1' upper='1' velocity='{written}'").velocity == speed
+
+
+def test_a_joint_that_turns_for_ever_has_a_speed_and_no_range(tmp_path):
+    found = limits(tmp_path, "lower='-1' upper='1' velocity='3'", kind="continuous")
+    assert found == Limits(-inf, inf, 3.0, turns=True)

@@ -2,6 +2,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pinocchio
 import pytest
 from chains import chain
 
@@ -178,6 +179,12 @@ def test_shapes_lie_around_the_origin_with_the_documented_number_of_triangles():
         assert (np.linalg.norm(np.cross(*np.diff(drawn, axis=1).swapaxes(0, 1)), axis=1) > 0).all()
 
 
+def test_a_capsule_of_a_urdf_is_drawn(tmp_path):
+    capsule = visual('<geometry><capsule radius="0.3" length="0.7"/></geometry>')
+    drawn = triangles(robot(tmp_path, arm=capsule))[0]
+    np.testing.assert_array_equal(drawn, urdf.capsule(0.3, 0.7))
+
+
 @pytest.mark.parametrize(
     ("geometry", "message"),
     [
@@ -206,6 +213,15 @@ def test_collision_geometry_is_not_read_if_every_link_has_a_visual(tmp_path):
         triangles(built, "collision")
     with pytest.raises(GeometryError, match="<cone> is not known"):
         triangles(robot(tmp_path, arm=visual(BOX) + broken), "auto")
+
+
+def test_angles_of_all_three_axes_turn_as_pinocchio_turns_them(tmp_path):
+    point = mesh_of(np.array([[[1, 0, 0], [0, 2, 0], [0, 0, 3]]]), tmp_path)
+    origin = '<origin rpy="0.4 -0.7 1.1" xyz="1 2 3"/>'
+    links = triangles(robot(tmp_path, arm=visual(MESH.format(point, 'scale="2 3 -4"'), origin)))
+    turn = pinocchio.rpy.rpyToMatrix(0.4, -0.7, 1.1)
+    expected = np.diag([2.0, 6.0, -12.0]) @ turn.T + [1, 2, 3]
+    np.testing.assert_allclose(links[0][0], expected, rtol=1e-12)
 
 
 def test_what_is_fixed_to_the_world_is_a_piece_and_collision_fills_in(tmp_path):
@@ -253,6 +269,37 @@ def test_links_are_named_after_the_child_of_their_joint():
         for joint, link in enumerate(link_names(built), start=1):
             joint_name = built.model.names[int(joint)]
             assert child.get(joint_name, "root") == link or joint_name == "root_joint"
+
+
+AREAS = {
+    "talos": (8.115, 4.594, 4.620),
+    "anymal": (4.571, 2.115, 2.733),
+    "anymal_c": (3.746, 4.487, 3.235),
+    "go2": (1.346, 0.869, 0.766),
+    "icub": (2.119, 1.146, 1.223),
+    "baxter": (8.765, 7.139, 7.211),
+    "laikago": (1.210, 1.207, 0.997),
+    "hextilt": (0.735, 1.374, 0.735),
+    "hyq": (3.036, 3.580, 2.968),
+    "kinova": (0.438, 0.472, 0.372),
+    "romeo": (2.704, 1.979, 2.646),
+    "iris": (0.955, 0.419, 1.076),
+    "panda": (0.922, 0.847, 0.847),
+    "ur5": (0.735, 0.648, 0.733),
+    "ur10": (1.251, 1.064, 1.131),
+    "pr2": (8.519, 7.814, 6.658),
+    "simple_humanoid": (0.0, 0.0, 18.554),
+    "human": (2.299, 2.238, 0.0),
+}
+"""Area of the visuals, their hulls and the collision shapes, base included, by another reader."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", AREAS)
+def test_areas_of_known_robots(name):
+    built = Robot.load(name, floating_base=True)
+    found = [sum(areas(triangles(built, kind))) for kind in ("visual", "hull", "collision")]
+    assert np.allclose(found, AREAS[name], rtol=0, atol=5.1e-4)
 
 
 @pytest.mark.slow
@@ -352,6 +399,12 @@ def twists(surface, count=200):
     form = moments(surface).mean_square
     drawn = np.linalg.solve(np.linalg.cholesky(form).T, random.standard_normal((6, count)))
     return drawn / np.sqrt(np.einsum("is,ij,js->s", drawn, form, drawn))
+
+
+def test_surface_of_a_box():
+    exact = moments(urdf.box(1.0, 2.0, 3.0) + np.array([5.0, 6.0, 7.0]))
+    assert exact.area == pytest.approx(22.0, rel=1e-15)
+    assert np.allclose(exact.centroid, [5.0, 6.0, 7.0], rtol=1e-15)
 
 
 def test_a_sphere_that_spins_has_no_normal_speed():
@@ -461,6 +514,23 @@ def test_mean_distances_of_a_square_sheet_are_the_known_ones():
         assert 1000 < len(cloud.points) < 10_000
 
 
+def test_a_point_on_the_axis_of_a_motion_rests():
+    random = np.random.default_rng(7)
+    points, turns = random.standard_normal((2, 100, 3))
+    moving = np.concatenate((-np.cross(turns, points), turns), axis=1).T
+    speeds = point_speeds(points, moving)
+    assert 0.0 <= np.diag(speeds).max() < 1e-6
+    expected = np.linalg.norm(moving[:3].T + np.cross(turns, points[3]), axis=1)
+    np.testing.assert_allclose(speeds[3], expected, atol=1e-6)
+
+
+def test_no_rotation_has_no_speed():
+    form = moments(SHAPES["box"]).mean_square[3:, 3:]
+    rounded = rounding(form)
+    table = tabulate(fine(SHAPES["box"]), rounded)
+    assert not turning_speed(table, rounded, np.zeros((3, 2))).any()
+
+
 CASES = {
     "panda_visual": ("panda", "visual"),
     "solo12_visual": ("solo12", "visual"),
@@ -478,6 +548,13 @@ def test_what_was_computed_once_is_not_computed_again(tmp_path, monkeypatch):
     assert np.array_equal(first.lever, again.lever)
     assert np.array_equal(first.mean_square_normal, again.mean_square_normal)
     assert np.array_equal(first.links[1].points.points, again.links[1].points.points)
+
+
+def test_a_surface_prints_its_links(tmp_path):
+    text = str(Surface.of(chain(tmp_path, "revolute")))
+    assert "link1" in text
+    assert "area [m²]" in text
+    assert "0.4000" in text.splitlines()[-1]
 
 
 @pytest.mark.skipif(not GOLDEN.is_dir(), reason="golden/surface is not beside this checkout")
