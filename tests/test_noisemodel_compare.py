@@ -31,6 +31,7 @@ from noisemodel.compare import (
     COMPARED,
     Comparison,
     check_length,
+    contrasts,
     ends,
     excitation,
     log_spectra,
@@ -86,6 +87,15 @@ def comparison(panda):
 def test_each_kind_is_as_itself(comparison):
     assert np.allclose(np.diag(comparison.correlation), 1.0, rtol=1e-12)
     assert not np.diag(comparison.distance).any()
+
+
+def test_shares_are_those_of_the_noise(panda, comparison):
+    robot, surface = panda
+    for kind in ("paper", "normal"):
+        noise = extended(robot, surface, *swinging(robot), kind)
+        found = comparison.shares[comparison.kinds.index(kind)]
+        assert np.allclose(found, noise.shares()[0], rtol=1e-12)
+    assert np.allclose(comparison.shares.sum(axis=1), 1.0, rtol=1e-12)
 
 
 def test_the_simplified_noise_shares_by_joint_velocity(panda, comparison):
@@ -157,6 +167,20 @@ def test_silence_is_compared_without_a_warning(panda):
     assert not found.distance.any()
     assert not found.shares.any()
     assert not found.terms.any()
+    assert np.isnan(contrasts(found.pressure, found.time, RATE, [Block(0.1, 0.2, "jerk")])).all()
+
+
+def test_without_events_or_without_anything_else_there_is_no_contrast(comparison):
+    whole = Block(-1.0, 3.0, "fall")
+    for events in ((), (whole,), (Block(0.1, 0.2, "jerk"), whole)):
+        found = contrasts(comparison.pressure, comparison.time, RATE, events)
+        assert found.shape == (len(comparison.kinds), len(events))
+        assert np.isnan(found).all()
+    during = (comparison.time > 1.0) & (comparison.time < 1.2)
+    alone = contrasts(
+        comparison.pressure * during, comparison.time, RATE, [Block(0.9, 1.3, "jerk")]
+    )
+    assert (alone == np.inf).all()
 
 
 @pytest.mark.parametrize(
@@ -243,6 +267,11 @@ def test_on_one_joint_all_models_agree(tmp_path):
     np.testing.assert_allclose(found.distance, 0.0, atol=1e-6)
     np.testing.assert_allclose(found.contrast, found.contrast[[0]] * np.ones((4, 1)), rtol=1e-6)
     np.testing.assert_allclose(found.pressure, found.pressure[[0]] * np.ones((4, 1)), rtol=1e-9)
+
+
+def test_pressures_have_a_root_mean_square_of_one(tmp_path):
+    found = alone(arm(tmp_path, "revolute", "continuous"))
+    np.testing.assert_allclose(np.mean(found.pressure**2, axis=1), 1.0, rtol=1e-12)
 
 
 def test_a_vibration_is_as_loud_as_it_is_above_the_ripple(tmp_path):
@@ -386,6 +415,19 @@ def test_robots_that_are_left_out_are_named_with_the_reason(urdfs, tmp_path):
     assert str(first) == f"{missing}: left out: there is no such URDF file"
 
 
+def test_progress_passes_each_robot_on(urdfs):
+    passed = []
+
+    def progress(results, *, total):
+        for result in results:
+            passed.append((result.name, total))
+            yield result
+
+    found = compare([*urdfs, "tallos"], kinds=FEW, progress=progress)
+    assert passed == [(name, 3) for name in (*urdfs, "tallos")]
+    assert len(found) == 2
+
+
 def test_where_every_robot_is_left_out_the_reasons_remain():
     found = compare("tallos", kinds=FEW)
     assert (list(found), str(found)) == ([], str(found.left_out[0]))
@@ -432,11 +474,11 @@ def test_what_cannot_be_compared_is_refused_before_any_work(options, error, mess
         compare(**({"robots": ["panda", "go2"]} | options))
 
 
-@pytest.fixture(scope="module")
-def thrice(urdfs):
-    """One robot that makes the excitation of three seeds."""
-    seeds = (compare(urdfs[1], kinds=THREE, seed=seed) for seed in (0, 1, 2))
-    return Comparisons(tuple(one for (one,) in seeds))
+def test_the_motion_is_the_excitation_of_seed_0_unless_another_is_named(urdfs):
+    found, zero, one = (alone(urdfs[1], THREE, **seed) for seed in ({}, {"seed": 0}, {"seed": 1}))
+    np.testing.assert_array_equal(found.pressure, zero.pressure)
+    assert not np.array_equal(found.pressure, one.pressure)
+    assert found.rate == 4000.0
 
 
 def test_medians_pass_over_what_is_not_there():
@@ -671,6 +713,13 @@ def test_velocities_are_the_slopes_of_positions(robot):
     np.testing.assert_allclose(slope, run.velocity[1:], atol=1e-7)
 
 
+def test_the_near_joint_carries_most_and_the_far_one_ends_the_chain(tmp_path):
+    robot = chain(tmp_path, "prismatic", "revolute", "continuous", "revolute", "prismatic")
+    assert ends(robot) == ("joint2", "joint4")
+    assert ends(chain(tmp_path, "prismatic")) == ()
+    assert ends(chain(tmp_path, "revolute")) == ("joint1",)
+
+
 def tree(folder, *joints, **options):
     """A robot of links that are named after their joints: name, kind and parent link of each."""
     text = '<robot name="tree"><link name="base"/>'
@@ -711,6 +760,23 @@ def test_the_ends_of_a_robot_with_branches(tmp_path):
     assert ends(tree(tmp_path, *continuous[:-1])) == ("c", "d2")
 
 
+def test_each_joint_has_its_own_limits(tmp_path):
+    robot = tree(
+        tmp_path,
+        ("a", "continuous", "base", -1, 1, 4),
+        ("b", "b2", "base"),
+        ("b2", "revolute", "b", -1, 3, 0),
+        ("c", "prismatic", "base", 0.5, 0.6, 0.25),
+        ("d", "revolute", "c", 2, 2, 7),
+        floating_base=True,
+    )
+    assert robot.joint_names == ("a", "b2", "c", "d")
+    bounds = limits(robot)
+    np.testing.assert_allclose(bounds.centre, [0.0, 1.0, 0.55, 0.0])
+    np.testing.assert_allclose(bounds.range, [np.inf, 4.0, 0.1, np.inf])
+    np.testing.assert_array_equal(bounds.speed, [4.0, np.inf, 0.25, 7.0])
+
+
 def test_a_joint_uses_nine_tenths_of_its_range_or_of_its_speed(tmp_path):
     robot = tree(
         tmp_path,
@@ -740,6 +806,37 @@ def test_the_speed_of_all_joints_jumps_by_half_and_the_jump_decays(tmp_path):
     assert {-1.0, 1.0} == set(np.sign(step))
     gone = run.velocity[first] - run.velocity[first + round(0.03 * run.rate)]
     np.testing.assert_allclose(gone * np.sign(step), 0.5 * (1 - np.exp(-1)), atol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            {"rate": 400.0},
+            "the excitation at 400 Hz, expected above 400 Hz: its shakes have up to 200 Hz$",
+        ),
+        ({"rate": np.inf}, "the excitation at inf Hz, expected above 400 Hz"),
+        ({"rate": np.nan}, "the excitation at nan Hz, expected above 400 Hz"),
+    ],
+)
+def test_a_rate_that_cannot_be_is_refused(tmp_path, options, message):
+    with pytest.raises(NoiseModelError, match=message):
+        excitation(chain(tmp_path, "revolute"), **options)
+
+
+def test_an_excitation_has_its_events_at_any_rate_and_names_its_robot(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute", "revolute")
+    slow, fast = excitation(robot, rate=401.0), excitation(robot)
+    assert [(each.label, each.start, each.stop) for each in fast.blocks] == [
+        ("shake-near", 1.0, 1.8),
+        ("shake-far", 2.6, 3.4),
+        ("jerk", 4.6, 4.8),
+    ]
+    assert slow.blocks == fast.blocks
+    assert (len(slow.time), len(fast.time)) == (2406, 24_000)
+    assert slow.meta == {"scenario": "excitation", "seed": 0}
+    assert slow.robot == str(robot.path)
+    assert excitation(Robot.load("ur5"), rate=500.0).robot == "ur5"
 
 
 def test_the_motion_of_a_seed_is_that_of_every_version(tmp_path):

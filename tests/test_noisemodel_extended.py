@@ -45,6 +45,15 @@ def test_power_is_impedance_times_area_times_squared_speed(solo):
         assert np.allclose(noise.total, noise.power.sum(axis=1), rtol=1e-14)
 
 
+def test_standstill_is_silent(solo):
+    robot, surface = solo
+    q, v = motion(robot)
+    noise = extended(robot, surface, q, 0 * v)
+    assert not noise.power.any()
+    assert (noise.level == -np.inf).all()
+    assert not noise.shares().any()
+
+
 def test_pressure_halves_with_twice_the_distance_and_spreads_over_a_sphere(solo):
     robot, surface = solo
     noise = extended(robot, surface, *motion(robot))
@@ -97,6 +106,15 @@ def test_shares_add_up_link_by_link_and_stretch_by_stretch(solo):
     assert np.allclose(shares[0] * first + shares[1] * second, shares[2] * whole, rtol=1e-12)
     assert np.array_equal(noise.shares(), shares[2:])
     assert noise.shares([]).shape == (0, len(surface.links))
+
+
+def test_the_shares_of_a_silent_stretch_are_zero(solo):
+    robot, surface = solo
+    q, v = motion(robot)
+    v[:10] = 0
+    shares = extended(robot, surface, q, v).shares([(0, 10), (0, 40)])
+    assert not shares[0].any()
+    assert shares[1].sum() == pytest.approx(1.0)
 
 
 def test_a_link_without_geometry_radiates_nothing(tmp_path):
@@ -172,6 +190,26 @@ def test_standstill_has_no_speed(every, kind):
     assert not surface_speed(robot, surface, q, 0 * v, kind).any()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_twice_the_velocity_is_twice_the_speed(every, kind):
+    robot, surface = every
+    q, v = motion(robot)
+    once = surface_speed(robot, surface, q, v, kind)
+    assert once[:, surface.area > 0].any()
+    twice = surface_speed(robot, surface, q, -2 * v, kind)
+    assert np.allclose(twice, 2 * once, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_noise_does_not_depend_on_the_place_of_the_base(every, kind):
+    robot, surface = every
+    q, v = motion(robot)
+    elsewhere = q.copy()
+    elsewhere[:, :7] = [5, -3, 1, 0.5, 0.5, 0.5, 0.5]
+    here = surface_speed(robot, surface, q, v, kind)
+    assert np.array_equal(surface_speed(robot, surface, elsewhere, v, kind), here)
+
+
 def test_the_sum_of_the_terms_is_above_the_mean_which_is_below_the_root_mean_square(every):
     robot, surface = every
     q, v = motion(robot, samples=200)
@@ -195,6 +233,16 @@ def test_a_revolute_joint_alone_drives_its_link_at_rate_times_lever(tmp_path):
     assert np.allclose(c, np.abs(v) * surface.lever, rtol=1e-12)
     mean = surface_speed(robot, surface, q, v, "mean")
     assert np.allclose(c, mean, rtol=5e-4)
+
+
+def test_a_mimic_joint_drives_its_link_by_its_multiple_of_the_leader(tmp_path):
+    mimic = '<mimic joint="joint1" multiplier="-3" offset="0.2"/>'
+    robot = Robot.load(chain(tmp_path, "revolute", "revolute", follow=mimic).path, mimic=True)
+    surface = Surface.of(robot)
+    q, v = motion(robot)
+    _, b, c = terms(robot, surface, q, v)
+    assert np.allclose(c, np.abs(v) * [1, 3] * surface.lever, rtol=1e-12)
+    assert b[:, 1].all()
 
 
 def test_a_floating_base_is_carried_by_nothing():
@@ -304,6 +352,14 @@ def test_a_shaking_sphere_radiates_as_acoustics_has_it(tmp_path, frequency):
     assert radiated / full == pytest.approx(x**4 / (4 + x**4), rel=0.03)
 
 
+def test_uniform_motion_is_silent_from_the_first_sample_on(tmp_path):
+    robot, surface = slider(tmp_path, SPHERE)
+    q = np.linspace(0, 1, 500)[:, None]
+    loud = extended(robot, surface, q, np.full_like(q, 3.0))
+    radiated = extended(robot, surface, q, np.full_like(q, 3.0), efficiency="dipole", rate=RATE)
+    assert radiated.total.max() < 1e-20 * loud.total.max()
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_chunks_carry_on_with_the_filters_of_the_chunk_before(tmp_path, kind, monkeypatch):
     robot, surface = slider(tmp_path, SPHERE, BAR)
@@ -391,6 +447,14 @@ def test_desired_velocities_without_positions_are_taken_where_the_robot_is():
     np.testing.assert_allclose(both.vibration, once.vibration, rtol=1e-12)
 
 
+def test_the_loudest_link_is_the_one_with_the_largest_peak():
+    found = link_noise(arm_run(rattling=3))
+    peaks = found.vibration.max(axis=0)
+    assert [peaks[link] for link in found.loudest] == sorted(peaks, reverse=True)
+    assert "wrist_1_joint" in found.movers[found.loudest[0]]
+    assert 200 <= found.vibration[:, found.loudest[0]].argmax() < 250
+
+
 def test_vibration_has_no_running_mean_of_a_tenth_of_a_second():
     velocity = np.random.default_rng(5).normal([1.0, -2.0], size=(300, 2))
     valid = np.ones(300, dtype=bool)
@@ -433,6 +497,10 @@ def test_each_link_names_the_joints_that_move_it():
     assert movers["wrist_3_link"] == set(Robot.load("ur5").joint_names)
 
 
+def test_a_long_run_has_no_more_bins_than_a_short_one():
+    assert len(link_noise(arm_run(rate=100.0, seconds=120.0)).time) <= 4001
+
+
 SIZE = 20
 
 
@@ -452,6 +520,13 @@ def vibration(robot, samples, *, moving):
         time = np.arange(samples)[:, None] / 1000
         q[:, 7:] += 0.5 * np.sin(2 * np.pi * time + np.arange(robot.nq - 7))
     return q, v
+
+
+def test_gaps_count_neither_as_motion_nor_as_rest():
+    valid = np.ones(60, dtype=bool)
+    valid[10:40] = False
+    found = second_moments(np.full((60, 1), 3.0), valid, size=SIZE)
+    np.testing.assert_allclose(found.ravel(), [9.0, 0.0, 9.0])
 
 
 def averaged(robot, surface, q, v, kind):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -23,6 +24,21 @@ def test_the_noise_of_one_joint_is_its_speed():
 
 def test_measured_and_desired_motion_add_as_powers():
     assert simplified(np.array([[3.0, 0.0]]), np.array([[0.0, 4.0]])) == [5.0]
+
+
+@given(VELOCITIES, st.floats(0, 10))
+def test_noise_grows_with_the_speed(velocity, factor):
+    faster = simplified(factor * velocity, factor * velocity)
+    assert np.allclose(faster, factor * simplified(velocity, velocity), rtol=1e-12, atol=1e-12)
+
+
+@given(VELOCITIES)
+def test_noise_does_not_depend_on_signs_and_order_of_joints(velocity):
+    assert np.allclose(simplified(velocity), simplified(-velocity[:, ::-1]), rtol=1e-14)
+
+
+def test_the_desired_joints_may_be_fewer_than_the_measured():
+    assert np.allclose(simplified(np.ones((4, 30)), np.ones((4, 24))), np.sqrt(54), rtol=1e-15)
 
 
 def test_a_floating_base_counts_with_its_six_velocities():
@@ -106,6 +122,11 @@ def test_a_run_without_desired_velocities_has_all_measured_joints():
     alone = nm.by_joint(run())
     assert alone.keys() == {"measured_joints"}
     np.testing.assert_array_equal(alone["measured_joints"], velocity.T)
+
+
+def test_a_run_of_which_no_desired_joint_is_measured_has_nothing_joint_by_joint():
+    others = run(velocity_desired=desired[:, :1], desired_joint_names=("tool",))
+    assert nm.by_joint(others) == {}
 
 
 def test_joints_have_the_norms_of_their_run():
