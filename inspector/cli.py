@@ -350,9 +350,10 @@ def main() -> None:
     """Run the command line: expected errors end as one line with 2, 3 or 5, bugs with 70."""
     # Matrices are small here: more threads mostly wait, and waiting takes processor time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Of a file that it cannot write, rerun tells in several lines; we do in one.
     os.environ["MPLBACKEND"] = "agg"  # pictures are files: whatever is set may not be installed
-    os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
+    # Of a file or a viewer that takes nothing, rerun tells in several lines; we do in one.
+    quiet = ("re_log_encoding", "re_sdk", "re_grpc_client", "re_quota_channel")
+    os.environ.setdefault("RUST_LOG", ",".join(["warn", *(f"{each}=off" for each in quiet)]))
     output = _standard_output()
     for stream in (sys.stdout, sys.stderr):  # names of files need not be text in their encoding
         if isinstance(stream, io.TextIOWrapper):

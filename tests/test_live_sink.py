@@ -1,7 +1,10 @@
 import http.server
 import os
+import re
+import signal
 import socket
 import subprocess
+import sys
 import threading
 import time
 from contextlib import closing, contextmanager
@@ -11,9 +14,11 @@ import pytest
 
 import inspector
 from inspector.live import SinkError
+from inspector.live import session as session_module
 from inspector.live import sink as module
 from inspector.live.sink import Sink
 from inspector.recording import viewer
+from inspector.recording.unstable import has_end
 
 
 def free_port():
@@ -31,7 +36,7 @@ def receiver(home):
         try:
             while not process.ended() and not module._listens("127.0.0.1", port):
                 time.sleep(0.1)
-            yield port, process.kill
+            yield port, process
         finally:
             process.kill()
 
@@ -44,14 +49,14 @@ def test_a_viewer_that_ends_is_warned_of_once_and_labels_continue(tmp_path, monk
     monkeypatch.setattr(module, "CHECK_INTERVAL", 0.0)
     monkeypatch.setattr(module, "CONNECT_TIMEOUT", 60.0)
     warned = []
-    with receiver(tmp_path) as (port, end):
+    with receiver(tmp_path) as (port, process):
         session = inspector.LiveSession(
             1000.0, connect=f"127.0.0.1:{port}", on_warning=warned.append
         )
         session.push(**second(0.0))
         assert warned == []
         assert len(session.summary.delays) == 7
-        end()
+        process.kill()
         for first in range(1, 4):
             session.push(**second(first))
         summary = session.close()
@@ -63,16 +68,94 @@ def test_a_viewer_that_ends_is_warned_of_once_and_labels_continue(tmp_path, monk
     assert f"shown by the viewer at 127.0.0.1:{port}" in str(summary)
 
 
-def test_a_file_is_continued_when_the_viewer_beside_it_ends(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "CHECK_INTERVAL", 0.0)
+@pytest.mark.parametrize("saved", [False, True])
+def test_a_late_viewer_is_told_once_and_sent_more_when_it_has_caught_up(
+    tmp_path, monkeypatch, saved
+):
+    monkeypatch.setattr(module, "CHECK_INTERVAL", 0.05)
     monkeypatch.setattr(module, "CONNECT_TIMEOUT", 60.0)
-    path, warned = tmp_path / "live.rrd", []
-    with receiver(tmp_path) as (port, end):
+    monkeypatch.setattr(module, "FLUSH_TIMEOUT", 60.0)
+    for place in (module, session_module):
+        monkeypatch.setattr(place, "LATE", 0.5)
+    path, warned = tmp_path / "live.rrd" if saved else None, []
+    with receiver(tmp_path) as (port, process):
         session = inspector.LiveSession(
             1000.0, connect=str(port), save=path, on_warning=warned.append
         )
         session.push(**second(0.0))
-        end()
+        os.killpg(process.process.pid, signal.SIGSTOP)
+        first = push_until(session, 1, lambda: warned)
+        late = session.summary.warnings["samples that were not sent to a late viewer"]
+        os.killpg(process.process.pid, signal.SIGCONT)
+        last = push_until(session, first, lambda: not session._sink.late)
+        summary = session.close()
+    (line,) = warned
+    assert re.fullmatch(
+        r"the viewer is \d+ s behind the stream, noticed at \d+\.\d{3} s: it is sent nothing"
+        r" until it has caught up",
+        line,
+    )
+    assert 0 < late <= 1000 * first
+    assert len(summary.warnings) == 1
+    assert summary.samples == 1000 * last
+    assert saved or len(summary.delays) < sum(summary.labels.values())
+    if saved:
+        assert has_end(path)
+
+
+def push_until(session, first, holds):
+    """Push seconds until something holds."""
+    while not holds() and first < 500:
+        session.push(**second(first))
+        time.sleep(0.02)
+        first += 1
+    return first
+
+
+def test_a_viewer_that_never_catches_up_holds_neither_the_file_nor_the_end_up(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(module, "CONNECT_TIMEOUT", 60.0)
+    monkeypatch.setattr(module, "FLUSH_TIMEOUT", 0.2)
+    path = tmp_path / "live.rrd"
+    with receiver(tmp_path) as (port, process):
+        code = f"""
+import os, signal, numpy as np, inspector
+from inspector.live import sink
+sink.FLUSH_TIMEOUT = 0.2
+session = inspector.LiveSession(1000.0, connect="{port}", save="{path}", on_warning=print)
+os.killpg({process.process.pid}, signal.SIGSTOP)
+for first in range(100):
+    session.push(velocity=np.ones((1000, 2)), time=first + np.arange(1000) / 1000)
+print(session.close().samples)
+"""
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, check=True, text=True, timeout=300
+        )
+    assert done.stdout.splitlines()[-1] == "100000"
+    assert has_end(path)
+
+
+def test_sessions_at_one_viewer_are_recordings_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "CONNECT_TIMEOUT", 60.0)
+    with receiver(tmp_path) as (port, _):
+        sinks = [Sink(connect=str(port)) for _ in range(2)]
+        identities = {each.open[0].get_recording_id() for each in sinks}
+        assert len(identities) == 2
+        for each in sinks:
+            each.close()
+
+
+def test_a_file_is_continued_when_the_viewer_beside_it_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "CHECK_INTERVAL", 0.0)
+    monkeypatch.setattr(module, "CONNECT_TIMEOUT", 60.0)
+    path, warned = tmp_path / "live.rrd", []
+    with receiver(tmp_path) as (port, process):
+        session = inspector.LiveSession(
+            1000.0, connect=str(port), save=path, on_warning=warned.append
+        )
+        session.push(**second(0.0))
+        process.kill()
         session.push(**second(1.0))
         summary = session.close()
     assert summary.warnings == {"samples that the viewer may not have shown": 1000}

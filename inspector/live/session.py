@@ -27,7 +27,7 @@ from inspector.live.samples import (
     rows_of,
     widths_of,
 )
-from inspector.live.sink import Sink
+from inspector.live.sink import LATE, Sink
 from inspector.logs.wrongrobot import LONG, LimitWatch, check_joints
 from inspector.recording.camera import Camera
 from inspector.reference.levels import LONGEST, Levels, LevelStream
@@ -41,6 +41,8 @@ POSES = 40
 """Poses of the robot in a message to a file without a viewer: 2 s."""
 MAX_DELAYS = 100_000
 """Delays that are kept, of the latest labels."""
+UNSEEN = "samples that the viewer may not have shown"
+LATE_SAMPLES = "samples that were not sent to a late viewer"
 
 
 class Worker:
@@ -140,25 +142,31 @@ class Worker:
                 self._skip(int(lost[first]))
             self._label(time[piece], received[piece], motion[piece], valid[piece])
             self._draw_piece(time[piece], valid[piece], {n: s[piece] for n, s in signals.items()})
-        if self._sink.alive:
+        if self._sink.open:
             self._draw_batch(time, motion, valid, signals)
         self._check_limits(signals)
         self._unconfirmed += len(time)
+        if self._sink.behind > LATE and not (self._sink.late or self._sink.gone):
+            self._drawing.changes(self._lane.end())  # nothing is shown while it is late
         if self._sink.check_viewer():
             self._unconfirmed = 0
-        if self._sink.gone:
+        if self._sink.gone or self._sink.late:
             self.note_unseen()
 
     def note_unseen(self) -> None:
-        """Count the samples since a viewer was last known to be there."""
-        rest = "the file goes on" if self._sink.alive else "samples are only labelled and counted"
-        line = f"the viewer is gone or hangs, noticed at {self._now:.3f} s: {rest}"
-        self._warnings.note("samples that the viewer may not have shown", line, self._unconfirmed)
+        """Count the samples since the viewer was last known to be there and to keep up."""
+        kind, state = UNSEEN, "is gone or hangs"
+        rest = "the file goes on" if self._sink.saved else "samples are only labelled and counted"
+        if self._sink.late:
+            kind, state = LATE_SAMPLES, f"is {self._sink.late:.0f} s behind the stream"
+            rest = "it is sent nothing until it has caught up"
+        line = f"the viewer {state}, noticed at {self._now:.3f} s: {rest}"
+        self._warnings.note(kind, line, self._unconfirmed)
         self._unconfirmed = 0
 
     def remark(self, line: str) -> None:
         """Show a line among the events."""
-        if self._sink.alive:
+        if self._sink.open:
             self._drawing.event(self._now, line)
 
     def finish(self) -> None:
@@ -170,7 +178,7 @@ class Worker:
                 line = f"more than {LONGEST / 60:.0f} minutes are not compared as a whole"
                 self._warnings.note("streams too long for a reference", line)
         self._news.update(self.findings, float("inf"))
-        if self._sink.alive:
+        if self._sink.open:
             self._drawing.changes(self._lane.end())
             if self.labeller.classes and self._start is not None:
                 self._drawing.findings(self._now, self.findings, ())
@@ -221,7 +229,7 @@ class Worker:
         labels = replace(labels, label=labels.raw)
         self.counts.update(labels.label.tolist())
         changes = self._lane.take(labels)
-        if self._sink.alive:
+        if self._sink.open:
             self._drawing.labels(labels)
             self._drawing.changes(changes)
             last = len(received) - 1 - back
@@ -243,7 +251,7 @@ class Worker:
         return merged(*events, *lasting)
 
     def _tell(self, event: Event, over: bool) -> None:
-        if self._sink.alive and not over:
+        if self._sink.open and not over:
             self._drawing.found(event)
         if self._on_finding is not None:
             self._on_finding(event, over)
@@ -252,7 +260,7 @@ class Worker:
         """Draw the spectrogram and the levels of links of a stretch without missing samples."""
         velocity = np.where(valid[:, None], signals["velocity"], 0.0)
         columns = self._spectrogram.push(velocity, valid, float(time[-1]) + 1.0 / self._rate)
-        if not self._sink.alive:
+        if not self._sink.open:
             return
         self._drawing.spectrogram(*columns)
         if self._links is not None and self._robot is not None:

@@ -4,18 +4,20 @@ import os
 import re
 import socket
 import time
+import uuid
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from http.client import HTTPConnection, HTTPException
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
+from typing import Any, cast
 
 import rerun as rr
 
 from inspector.live.samples import SinkError
-from inspector.recording import viewer
-from inspector.recording.run import require_whole
+from inspector.recording import unstable, viewer
+from inspector.recording.run import writing
 from inspector.recording.viewer import HOST, free_port
-from noisemodel.files import replacing
 
 APPLICATION = "inspector-live"
 """Another than recordings of whole runs have: the viewer keeps a layout for each application."""
@@ -28,6 +30,8 @@ CONNECT_TIMEOUT = 2.0
 SERVICE = "/rerun.sdk_comms.v1alpha1.MessageProxyService/Knock"
 CHECK_INTERVAL = 1.0
 """Time between checks that the viewer is still there, in [s]."""
+LATE = 10.0
+"""How far behind the stream a viewer may be before it is sent no more, in [s]."""
 FLUSH_TIMEOUT = 5.0
 """How long the last messages may take, in [s]."""
 MEMORY = "2GB"
@@ -43,72 +47,113 @@ class Sink:
     Attributes:
         recording: What to log into.
         where: Its sinks, in words.
+        saved: Whether a file is written.
         gone: Whether there was a viewer that is there no more.
+        late: How far the viewer was behind at the last check, if more than ``LATE``, in [s].
     """
 
     def __init__(
         self, save: Path | None = None, connect: str | None = None, *, overwrite: bool = False
     ) -> None:
-        self._address: tuple[str, int] | None = None
-        self.gone = False
-        self._temporary: Path | None = None
-        self._file, self._checked = save is not None, time.monotonic()
-        sinks: list[rr.GrpcSink | rr.FileSink] = []
+        self.saved, self.gone, self.late = save is not None, False, 0.0
+        self._address = (HOST, PORT)
+        self._checked = time.monotonic()
+        self._asked: float | None = None  # since when the viewer lacks what had been sent by then
+        self._ended = Event()
+        # Of one identity, but two: a viewer that is late or hangs would hold the file up.
+        self._file = self._viewer = None
+        identity = uuid.uuid4().hex
         places = []
         with ExitStack() as stack:
             if save is not None:
-                self._temporary = stack.enter_context(replacing(save, overwrite=overwrite))
-                sinks.append(rr.FileSink(self._temporary))
+                file = writing(save, identity, application=APPLICATION, overwrite=overwrite)
+                self._file = stack.enter_context(file)
                 places.append(f"written to {save}")
             if connect is not None or save is None:
                 host, port = self._address = _viewer(connect)
-                sinks.append(rr.GrpcSink(f"rerun+http://{host}:{port}/proxy"))
+                self._viewer = rr.RecordingStream(APPLICATION, recording_id=identity)
+                self._viewer.set_sinks(rr.GrpcSink(f"rerun+http://{host}:{port}/proxy"))
                 places.append(f"shown by the viewer at {host}:{port}")
+                Thread(target=self._follow, args=(self._viewer,), daemon=True).start()
             self._stack = stack.pop_all()
         self.where = " and ".join(places)
-        self.recording = rr.RecordingStream(APPLICATION)
-        self.recording.set_sinks(*sinks)
+        self.recording: rr.RecordingStream = cast(Any, _Tee(self))
 
     @property
-    def alive(self) -> bool:
-        """Whether any sink takes what is logged: a file does when its viewer is gone."""
-        return self._file or not self.gone
+    def open(self) -> list[rr.RecordingStream]:
+        """The sinks that take what is logged: a file does when its viewer is gone or late."""
+        viewer = None if self.gone or self.late else self._viewer
+        return [each for each in (self._file, viewer) if each is not None]
 
     @property
     def watched(self) -> bool:
         """Whether there is, or was, a viewer."""
-        return self._address is not None
+        return self._viewer is not None
+
+    @property
+    def behind(self) -> float:
+        """Since when the viewer has not taken all that it had been sent by then, in [s]."""
+        asked = self._asked
+        return 0.0 if asked is None else time.monotonic() - asked
 
     def check_viewer(self) -> bool:
-        """Check once in a second that the viewer is there."""
-        if self._address is None or self.gone or time.monotonic() - self._checked < CHECK_INTERVAL:
+        """Check once in a second that the viewer is there and keeps up."""
+        if self._viewer is None or self.gone or time.monotonic() - self._checked < CHECK_INTERVAL:
             return False
-        self._checked = time.monotonic()
+        self._checked, behind = time.monotonic(), self.behind
         self.gone = not _listens(*self._address)
-        return not self.gone
+        self.late = behind if behind > LATE else 0.0
+        return not (self.gone or self.late)
+
+    def _follow(self, viewer: rr.RecordingStream) -> None:
+        """Note since when the viewer is behind, until the recording ends."""
+        while not self._ended.wait(CHECK_INTERVAL):
+            self._asked = self._asked or time.monotonic()
+            with suppress(RuntimeError):  # it takes longer, or is gone
+                viewer.flush(timeout_sec=CHECK_INTERVAL)
+                self._asked = None
 
     def discard(self) -> None:
         """End a recording in which there is nothing, and leave no file."""
+        self._leave()
         with suppress(_Discarded), self._stack:
-            self.recording.disconnect()
             raise _Discarded
 
     def close(self) -> bool:
         """Send what waits, and put the file in its place if it is whole."""
-        taken = not self.gone
-        with self._stack:
+        taken = not (self.gone or self.late)
+        if taken and self._viewer is not None:
             try:
-                if self.alive:
-                    self.recording.flush(timeout_sec=FLUSH_TIMEOUT)
-            except RuntimeError:  # it is gone, or hangs, or the file cannot be written
-                taken = self._address is None
-            # Rerun waits for a viewer that hangs, for good; we do not.
-            ending = Thread(target=self.recording.disconnect, daemon=True)
+                self._viewer.flush(timeout_sec=FLUSH_TIMEOUT)
+            except RuntimeError:
+                taken = False
+        self._leave()
+        self._stack.close()
+        return taken
+
+    def _leave(self) -> None:
+        """Leave the viewer; of one that hangs or is late rerun waits without end."""
+        self._ended.set()
+        if self._viewer is not None:
+            ending = Thread(target=self._viewer.disconnect, daemon=True)
             ending.start()
             ending.join(FLUSH_TIMEOUT)
-            if self._temporary is not None and not ending.is_alive():
-                require_whole(self._temporary)
-        return taken
+            if ending.is_alive():
+                unstable.abandon(self._viewer)
+
+
+class _Tee:
+    """Logs into every sink that is open, by the methods of a recording."""
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        def log(*args: Any, **options: Any) -> None:
+            for each in self._sink.open:
+                getattr(each, name)(*args, **options)
+
+        return log
 
 
 class _Discarded(Exception):  # noqa: N818

@@ -185,7 +185,7 @@ def log_shapes(recording: rr.RecordingStream, tree: UrdfTree, *, coloured: bool)
     drawn = tree.stream()
     if coloured:
         drawn = drawn.drop(components=[":".join(pair) for pair in COLOURED.items()])
-    rr.send_chunks(drawn, recording=recording)
+    recording.send_chunks(drawn)
 
 
 def log_colours(

@@ -25,10 +25,12 @@ PATIENCE = 3.0
 
 
 @contextmanager
-def writing(path: Path, identity: str, *, overwrite: bool = False) -> Iterator[rr.RecordingStream]:
+def writing(
+    path: Path, identity: str, *, application: str = APPLICATION, overwrite: bool = False
+) -> Iterator[rr.RecordingStream]:
     """Write a recording for as long as the block lasts."""
     with replacing(path, overwrite=overwrite) as temporary:
-        recording = rr.RecordingStream(APPLICATION, recording_id=identity[:32])
+        recording = rr.RecordingStream(application, recording_id=identity[:32])
         recording.save(temporary)
         yield recording
         if _flushed(recording, temporary):

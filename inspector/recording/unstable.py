@@ -375,10 +375,10 @@ def _lists(kind: Any, flat: Any, count: int) -> Any:
 
 
 def abandon(recording: rr.RecordingStream) -> None:
-    """Leave a recording whose file cannot be written as it is until the process ends.
+    """Leave a recording as it is until the process ends: nothing takes what it holds.
 
-    Rerun 0.41 may wait for the file without end: to disconnect, to delete the recording, and when
-    the process ends.
+    Rerun 0.41 may wait for a file or a viewer without end: to disconnect, to delete the recording,
+    and when the process ends.
     """
     for each in (recording, recording.inner):
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(each))
