@@ -66,6 +66,13 @@ def test_a_model_is_measured_by_runs_outside_of_its_training_set(classifier):
     assert found.calibration_error is None
 
 
+def test_frames_are_those_that_were_always_counted(classifier):
+    found = nc.assess(classifier, fresh())
+    dataset = nc.Dataset.of(fresh(), PROFILE, training=False)
+    whole = nc.evaluate(classifier, dataset)
+    assert found.evaluation.confusion.tolist() == whole.confusion.tolist()
+
+
 def test_measures_with_intervals_are_the_measures_without():
     cut = ["ok", "impact", "ok"], ["ok", "ok", "highaccelerations"], ["ok", "impact", "impact"]
     runs = [
@@ -81,6 +88,15 @@ def test_measures_with_intervals_are_the_measures_without():
         for label, each in found.frames[name].items():
             assert each.value == pytest.approx(measures[name][label] or each.value, nan_ok=True)
             assert np.isnan(each.value) == (measures[name][label] is None), (name, label)
+
+
+def test_perfect_predictions_score_one_with_the_exact_bound_of_their_groups():
+    found = measure(many(6))
+    for each in (found.frames["balanced_accuracy"], found.frames["failure_recall"]):
+        assert each.value == each.high == 1.0
+    assert found.frames["failure_recall"].low == pytest.approx(0.025 ** (1 / 12))
+    bounds = [0.025 ** (1 / runs) for runs in (18, 6, 6)]
+    assert found.frames["balanced_accuracy"].low == pytest.approx(np.mean(bounds))
 
 
 def test_runs_of_the_training_set_are_refused_or_listed(classifier):
@@ -152,6 +168,12 @@ def test_everything_goes_through_json(classifier):
     assert plain["format"] == "noise-evaluation/3"
     assert plain["calibration_error"] is plain["reliability"] is None
     assert plain["protocol"]["pooled"]["false_alarms_per_hour"]["value"] == 0.0
+
+
+def test_lines_are_short_and_lists_too():
+    text = str(measure(many(40, ["ok"] * 47)))
+    assert max(map(len, text.splitlines())) <= 120
+    assert "and 75 more" in text
 
 
 def test_probabilities_differ_from_margins():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
+from noiseclassifier import classifier as classifier_module
 
 RATE = 1000.0
 RANDOM = np.random.default_rng(11)
@@ -114,6 +115,16 @@ def test_noisytests_profile_loses_the_first_sample_and_the_tail():
     np.testing.assert_allclose(labels.start, 0.001 + 0.1 * np.arange(7))
 
 
+def test_labels_do_not_depend_on_chunks(ours, monkeypatch):
+    signal = np.concatenate([noise(4.0, hum=0.2), knocks(6.0), noise(5.0)])
+    whole = ours.classify(signal, RATE)
+    monkeypatch.setattr(classifier_module, "CHUNK", 7)
+    chunked = ours.classify(signal, RATE)
+    assert len(whole) > classifier_module.CHUNK
+    assert np.array_equal(whole.label, chunked.label)
+    np.testing.assert_allclose(whole.scores, chunked.scores, atol=1e-9)
+
+
 def test_labels_are_those_of_the_frames_alone(ours):
     signal = np.concatenate([knocks(2.0), noise(2.0)])
     frames = nc.frame(signal, length=400, hop=100)
@@ -153,6 +164,11 @@ def test_all_gaps_are_no_labels(ours):
 def test_signals_that_cannot_be_classified_are_refused(ours, signal, reason):
     with pytest.raises(nc.SignalError, match=reason):
         ours.classify(signal, RATE)
+
+
+def test_validity_of_another_length_is_refused(ours):
+    with pytest.raises(nc.SignalError, match=r"validity of shape \(3,\)"):
+        ours.classify(np.zeros(500), RATE, valid=np.ones(3, bool))
 
 
 @pytest.mark.parametrize("rate", [970.0, 10_000.0, 0.0, float("nan")])

@@ -92,6 +92,16 @@ def test_a_tone_lands_in_its_band(frequency):
     assert low <= frequency <= high
 
 
+@pytest.mark.parametrize("rate", [333.0, 1000.0, 48_000.0])
+def test_log_bands_of_a_tone_are_equal_at_any_rate(rate):
+    def mean(profile):
+        return nc.features(tone(profile, 61.0), profile)[0, 4]
+
+    low, high = nc.LogBands().at(rate), nc.LogBands().at(10_000.0)
+    # At 333 Hz, a window of 34 samples is a fiftieth longer than 0.1 s.
+    assert mean(low) == pytest.approx(mean(high), abs=0.08)
+
+
 def test_log_bands_do_not_depend_on_the_time_of_a_burst():
     profile = nc.LogBands().at(10_000.0)
     burst = RANDOM.standard_normal(300)
@@ -132,6 +142,14 @@ def test_the_first_quick_band_alone_holds_the_speed():
 def test_a_steady_level_has_no_deviation():
     pooled = pool(np.full((2, 13, 5), 4.0))
     assert np.array_equal(pooled, np.full((2, 3, 5), [[4.0], [4.0], [0.0]]))
+
+
+def test_three_signals_that_grow_alike_change_the_level_of_the_whole_frame_alone():
+    profile = nc.GENERAL.at(1000.0)
+    frames = 1e6 * RANDOM.standard_normal((2, 3, 400))
+    change = nc.features(8.0 * frames, profile) - nc.features(frames, profile)
+    np.testing.assert_allclose(change[:, :-1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(change[:, -1], np.log(8.0), atol=1e-6)
 
 
 def test_a_signal_that_grows_alone_is_relative_to_the_frame_and_to_its_neighbours():

@@ -225,6 +225,18 @@ def test_trees_have_the_probabilities_of_scikit_learn_where_features_are_missing
     )
 
 
+def test_a_part_of_the_frames_may_lack_a_feature_that_others_have():
+    recordings = [
+        recording(rate, label, seed)
+        for seed, rate in enumerate((80.0, 125.0, 125.0, 500.0))
+        for label in ("ok", "oscillations")
+    ]
+    model = nc.General.train(nc.Examples.joined(nc.frames_of(recordings, RECIPE)), RECIPE)
+    shaken = signals(500.0, "oscillations", seed=12)
+    labels = model.at(500.0, shaken).classify(shaken, 500.0)
+    assert "oscillations" in {event.label for event in labels.events()}
+
+
 # --- the file
 
 

@@ -86,6 +86,11 @@ def test_one_frame_above_the_threshold_is_enough_beside_a_gap():
         assert (found.debounced == "impact").sum() == kept
 
 
+def test_the_only_frame_of_a_signal_is_enough():
+    assert labels("I").debounced.tolist() == ["impact"]
+    assert labels("i").debounced.tolist() == ["ok"]
+
+
 def test_without_an_alarm_threshold_each_failure_frame_is_flagged():
     plain = replace(labels("i.iOi"), above_threshold=None)
     assert plain.debounced is plain.label
@@ -123,6 +128,11 @@ def test_the_score_of_a_frame_is_that_of_its_label_and_none_of_unknown_ones():
     found.scores[:] = np.arange(found.scores.size).reshape(found.scores.shape)
     place = found.classes.index("impact")
     assert [found.score(frame) for frame in range(3)] == [0.0, len(CLASSES) + place, 0.0]
+
+
+def test_no_frames_are_confirmed_of_none():
+    none = np.zeros(0, dtype=bool)
+    assert confirmed(none, none, none).shape == (0,)
 
 
 @pytest.mark.parametrize(

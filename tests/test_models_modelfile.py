@@ -219,6 +219,7 @@ def test_members_that_an_archive_says_are_packed_are_refused(path, place, value)
     ("name", "kind", "shape", "content"),
     [
         ("intercept", "<f8", (4,), 3 * b"12345678"),
+        ("intercept", "<f8", (10**12,), b"12345678"),
         ("intercept", "<f8", (2,), 3 * b"12345678"),
         ("coefficients", "<f8", (-1, -3), 3 * b"12345678"),
         ("manifest", "<U0", (), b""),

@@ -8,7 +8,7 @@ import pytest
 from addedfaults import with_fault
 
 import noiseclassifier as nc
-from noiseclassifier.profile import HIGHEST, columns
+from noiseclassifier.profile import HIGHEST, LOWEST, columns
 from noiseclassifier.signals import JOINTS, MOTION
 
 GENERAL = Path(__file__).parents[1] / "models" / "general.npz"
@@ -160,6 +160,13 @@ def test_numbers_of_a_recipe_lie_from_0_to_the_highest_rate(name, right, wrong):
             nc.LogBands.of(recipe | {name: value})
 
 
+def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
+    assert (LOWEST, HIGHEST) == (80.0, 10_000.0)  # as docs/classifier.md promises
+    recipe = nc.ANY.bound(LOWEST)
+    assert recipe.edges[-1] <= LOWEST / 2
+    assert nc.ANY.bound(HIGHEST).edges[-1] <= 5000.0
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
@@ -189,6 +196,21 @@ def test_numbers_of_a_recipe_lie_from_0_to_the_highest_rate(name, right, wrong):
         ),
         ({"bands": "log", "edges": (1, 2)}, r"edges is \(1, 2\), expected a tuple of float"),
         ({"leaves": 1}, "leaves is 1, expected 2 to 16"),
+        ({"leaves": -3}, "leaves is -3, expected 2 to 16"),
+        ({"length": -4000}, "length is -4000, expected more than 0"),
+        ({"learning_rate": 0.0}, "learning_rate is 0.0, expected more than 0"),
+        ({"alarm": 1.5}, "alarm is 1.5, expected a probability below 1"),
+        ({"rate": True}, "rate is True, expected a finite number"),
+        ({"classes": ()}, "classes are none, expected 'ok' and others, each once"),
+        ({"bands": "log", "edges": (9.0,)}, r"edges are \(9.0,\), expected two or more"),
+        (
+            {"quick_window": 64},
+            "quick_window is 64 with quick_stride 0 and bands 'adjacent', expected",
+        ),
+        (
+            {"bands": "log", "edges": (15.0, 30.0), "quick_window": 5000, "quick_stride": 9},
+            "window of 5000 samples is longer than a frame of 4000",
+        ),
         ({"quick_window": -1}, "quick_window is -1, expected 0 or more"),
         ({"signals": ()}, "signals are none, expected one or more, each once"),
         ({"signals": ("noise", "noise")}, "signals are noise, noise, expected one or more, each"),

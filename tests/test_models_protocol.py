@@ -92,6 +92,18 @@ def test_a_robot_with_ten_times_as_many_runs_weighs_the_same():
     assert few.pooled["recall_injected"].value < lots.pooled["recall_injected"].value
 
 
+def test_how_much_time_a_robot_has_does_not_change_its_weight():
+    def runs(hours):
+        long = blocks((0.0, 5.0 * hours, "ok"))
+        calm = [reporting("panda/good-000", long, [], seconds=5.0 * hours)]
+        return [*calm, reporting("go2/good-000", GOOD, [("impact", 1.0, 1.5)])]
+
+    one, other = measured(runs(1)), measured(runs(20))
+    assert one.alike["false_alarms_per_hour"].value == pytest.approx(3600.0 / 5.0 / 2)
+    assert other.alike["false_alarms_per_hour"].value == pytest.approx(3600.0 / 5.0 / 2)
+    assert other.pooled["false_alarms_per_hour"].value < one.pooled["false_alarms_per_hour"].value
+
+
 def test_two_findings_on_one_fault_are_one_found_and_one_false():
     twice = [("impact", 2.0, 2.1), ("impact", 2.15, 2.2)]
     counts = Outcome.of(reporting("a", IMPACT, twice)).counts

@@ -324,6 +324,14 @@ def test_a_test_class_without_training_frames_is_named():
         measure([PROFILES["paper"]], trial)
 
 
+def test_a_class_of_a_single_recording_cannot_be_folded():
+    recordings = [recording(n, nc.CLASSES if n == 2 else ("ok", "impact")) for n in range(4)]
+    trial = Trial(recordings, folds([each.name for each in recordings], 2))
+    reason = "of walk-2 are checked; give more recordings of it, or take other folds"
+    with pytest.raises(nc.DatasetError, match=reason):
+        measure([PROFILES["paper"]], trial)
+
+
 @pytest.fixture(scope="module")
 def stand_in(lola):
     """The recordings of the stand-in."""
