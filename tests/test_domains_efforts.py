@@ -14,6 +14,7 @@ from noiseclassifier.scenarios.errors import DatasetError
 from noiseclassifier.scenarios.faults import Imperfections
 from noiseclassifier.scenarios.logs import logged, visible
 from noiseclassifier.scenarios.motions import PUSH
+from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.simulation import (
     GOOD,
     WIDE_RECIPE,
@@ -55,6 +56,15 @@ def real_panda():
     model = real_model(model, tool.frame, np.array(tool.point), imperfections)
     friction = np.array(drawn.robot.drives.friction) * imperfections.friction
     return model, friction * drawn.domain.stiction
+
+
+def test_efforts_are_those_of_the_drives_in_the_runs_form_and_may_be_missing(twin):
+    assert (twin.effort.dtype, twin.effort.shape) == (np.float32, twin.velocity.shape)
+    limit = np.array(WIDE["panda"].drives.torque) * twin.meta["domain"]["torque_limit"]
+    assert twin.meta["effort_limit"] == pytest.approx(limit)
+    assert (np.abs(twin.effort) <= limit * 1.001).all()
+    without = replace(twin, effort=None, meta={**twin.meta, "recipe": "domains 1"})
+    assert logged(without, without, PLAIN, seed=1).effort is None
 
 
 def test_the_effort_of_a_standing_arm_is_its_gravity_torque_within_friction(twin):

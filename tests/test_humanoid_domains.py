@@ -75,8 +75,8 @@ def test_its_data_are_those_of_its_description(robot):
 
 
 @pytest.mark.slow
-def test_it_stands_sways_squats_and_waves():
-    robot = ROMEO
+@pytest.mark.parametrize("robot", [G1_MOVING, ROMEO], ids=lambda robot: robot.name)
+def test_it_stands_sways_squats_and_waves(robot):
     way, run = simulated(robot, SQUAT, duration=3.0)
     assert np.ptp(way.centre[:, 2]) > 0.03 * robot.centre
     deep = run.base_pose[::STEPS, 2] - run.base_pose[0, 2]
@@ -122,9 +122,10 @@ def test_the_weight_is_between_both_feet_at_a_stop():
     assert centred(stopping) > 1.0
 
 
-def test_upper_bodies_start_at_rest_and_stay_within_their_reach():
+@pytest.mark.parametrize("seed", range(3))
+def test_upper_bodies_start_at_rest_and_stay_within_their_reach(seed):
     for way in ("still", "sines", "reaches"):
-        upper = planned(G1_MOVING, Stand(upper=replace(WAVE, way=way))).upper
+        upper = planned(G1_MOVING, Stand(upper=replace(WAVE, way=way)), seed).upper
         np.testing.assert_allclose(upper[0], G1_MOVING.rest[LEGS:], atol=1e-12)
         assert np.abs(np.diff(upper[:3], axis=0)).max() < 1e-5
         assert (np.abs(upper - G1_MOVING.rest[LEGS:]) <= np.add(G1_MOVING.reach, 1e-9)).all()

@@ -20,6 +20,7 @@ G1 = WIDE["g1"]
 TALOS = WIDE["talos"]
 
 SEED, SHORT = 1, 4.0
+HUMANOIDS = pytest.mark.parametrize("robot", [TALOS, G1], ids=lambda robot: robot.name)
 
 
 def imperfect(robot, seed=3):
@@ -39,8 +40,8 @@ def stood(robot, duration=0.3):
     return record(scenery, drives, encoder_error=quiet, sensor_error=error), like
 
 
-def test_a_standing_robot_stands_still_and_the_ground_bears_its_weight():
-    robot = TALOS
+@HUMANOIDS
+def test_a_standing_robot_stands_still_and_the_ground_bears_its_weight(robot):
     motion, like = stood(robot)
     assert np.abs(motion.velocity).max() < 0.02
     assert np.ptp(motion.base_pose[:, :3], axis=0).max() < 2e-3
@@ -50,8 +51,8 @@ def test_a_standing_robot_stands_still_and_the_ground_bears_its_weight():
     assert (motion.contact.min(axis=0) > 0.3 * weight).all()
 
 
-def test_mujoco_and_pinocchio_agree_on_soles_and_centre_of_mass_along_a_walk():
-    robot = G1
+@HUMANOIDS
+def test_mujoco_and_pinocchio_agree_on_soles_and_centre_of_mass_along_a_walk(robot):
     model = reduced_model(robot)
     way = plan(robot, Walk(way="curve"), np.random.default_rng(0), SHORT)
     built = scene(robot, way, Faults(), imperfect(robot)).model
@@ -117,6 +118,12 @@ def test_it_walks_upright_to_where_its_steps_lead(straight):
     assert np.abs(turn[:3]).max() < 0.03
 
 
+def test_the_drives_stay_far_from_their_limits(straight):
+    assert np.abs(straight.effort).max() < 0.6 * max(TALOS.drives.torque)
+    error = straight.velocity - straight.velocity_desired
+    assert error.std() < 0.02
+
+
 def test_an_obstacle_is_an_early_contact_and_an_impact(obstacle):
     (event, *_) = obstacle.meta["events"]
     assert event["label"] == "impact"
@@ -151,11 +158,28 @@ def test_planned_velocities_are_those_that_drives_follow_where_nothing_disturbs(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "way"),
-    [("talos", "curve"), ("g1", "directions")],
+    [("g1", "straight"), ("talos", "curve"), ("g1", "directions"), ("talos", "spot")],
 )
 def test_humanoids_walk_every_way_without_an_event(robot, way):
-    run = simulated(robot, way, 2)
+    run = simulated(robot, way, 2, duration=SHORT)
     assert [block.label for block in run.blocks] == ["ok"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scenario", "failure"),
+    [
+        ("obstacle-heel", "impact"),
+        ("obstacle-toe", "impact"),
+        ("obstacle-left", "impact"),
+        ("limit-cycle", "oscillations"),
+    ],
+)
+def test_obstacles_under_any_part_of_a_sole_are_impacts_and_too_high_gains_oscillate(
+    scenario, failure
+):
+    run = simulated("talos", scenario, 2, duration=SHORT)
+    assert failure in {block.label for block in run.blocks}
 
 
 @pytest.mark.slow

@@ -7,15 +7,18 @@ import pytest
 
 from noiseclassifier.scenarios.motions import TICK, times
 from noiseclassifier.scenarios.quadruped import (
+    ACROSS,
     CHANGE,
     GAITS,
     LANDING,
+    NEAR,
     TOP,
     TROT,
     beats,
     footholds,
     height_of,
     loads,
+    progress_of,
     steer,
     swings,
 )
@@ -40,6 +43,15 @@ def test_pairs_swing_in_turn_and_never_together(timing):
     assert 5.5 - 0.55 <= timing[-1].touch <= 5.5
 
 
+def test_cycles_vary_by_the_given_share(timing):
+    cycles = np.diff([beat.begin for beat in timing[::2]])
+    assert cycles.min() >= 0.45
+    assert cycles.max() <= 0.55
+    assert np.ptp(cycles) > 0.02
+    stands = [two.lift - one.touch for one, two in zip(timing, timing[2:], strict=False)]
+    assert np.mean(stands) / cycles.mean() == pytest.approx(TROT.duty, abs=0.02)
+
+
 def test_the_feet_share_the_weight_and_feet_in_the_air_bear_none(timing):
     load, share = loads(TIME, timing), swings(TIME, timing)
     np.testing.assert_allclose(load.sum(axis=1), 1, atol=1e-12)
@@ -60,6 +72,11 @@ def test_a_foot_goes_up_and_comes_down_softly():
     assert slope[-1] == pytest.approx(-LANDING / (1 - TOP), rel=1e-2)
     assert slope.min() < 10 * slope[-1]
     assert np.abs(np.diff(slope)).max() < 0.01
+
+
+def test_a_foot_is_over_its_place_before_it_may_touch():
+    assert progress_of(np.array([0.0, ACROSS, 1.0])) == pytest.approx([0, 1, 1])
+    assert height_of(np.array([NEAR]))[0] < 0.35
 
 
 def test_feet_come_down_at_the_neutral_point(timing):
@@ -122,6 +139,15 @@ def test_a_walk_lifts_one_foot_at_a_time_in_the_lateral_sequence():
     assert sequence[:8] == [2, 0, 3, 1] * 2  # rear left, front left, rear right, front right
     inside = (TIME > 1.5) & (TIME < 4.5)
     assert swing[inside].mean() == pytest.approx(1 - GAITS["walk"].duty, abs=0.02)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_the_feet_on_the_ground_share_the_weight_in_every_gait(name):
+    gait = GAITS[name]
+    timing = _timing(gait)
+    load, share = loads(TIME, timing, gait), swings(TIME, timing, gait)
+    np.testing.assert_allclose(load.sum(axis=1), 1, atol=1e-12)
+    assert not load[share < 1].any()
 
 
 def _timing(gait):

@@ -7,6 +7,7 @@ import pytest
 
 from noiseclassifier.scenarios import SCENARIOS, faults
 from noiseclassifier.scenarios.arm import plan as arm_plan
+from noiseclassifier.scenarios.domains import MOTIONS
 from noiseclassifier.scenarios.humanoid import plan as humanoid_plan
 from noiseclassifier.scenarios.motions import Picks, Trot, Walk
 from noiseclassifier.scenarios.quadruped import plan as quadruped_plan
@@ -14,7 +15,7 @@ from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.table import FAULTS
 
 TIME = np.arange(70_000) * 1e-4
-TALOS, G1, GO2, SOLO12 = (WIDE[name] for name in ("talos", "g1", "go2", "solo12"))
+TALOS, G1, GO2, SOLO12, ANYMAL = (WIDE[name] for name in ("talos", "g1", "go2", "solo12", "anymal"))
 PICKS = arm_plan(WIDE["panda"], Picks(), np.random.default_rng(0), 7.0)
 
 
@@ -157,7 +158,9 @@ def test_faults_of_talos_have_the_sizes_of_the_paper_and_a_smaller_robot_has_sma
         assert abs(small) == pytest.approx(G1.size**power * size)
 
 
-@pytest.mark.parametrize(("side", "axis", "sign"), [("heel", 0, -1), ("left", 1, 1)])
+@pytest.mark.parametrize(
+    ("side", "axis", "sign"), [("heel", 0, -1), ("toe", 0, 1), ("left", 1, 1), ("right", 1, -1)]
+)
 def test_an_obstacle_lies_only_under_the_named_part_of_a_sole(side, axis, sign):
     plan = walk()
     (box,) = drawn(f"obstacle-{side}", plan).boxes
@@ -193,7 +196,7 @@ def test_one_obstacle_is_never_under_the_last_step():
         assert contact.start < last
 
 
-@pytest.mark.parametrize("robot", [GO2, SOLO12], ids=lambda robot: robot.name)
+@pytest.mark.parametrize("robot", [GO2, SOLO12, ANYMAL], ids=lambda robot: robot.name)
 def test_obstacles_and_forces_of_a_quadruped_are_in_its_own_units(robot):
     plan = trot(robot)
     boxes = drawn("obstacle-full", plan).boxes
@@ -238,3 +241,19 @@ def test_every_fault_of_wide_domains_has_events_in_time_or_loads():
             found = draw(defect, plan)
             drawn_of_it = chain(found.events, found.loads)
             assert all(0 <= each.start < plan.duration for each in drawn_of_it)
+
+
+@pytest.mark.parametrize("family", ["humanoid", "quadruped"])
+def test_every_fault_of_wide_domains_is_drawn_for_every_motion(family):
+    robots = [robot for robot in WIDE.values() if robot.family == family]
+    plan_of = {"humanoid": humanoid_plan, "quadruped": quadruped_plan}[family]
+    for seed in range(12):
+        rng, robot = np.random.default_rng(seed), robots[seed % len(robots)]
+        plan = plan_of(robot, MOTIONS[family](rng, seed / 11, robot), rng, 3.0)
+        for name, defect in FAULTS[family].items():
+            found = defect(rng, plan)
+            assert all(event.start < event.stop for event in found.events), name
+            if family == "quadruped":
+                assert all(box.top <= 0.65 * np.ptp(plan.places[..., 2]) for box in found.boxes)
+            elif "obstacle" in name or name == "edge":
+                assert not found.boxes or len(plan.contacts) > 2

@@ -15,6 +15,7 @@ from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset, simulation
 from noiseclassifier.scenarios.dataset import Folder, Task
 from noiseclassifier.scenarios.faults import multisine, obstacles
+from noiseclassifier.scenarios.labels import deviation
 from noiseclassifier.scenarios.motions import Picks
 from noiseclassifier.scenarios.simulation import digest
 from noiseclassifier.scenarios.table import Case
@@ -37,7 +38,9 @@ FAILURE = {
 @pytest.fixture(scope="module")
 def runs() -> dict[tuple[str, int], Run]:
     return {
-        (name, seed): simulated("panda", name, seed, duration=SHORT)
+        (name, seed): simulated(
+            "panda", 5 if name == "obstacle-full" else name, seed, duration=SHORT
+        )
         for seed, names in zip(SEEDS, (("straight", *FAILURE), ("straight",)), strict=True)
         for name in names
     }
@@ -69,10 +72,15 @@ def test_a_healthy_robot_is_ok_all_the_time(runs, seed):
 
 
 @pytest.mark.slow
-def test_full_runs_of_other_arms_contain_their_failure_too():
-    for robot, name in zip(cycle(["ur5", "ur10"]), ("obstacle-full", "platform"), strict=False):
-        assert FAILURE[name] in labels(simulated(robot, name, 1)), name
-    assert labels(simulated("ur10", "directions", 1)) == {"ok"}
+def test_runs_of_other_arms_contain_their_failure_too():
+    for robot, (name, failure) in zip(cycle(["ur5", "ur10"]), FAILURE.items(), strict=False):
+        # A limit cycle grows from rounding, which differs between processors: not in every seed is
+        # it felt, and in which it is depends on the machine.
+        seeds = (1, 2, 3) if name == "limit-cycle" else (1,)
+        found = (labels(simulated(robot, name, seed, duration=SHORT)) for seed in seeds)
+        assert any(failure in each for each in found), name
+    for robot, name in zip(cycle(["ur5", "ur10"]), HEALTHY, strict=False):
+        assert labels(simulated(robot, name, 1, duration=SHORT)) == {"ok"}, name
 
 
 def test_runs_of_a_seed_are_the_same_until_the_defect_acts(runs):
@@ -104,6 +112,16 @@ def test_each_defect_shows_first_in_the_stage_where_it_acts(runs):
         assert first_difference(run, healthy, stage) < min([np.inf, *before])
 
 
+def test_after_an_obstacle_the_tool_is_quieter_than_when_a_good_one_moves(runs):
+    run, healthy = runs["obstacle-full", 5], runs["straight", 5]
+    fast = deviation(run.velocity, healthy.velocity, rate=run.rate)
+    good = deviation(healthy.velocity, np.zeros_like(healthy.velocity), rate=run.rate)
+    (impact,) = (block for block in run.blocks if block.label == "impact")
+    after = np.linalg.norm(fast[run.time > impact.stop + 0.05], axis=1).max()
+    assert after < np.linalg.norm(good, axis=1).max()
+    assert after < 0.25 * np.linalg.norm(fast, axis=1).max()
+
+
 def test_a_run_states_how_it_was_made(runs, tmp_path):
     run = runs["obstacle-full", 5]
     run.save(tmp_path / "run.npz")
@@ -113,6 +131,9 @@ def test_a_run_states_how_it_was_made(runs, tmp_path):
     assert (loaded.meta["scenario"], loaded.meta["seed"]) == ("obstacle-full", 5)
     assert (loaded.rate, loaded.velocity.shape, loaded.robot) == (10_000, (30_000, 7), "panda")
     assert set(loaded.stages) == {"planned", "commanded"}
+    assert loaded.meta["number"] == 5
+    for signal in (run.position, run.velocity, run.velocity_desired, run.position_desired):
+        assert signal.dtype == np.float32
 
 
 def test_reported_velocities_are_the_slopes_of_reported_positions(runs):
@@ -129,6 +150,18 @@ def test_the_robot_stays_within_its_speed_and_torque(runs):
         run = runs["straight", seed]
         assert (np.abs(run.velocity).max(axis=0) < [2.175] * 4 + [2.61] * 3).all()
         assert (np.abs(run.effort).max(axis=0) < [87.0] * 4 + [12.0] * 3).all()
+
+
+def test_a_healthy_robot_makes_noise(runs):
+    still = runs["straight", 5].velocity[:1000]
+    assert 1e-4 < still.std() < 5e-3
+    assert np.unique(still[:, 0]).size > 100
+
+
+def test_seeds_differ_in_motion_and_in_robot(runs):
+    one, two = (runs["straight", seed] for seed in SEEDS)
+    assert one.meta["imperfections"] != two.meta["imperfections"]
+    assert np.abs(one.position_desired[-1] - two.position_desired[-1]).max() > 0.01
 
 
 def test_an_unplanned_contact_is_recorded_with_its_impulse(runs):

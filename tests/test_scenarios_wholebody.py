@@ -10,13 +10,14 @@ from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.world import WholeBody, reduced_model
 
 G1 = WIDE["g1"]
+TALOS = WIDE["talos"]
 
 LEVEL = np.eye(3)
 
 
-@pytest.fixture
-def robot():
-    return G1
+@pytest.fixture(params=[TALOS, G1], ids=lambda robot: robot.name)
+def robot(request):
+    return request.param
 
 
 def body_of(robot):
@@ -116,6 +117,6 @@ def test_too_many_joints_are_refused():
 
 
 def test_a_missing_frame_is_named():
-    model = reduced_model(WIDE["talos"])
+    model = reduced_model(TALOS)
     with pytest.raises(ScenarioError, match="no frame 'paw' to stand on; it has .*sole"):
         WholeBody(model, [Sole("paw", (0.1, 0.05))], pin.neutral(model))
