@@ -186,6 +186,12 @@ def test_a_stream_too_long_to_be_kept_is_compared_while_it_runs(
     assert "elbow" in out.splitlines()[0]
     assert "minutes are not compared as a whole" in err
     assert live(*options, text=streamed(simulate.run("pick", 5)), rate=1000)[0] == 0
+    # The last second, after which there are no 3 s more.
+    late = simulate.run("pick", 5)
+    now = late.time > late.time[-1] - 1.0
+    late.velocity[now, 2] += 0.1 * np.sin(2 * np.pi * 62 * late.time[now])
+    status, out, _ = live(*options, text=streamed(late), rate=1000)
+    assert (status, "elbow" in out.splitlines()[0]) == (1, True)
 
 
 def test_each_stretch_of_a_stream_is_compared_with_the_same_motion(accepted, simulate):

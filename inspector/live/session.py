@@ -172,12 +172,12 @@ class Worker:
     def finish(self) -> None:
         """Show what waits, and tell of findings that last to the end."""
         self.labeller.finish()
+        self._news.update(self.findings, float("inf"))
         if self._stream is not None:
             self.levels = self._stream.finish()
             if self._stream.too_long:
                 line = f"more than {LONGEST / 60:.0f} minutes are not compared as a whole"
                 self._warnings.note("streams too long for a reference", line)
-        self._news.update(self.findings, float("inf"))
         if self._sink.open:
             self._drawing.changes(self._lane.end())
             if self.labeller.classes and self._start is not None:

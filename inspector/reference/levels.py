@@ -192,8 +192,11 @@ class LevelStream:
             self._add({n: signals[n][first:stop] for n in names}, known[first:stop])
 
     def finish(self) -> Levels | None:
-        """Levels of what came; None of less than a frame, or of more than an hour."""
-        if not self.too_long and len(self._valid) > 1:
+        """Levels of what came; None of less than a frame, or of more than an hour.
+
+        Of more than an hour, the last samples are told as those before were.
+        """
+        if len(self._valid) > 1:
             self._measure(len(self._valid), None)
         if self.too_long or not self._parts:
             return None
@@ -270,7 +273,7 @@ class LevelStream:
             self._origin = part.guide[0] if self._origin is None else self._origin
             self._parts.append(part)
             self._frames += len(part.guide)
-            if self._tell is not None and frames is not None:
+            if self._tell is not None and (frames is not None or self.too_long):
                 self._tell(self._joined(self._parts[-LATEST:]))
 
 
