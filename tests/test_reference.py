@@ -174,6 +174,7 @@ def test_a_run_that_is_cut_or_frozen_fails_and_says_so(own, simulate):
     run.cut(0.0, 2.0).save(own / "runs" / "pick-4.npz")
     out = call("classify", own / "runs" / "pick-4.npz")[1]
     assert "missing: end of the run (required: 2.0 of 6.0 s)" in out
+    assert "Nothing stands out" not in out
     still = np.repeat(run.position[:1], len(run.time), axis=0)
     frozen = replace(run, position=still, velocity=0 * run.velocity)
     frozen.save(own / "runs" / "pick-5.npz")

@@ -233,7 +233,6 @@ def beside(
     return replace(
         verdict,
         status=status,
-        message=re.sub(NOTHING, "", verdict.message) if failing else verdict.message,
         events=events,
         evidence=evidence,
         beside=known,
@@ -418,7 +417,8 @@ def judge(
         expectations="" if reference is None else str(reference.path),
     )
     if judged.failing or judged.missing:
-        return replace(judged, status=Status.FINDINGS)
+        message = re.sub(NOTHING, "", verdict.message)
+        return replace(judged, status=Status.FINDINGS, message=message)
     if verdict.status is Status.FINDINGS:
         return replace(judged, status=Status.OK)
     return judged
