@@ -217,7 +217,9 @@ class Repository:
         known = {"inputs": inputs, "github.event_name": event, "github.repository": "o/r"}
         known |= {"github.event.pull_request.number": "7", "runner.temp": str(temp)}
         status, said = 0, ""
-        for step in read("examples/ci/github.yml")["jobs"]["noise"]["steps"]:
+        jobs = read("examples/ci/github.yml")["jobs"].values()
+        (chosen,) = [each for each in jobs if holds(each["if"], known, 0)]
+        for step in chosen["steps"]:
             action = step.get("uses", "")
             if not action.startswith("OWNER/"):
                 steps_of = [] if action else [step]
@@ -301,11 +303,38 @@ def test_runs_are_accepted_changed_shown_and_accepted_after_review(job):
 
 
 def test_the_workflow_uses_inputs_that_the_action_has():
-    (used,) = [
-        step for step in read("examples/ci/github.yml")["jobs"]["noise"]["steps"] if "with" in step
-    ]
-    assert set(used["with"]) <= set(read("action.yml")["inputs"])
+    workflow = read("examples/ci/github.yml")
+    for each in workflow["jobs"].values():
+        (used,) = [step for step in each["steps"] if "with" in step]
+        assert set(used["with"]) <= set(read("action.yml")["inputs"])
     assert len((ROOT / "examples/ci/github.yml").read_text().splitlines()) <= 15
+
+
+def test_only_the_job_that_accepts_may_write_to_the_repository():
+    workflow = read("examples/ci/github.yml")
+    assert workflow["permissions"]["contents"] == "read"
+    jobs = workflow["jobs"]
+    may = {name: each.get("permissions") for name, each in jobs.items()}
+    assert may == {"noise": None, "accept": {"contents": "write"}}
+    known = {"inputs": {}, "github.event_name": "pull_request"}
+    assert not holds(jobs["accept"]["if"], known, 0)
+
+
+@pytest.mark.slow
+def test_the_action_accepts_into_the_reference_that_it_compares_with(job):
+    (job.folder / "logs").rename(job.folder / "arm")
+    git = ("git", "-c", "user.name=a", "-c", "user.email=a@b")
+    assert job(*git, "init", "--quiet", "--bare", "origin.git").returncode == 0
+    assert job(*git, "init", "--quiet", ".").returncode == 0
+    assert job(*git, "remote", "add", "origin", "origin.git").returncode == 0
+    first = ("--reason", "first", "--in-ci", "--output", "arm/reference")
+    assert job("inspector", "accept", "arm/demo.npz", *first).returncode == 0
+    variables = {"GITHUB_ACTOR": "ann", "GITHUB_REF": "refs/heads/main"}
+    done, _ = check(job, RUNS="arm/demo.npz", ACCEPT="again", **variables)
+    assert done.returncode == 0, done.stdout + done.stderr
+    shown = job(*git, "-C", "origin.git", "show", "--name-only", "--format=%s", "main").stdout
+    assert shown.startswith("Accept runs: again\n\narm/reference/"), shown
+    assert not (job.folder / "reference").exists()
 
 
 @pytest.mark.slow
