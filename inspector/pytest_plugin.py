@@ -267,7 +267,7 @@ class Noise:
         stem = name_of(self._node.nodeid)
         recording, picture = self._artefacts(stem if self._count < 2 else f"{stem}-{self._count}")
         write(analysis, recording, overwrite=True)
-        if picture and comparison is not None:
+        if picture and comparison is not None and not comparison.empty:
             from inspector.report.picture import over_reference
 
             picture.write_bytes(over_reference(comparison, f"{shown}: {comparison}"))

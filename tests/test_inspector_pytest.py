@@ -128,6 +128,24 @@ def test_runs_are_compared_with_accepted_ones(project, tmp_path, processes):
     assert project(loud, *processes)[0] == 0
 
 
+STRANGE = """
+from dataclasses import replace
+
+def test_one(noise):
+    noise.check(replace(run(0, {tone}), joint_names=({names})))
+"""
+
+
+@pytest.mark.slow
+def test_a_finding_in_joints_that_were_never_accepted_has_a_picture(project, tmp_path):
+    known = STRANGE.format(tone=0.0, names="'elbow', 'wrist'")
+    assert project(known, "--noise-accept", "first release")[0] == 0
+    status, out = project(STRANGE.format(tone=1.0, names="'left', 'right'"))
+    assert (status, "IndexError" in out) == (1, False), out
+    assert "oscillations from 1." in out
+    assert (tmp_path / "noise-artefacts" / "test_robot-test_one.png").exists()
+
+
 NODES = st.builds(
     "{}{}.py{}::{}{}".format,
     st.sampled_from(["", "a/", "a/b/", "a.b/", "../"]),
