@@ -160,12 +160,14 @@ class CsvReader:
         naming = Naming.of(self._header)
         for place, column in enumerate(self._header):
             meaning = column_signal(column, naming)
-            if (
-                meaning is not None
-                and meaning[0] in SIGNALS
-                and factor_of(column) == 1.0
-                and not other_quantity(column, meaning)
-            ):
+            if meaning is None or meaning[0] not in SIGNALS:
+                continue
+            if unit := other_quantity(column, meaning):
+                raise LiveError(
+                    f"column {column!r} is named like {meaning[0]} and has a unit of {unit};"
+                    " rename it"
+                )
+            if factor_of(column) == 1.0:
                 joint = meaning[1]
                 known = joint if isinstance(joint, str) else _numbered(joint - naming.first, names)
                 found.setdefault(meaning[0], {})[known] = place
