@@ -102,7 +102,7 @@ KEY = axes.Panel("key", 360.0)
 ROOM = 1.3
 """What the camera sees of a robot that moves its base, by its size as it stands at first."""
 MOST_POSES = 400
-"""Poses in a message to a file without a viewer, at last: 20 s."""
+"""Poses in a message to a file without a viewer, at most: 20 s."""
 POSES = 200
 """Random poses within the limits of the joints, of which the camera sees all."""
 AROUND = np.array([[-20.0, -20.0], [20.0, 20.0]])

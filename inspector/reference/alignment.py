@@ -21,7 +21,8 @@ STEP_COST = 1e-3
 OUTSIDE = 0.36
 """Largest cost of a frame before the start or after the end, in squared standard deviations."""
 STEPS = np.array([1, 1, 2, 2, 0])
-"""Frames by which a path advances, by how it came: the frame before was itself held, or not."""
+"""Frames by which a path advances, by the code in `came`: odd codes come from a frame that was
+held; the last one waits at an end."""
 LARGEST = 4_000_000
 """Cells of a matrix of costs; of longer runs every second frame is aligned, and so on."""
 STILL = 0.05
