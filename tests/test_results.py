@@ -211,6 +211,16 @@ def test_results_that_a_rebase_replaced_are_left_out_and_told(tmp_path):
     ]
 
 
+def test_results_without_a_number_all_count(tmp_path):
+    for name in ("2024-01-05", "2024-01-06", "nightly-3f2a", "nightly-9c1b", "-3", "last"):
+        results(tmp_path / f"{name}.json", Verdict(Path("a.npz"), Status.OK))
+    found = history.read(tmp_path)
+    assert not found.notes
+    assert set(found.commits) == {
+        "2024-01-05", "2024-01-06", "nightly-3f2a", "nightly-9c1b", "-3", "last",
+    }  # fmt: skip
+
+
 def test_a_folder_without_results_is_one_line(tmp_path):
     status, _, err = call("history", tmp_path)
     assert (status, err.count("\n")) == (3, 1)

@@ -1,8 +1,8 @@
 """Results of many commits: how far each scenario is over its reference, and where that changed.
 
 A file of `classify --write json=FILE` is a commit. They are in order of their names, numbers by
-their value, and named after what stands behind the last dash: ``0061-3f2a1c9.json``. Levels are
-those over a reference: results without one have findings only.
+their value. A name that is a number, a dash and the rest is of that number, and called the rest:
+``0061-3f2a1c9.json``. Levels are those over a reference: results without one have findings only.
 """
 
 import re
@@ -94,20 +94,20 @@ class History:
 def read(folder: Path) -> History:
     """Read the results of a folder; what is no result is named and left out.
 
-    Of results with one number, as a rebase leaves them, the one that was written last counts.
+    Of results with one number, as a rebase leaves them, the file that was modified last counts.
     """
     commits, results, problems, notes = [], [], [], []
     last: dict[str, Path] = {}
     paths = sorted(folder.glob("*.json"), key=lambda path: (path.stat().st_mtime, path))
     for path in paths:
-        number = path.stem.rpartition("-")[0] or path.stem
+        number = _named(path)[0]
         if number in last:
             notes.append(f"{last[number].name}: replaced by {path.name}")
         last[number] = path
     for path in sorted(last.values(), key=_natural):
         try:
             results.append(read_results(path))
-            commits.append(path.stem.rpartition("-")[2])
+            commits.append(_named(path)[1])
         except InspectorError as error:
             problems.append(str(error))
     if not commits:
@@ -115,6 +115,12 @@ def read(folder: Path) -> History:
         raise InspectorError(f"{folder}: no result of `classify --write json=FILE`{why}")
     series = sorted(_series(results), key=lambda each: -_largest(each))
     return History(tuple(commits), tuple(series), tuple(problems), tuple(notes))
+
+
+def _named(path: Path) -> tuple[str, str]:
+    """Number and name of a commit; both are the whole name of a file without a number."""
+    number, _, name = path.stem.rpartition("-")
+    return (number, name) if number.isdigit() else (path.stem, path.stem)
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
