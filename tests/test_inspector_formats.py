@@ -377,6 +377,16 @@ def test_a_fingerprint_stays_when_a_finding_moves():
     assert first["partialFingerprints"] == second["partialFingerprints"]
 
 
+@pytest.mark.parametrize("line", [0, 3])  # it is not kept in JSON, which `merge` reads
+def test_scenarios_without_a_log_have_a_fingerprint_each(line):
+    missing = tuple(Missing(f"log of {name}", line=line) for name in ("pick", "place"))
+    store = Path("reference.toml")
+    absent = Verdict(store, Status.FINDINGS, missing=missing, expectations=str(store))
+    results = json.loads(sarif([absent]))["runs"][0]["results"]
+    prints = [each["partialFingerprints"]["primaryLocationLineHash"] for each in results]
+    assert len(prints) == len(set(prints)) == 2
+
+
 def test_markdown_is_a_table_with_the_worst_first_and_one_picture():
     drawn = replace(LOUD, picture=Path("r/pictures/loud.png"), picture_url="https://x.org/loud.png")
     lines = markdown([QUIET, LACKING, drawn, EXPECTED]).splitlines()

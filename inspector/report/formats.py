@@ -329,9 +329,10 @@ def _results(verdict: Verdict) -> list[dict[str, Any]]:
     facts += [(each.rule, str(each), {}) for each in verdict.missing]
     line = 0 if verdict.of_run else verdict.missing[0].line
     name = f"{verdict.path}" if verdict.of_run else verdict.missing[0].scenario
+    known = _uri(verdict.path) if verdict.of_run else name
     for rule, told, span in facts:
         number[rule] += 1
-        same = f"{name if line else _uri(verdict.path)}:{rule}:{number[rule]}"
+        same = f"{known}:{rule}:{number[rule]}"
         results.append(
             {
                 "ruleId": rule,
