@@ -157,15 +157,11 @@ def folded(items: Sequence[Item], alike: Callable[[Item, Item], bool]) -> list[l
 
 def each_missing(verdicts: Sequence[Verdict]) -> list[Verdict]:
     """The verdicts with one for each scenario that has no log."""
-    return [
-        one
-        for verdict in verdicts
-        for one in (
-            [verdict]
-            if verdict.of_run
-            else [replace(verdict, missing=(each,)) for each in verdict.missing]
-        )
-    ]
+    found: list[Verdict] = []
+    for verdict in verdicts:
+        absent = [replace(verdict, missing=(each,)) for each in verdict.missing]
+        found += [verdict] if verdict.of_run else absent
+    return found
 
 
 def groups(verdicts: Sequence[Verdict]) -> list[Group]:
