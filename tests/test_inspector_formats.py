@@ -7,20 +7,12 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from inspector.localisation.stage import Localisation
-from inspector.report.cases import ANNOTATIONS, COMMENT, MARKER
-from inspector.report.formats import (
-    FORMATS,
-    as_json,
-    github,
-    junit,
-    markdown,
-    sarif,
-    text,
-)
+from inspector.report.formats import ANNOTATIONS, COMMENT, FORMATS, MARKER, as_json, sarif, text
 from inspector.status import Status, Unknown
 from inspector.verdict import Evidence, Missing, Ruled, Ruling, Verdict, exit_status
 from noiseclassifier import Event
 
+github, junit, markdown = (FORMATS[name] for name in ("github", "junit", "markdown"))
 BLOW, RATTLE = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
 QUIET = Verdict(Path("quiet.npz"), Status.OK, "general")
 LOUD = Verdict(

@@ -8,8 +8,8 @@ from inspector.assets import demo_run, model_files
 from inspector.library import load_library
 from inspector.localisation.localise import Localisation, band, localise
 from inspector.localisation.stage import quiet_stretches
+from inspector.report.findings import words
 from inspector.report.html import found as tables
-from inspector.report.localisation import words
 from inspector.report.markdown import report, sentence
 from inspector.verdict import classify_file
 from noisemodel import Block, Run

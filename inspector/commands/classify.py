@@ -124,8 +124,7 @@ def classify(
     from inspector.logs.read import sources
     from inspector.progress import progress
     from inspector.reference.verdicts import Gate, References
-    from inspector.report.cases import published
-    from inspector.report.formats import FORMATS, text
+    from inspector.report.formats import FORMATS, published, text
     from inspector.verdict import classify_files, exit_status
 
     del localise  # of 0.6: each finding is localised now

@@ -102,8 +102,8 @@ def diff(
     from inspector import assets
     from inspector.library import load_library
     from inspector.reference.difference import Gate, difference
-    from inspector.report.cases import published
     from inspector.report.difference import FORMATS
+    from inspector.report.formats import published
 
     files = files_of(write or [], list(Format), overwrite=overwrite)
     if report:

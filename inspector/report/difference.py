@@ -17,14 +17,15 @@ from inspector.reference.difference import (
     Outcome,
     Row,
 )
-from inspector.report import cases
-from inspector.report.cases import DIFF_MARKER, Case, Job
-from inspector.report.cases import Outcome as OfTest
 from inspector.report.findings import TOGETHER, folded, table
+from inspector.report.formats import Case, Job, github, junit, markdown
+from inspector.report.formats import Outcome as OfTest
 from inspector.status import EXIT, Status
 from inspector.text import counted
 from inspector.version import program_version
 
+DIFF_MARKER = "<!-- noise-inspector diff -->"
+"""First line of its Markdown: a job may have a comment of verdicts, too."""
 MOST = 5
 """Findings of a scenario and kind that are listed."""
 SHORT = 0.5
@@ -241,26 +242,15 @@ def _case(found: Difference, row: Row, place: int) -> Case:
     )
 
 
-def junit(found: Difference) -> str:
-    """A test case per scenario and bad file, as JUnit XML."""
-    return cases.junit(_job(found))
-
-
-def github(found: Difference) -> str:
-    """GitHub workflow commands: the ten worst scenarios, and the counts."""
-    return cases.github(_job(found))
-
-
-def markdown(found: Difference) -> str:
-    """A table for a job's summary or a comment, the worst first, and a picture."""
-    head, notes = "| scenario | verdict | what changed |", "Changes that do not count"
-    return cases.markdown(_job(found), head=head, notes=notes, marker=DIFF_MARKER)
-
-
 FORMATS: dict[str, Callable[[Difference], str]] = {
     "text": text,
     "json": as_json,
-    "junit": junit,
-    "github": github,
-    "markdown": markdown,
+    "junit": lambda found: junit(_job(found)),
+    "github": lambda found: github(_job(found)),
+    "markdown": lambda found: markdown(
+        _job(found),
+        head="| scenario | verdict | what changed |",
+        notes="Changes that do not count",
+        marker=DIFF_MARKER,
+    ),
 }

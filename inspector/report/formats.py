@@ -1,19 +1,23 @@
-"""Verdicts as text, JSON, JUnit XML, GitHub annotations, SARIF and Markdown."""
+"""Verdicts as text, JSON, JUnit XML, GitHub annotations, SARIF and Markdown.
+
+Three formats are written from a job of cases, which a difference is, too.
+"""
 
 import hashlib
 import json
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
+from xml.etree import ElementTree as ET
 
 from inspector.analysis import NOTHING
-from inspector.report import cases
-from inspector.report.cases import Case, Job, Outcome
 from inspector.report.findings import (
     COUNTED,
     WORDS,
@@ -31,6 +35,240 @@ from inspector.status import IGNORED, Status, Unknown
 from inspector.text import counted
 from inspector.verdict import Verdict, counts, exit_status
 from inspector.version import program_version
+
+ANNOTATIONS = 10
+"""GitHub silently drops what goes beyond ten of a kind per step."""
+COMMENT = 60_000
+"""Most characters of the Markdown: GitHub refuses comments of more than 65,536."""
+MARKER = "<!-- noise-inspector -->"
+"""First line of the Markdown, by which a script finds its own comment to replace it."""
+
+
+class Outcome(StrEnum):
+    """What a case is as a test, by its element in JUnit XML."""
+
+    PASSED = ""
+    FAILURE = "failure"
+    ERROR = "error"
+    SKIPPED = "skipped"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case: a run, a scenario, or a file that cannot be read.
+
+    Attributes:
+        path: The file that it is about.
+        status: What became of it, as machines read it; `words` as people do.
+        rank: Sorts cases, the worst first.
+        kind: Type of a failure or an error.
+        sentences: What fails it, a sentence each.
+        message: A line that says more; may be empty.
+        notes: What does not fail it, a sentence each.
+        seconds: How long it took, in [s].
+        quiet: Whether there is nothing to say of it, so that tables leave it out.
+        picture_url: Where its picture will be published; empty if that is not known.
+        timeline: It over time as text, for where there is no picture; may be empty.
+        line: Its line in the file, from 1; 0 without.
+    """
+
+    name: str
+    path: Path
+    status: str
+    words: str
+    outcome: Outcome
+    rank: tuple[float, ...] = ()
+    kind: str = ""
+    sentences: tuple[str, ...] = ()
+    message: str = ""
+    notes: tuple[str, ...] = ()
+    trace: str = ""
+    seconds: float = 0.0
+    quiet: bool = False
+    picture: Path | None = None
+    picture_url: str = ""
+    timeline: str = ""
+    line: int = 0
+
+    @property
+    def told(self) -> str:
+        """What is said of it in a line."""
+        return "; ".join(self.sentences) or self.message
+
+
+@dataclass(frozen=True)
+class Job:
+    """All cases of a job, in order of their files, with counts by kind and name."""
+
+    title: str
+    summary: str
+    counts: Mapping[str, Mapping[str, int]]
+    cases: Sequence[Case]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def ranked(self) -> list[Case]:
+        """The cases, the worst first."""
+        return sorted(self.cases, key=lambda case: case.rank)
+
+
+def junit(job: Job) -> str:
+    """Write a job as JUnit XML: a test case each.
+
+    A case has one `failure` with all that fails it, since Jenkins keeps the last of several. A
+    picture is attached by a line ``[[ATTACHMENT|path]]``, which GitLab, Jenkins and Azure read.
+    """
+    outcomes = Counter(case.outcome for case in job.cases)
+    suite = ET.Element(
+        "testsuite",
+        name="inspector",
+        tests=str(len(job.cases)),
+        failures=str(outcomes[Outcome.FAILURE]),
+        errors=str(outcomes[Outcome.ERROR]),
+        skipped=str(outcomes[Outcome.SKIPPED]),
+        time=f"{sum(case.seconds for case in job.cases):.3f}",
+    )
+    properties = ET.SubElement(suite, "properties")
+    for kind, numbers in job.counts.items():
+        for name, number in numbers.items():
+            ET.SubElement(properties, "property", name=f"{kind}.{name}", value=str(number))
+    seen: Counter[str] = Counter()
+    for case in job.cases:
+        name = _plain(case.name)
+        seen[name] += 1  # GitLab reads the first of several cases of one name only
+        name = name if seen[name] == 1 else f"{name} ({seen[name]})"
+        time = f"{case.seconds:.3f}"
+        node = ET.SubElement(suite, "testcase", classname="inspector", name=name, time=time)
+        lines = [*case.notes]
+        if case.outcome:
+            sentences = case.sentences or (case.message,)
+            told = ET.SubElement(node, case.outcome, message=_plain("; ".join(sentences)))
+            if case.outcome is not Outcome.SKIPPED:
+                told.set("type", _plain(case.kind))
+            told.text = _plain("\n".join([*sentences, *filter(None, [case.trace])]))
+        if case.message and (case.sentences or not case.outcome):
+            lines.insert(0, case.message)
+        if case.picture is not None:
+            lines.append(f"[[ATTACHMENT|{case.picture}]]")
+        if lines:
+            ET.SubElement(node, "system-out").text = _plain("\n".join(lines))
+    root = ET.Element("testsuites")
+    root.append(suite)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def github(job: Job) -> str:
+    """Write a job as GitHub workflow commands: the ten worst, and the counts.
+
+    One case that is annotated needs no counts.
+
+    Of ten errors, those that cannot be read take five at most where others fail, so that they hide
+    none. Cases that are skipped are warnings.
+    """
+    ranked = job.ranked
+    bad = [case for case in ranked if case.outcome is Outcome.ERROR]
+    failed = [case for case in ranked if case.outcome is Outcome.FAILURE]
+    shown = [*bad[: max(ANNOTATIONS // 2, ANNOTATIONS - len(failed))], *failed][:ANNOTATIONS]
+    skipped = [case for case in ranked if case.outcome is Outcome.SKIPPED][:ANNOTATIONS]
+    lines = [_annotation("error", case) for case in shown]
+    lines += [_annotation("warning", case) for case in skipped]
+    lines += [f"::notice::{_escaped(remark)}" for remark in job.remarks]
+    left = len(bad) + len(failed) - len(shown)
+    more = f"; {left} more are not shown here" if left else ""
+    if len(job.cases) > 1 or not lines:
+        lines += [f"::notice title=noise-inspector::{_escaped(job.summary)}{more}"]
+    return "\n".join(lines)
+
+
+def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
+    """Write a job for its summary or a comment: a table, the worst first, and a picture.
+
+    GitHub takes no pictures inside the text: the worst case's is linked if its address is
+    known, and else its file is named.
+
+    Args:
+        notes: Title of what does not fail its case.
+    """
+    ranked = job.ranked
+    shown = [case for case in ranked if case.outcome or not case.quiet]
+    lines = [marker, f"### {job.title}: {job.summary}", ""]
+    tail = [""]
+    for remark in job.remarks:
+        tail += [f"{_cell(remark[:1].upper() + remark[1:])}.", ""]
+    worst = next((case for case in ranked if case.picture is not None), None)
+    if worst is not None and shown:
+        told = f"Picture of {_code(worst.name)}: {_code(worst.picture)}."
+        drawn = f"![{_cell(worst.name)} over time]({worst.picture_url})"
+        tail += [drawn if worst.picture_url else told]
+    sketched = next((case for case in ranked if case.timeline), None)
+    if sketched is not None and (worst is None or not worst.picture_url):
+        tail += ["", f"{_code(sketched.name)} over time:", "```", sketched.timeline, "```"]
+    rows = [f"| {_code(case.name)} | {case.words} | {_cell(case.told)} |" for case in shown]
+    left = [f"- {_code(case.name)}: {_cell(note)}" for case in ranked for note in case.notes]
+    if rows:
+        lines += _cut([head, "|---|---|---|"], rows, COMMENT * 2 // 3)
+    lines += tail
+    if left:
+        opened = ["", f"<details><summary>{notes}: {len(left)}</summary>", ""]
+        lines += [*_cut(opened, left, COMMENT // 4), "", "</details>"]
+    return "\n".join(lines).rstrip()
+
+
+def published(picture: Path | None, folder: Path | None, address: str) -> str:
+    """Address of a picture; empty if it will not be published, or there is none.
+
+    Args:
+        folder: The folder of the report that it lies in, however deep.
+        address: Where that folder is published; empty if it is not.
+    """
+    if picture is None or folder is None or not address:
+        return ""
+    return f"{address.rstrip('/')}/{quote(picture.relative_to(folder).as_posix())}"
+
+
+def _annotation(kind: str, case: Case) -> str:
+    about = {"file": str(case.path)}
+    if case.line:
+        about["line"] = str(case.line)
+    if case.name != about["file"]:
+        about["title"] = case.name
+    listed = ",".join(
+        f"{key}={_escaped(value).replace(':', '%3A').replace(',', '%2C')}"
+        for key, value in about.items()
+    )
+    return f"::{kind} {listed}::{_escaped(f'{case.status}: {case.told}')}"
+
+
+def _escaped(value: str) -> str:
+    return value.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _plain(value: object) -> str:
+    """Drop the control characters that XML forbids."""
+    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "", str(value))
+
+
+def _cell(value: object) -> str:
+    """A text that stays in its cell, and is no HTML."""
+    line = " ".join(str(value).split())
+    for mark, written in (("&", "&amp;"), ("<", "&lt;"), ("|", "\\|"), ("`", "'")):
+        line = line.replace(mark, written)
+    return line
+
+
+def _code(path: object) -> str:
+    """A path that stays in its cell."""
+    return f"`{' '.join(str(path).split()).replace('`', chr(39)).replace('|', chr(92) + '|')}`"
+
+
+def _cut(head: list[str], lines: list[str], room: int) -> list[str]:
+    """As many lines as there is room for, and how many are left out."""
+    ends = accumulate(len(line) + 1 for line in lines)
+    kept = [line for line, end in zip(lines, ends, strict=True) if end <= room]
+    left = len(lines) - len(kept)
+    return [*head, *kept, *(["", f"{left} more are left out here."] if left else [])]
+
 
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
@@ -52,7 +290,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     runs += [f"{ignored} of the bad input ignored"] if ignored else []
     absent = sum(len(verdict.missing) for verdict in verdicts if not verdict.of_run)
     logs = f"; no log for {counted(absent, 'required finding')}" if absent else ""
-    found = [f"{n} {_words(name)}" for name, n in number["findings"].items() if n]
+    found = [f"{n} {name.replace('-', ' ')}" for name, n in number["findings"].items() if n]
     total = counted(sum(verdict.of_run for verdict in verdicts), "run")
     findings = f"; findings: {', '.join(found)}" if found else ""
     return f"{total}: {', '.join(runs) or 'none'}{logs}{findings}"
@@ -160,19 +398,6 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
     return json.dumps(whole, indent=2)
 
 
-def junit(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts as JUnit XML: a test case per run, of the type of its best score."""
-    return cases.junit(_job(verdicts))
-
-
-def github(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts as GitHub workflow commands: the ten worst, and the counts of several runs.
-
-    Runs that cannot be told, and bad input that is ignored, are warnings.
-    """
-    return cases.github(_folded(verdicts))
-
-
 def sarif(verdicts: Sequence[Verdict]) -> str:
     """Write the findings that count as SARIF 2.1.0, the worst runs first.
 
@@ -225,72 +450,59 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
     return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
 
 
-def markdown(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts for a job's summary or a comment: a table, the worst first, and a picture."""
-    head, notes = "| scenario | status | findings |", "Findings that do not count"
-    return cases.markdown(_folded(verdicts), head=head, notes=notes)
-
-
-FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
-    "text": text,
-    "json": as_json,
-    "junit": junit,
-    "github": github,
-    "sarif": sarif,
-    "markdown": markdown,
-}
-
-
 def _ignoring(verdicts: Sequence[Verdict]) -> bool:
     return any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
 
 
-def _job(verdicts: Sequence[Verdict]) -> Job:
-    """All runs as cases, for programs that count runs."""
-    found = [
-        Case(
-            name=str(verdict.path) if verdict.of_run else verdict.missing[0].scenario,
-            path=verdict.path,
-            line=0 if verdict.of_run else verdict.missing[0].line,
-            status=verdict.status,
-            words=WORDS[verdict.status],
-            outcome=_outcome(verdict),
-            rank=verdict.severity,
-            kind=_kind(verdict),
-            sentences=tuple(failing(verdict)),
-            message=verdict.message,
-            notes=tuple(excused(verdict)),
-            trace=verdict.trace,
-            seconds=verdict.seconds,
-            quiet=verdict.status is Status.OK,
-            picture=verdict.picture,
-            picture_url=verdict.picture_url,
-        )
-        for verdict in each_missing(verdicts)
-    ]
+def _job(verdicts: Sequence[Verdict], found: Sequence[Case]) -> Job:
     remarks = (IGNORED,) if _ignoring(verdicts) else ()
     return Job("Noise", summary(verdicts), counts(verdicts), found, remarks)
 
 
-def _folded(verdicts: Sequence[Verdict]) -> Job:
+def _by_run(verdicts: Sequence[Verdict]) -> Job:
+    """All runs as cases, for programs that count runs."""
+    return _job(verdicts, [_case(each) for each in each_missing(verdicts)])
+
+
+def _by_scenario(verdicts: Sequence[Verdict]) -> Job:
     """All scenarios as cases, for people."""
     found = []
     for group in groups(verdicts):
-        (case,) = _job([group.worst]).cases
         drawn = next((each for each in group.verdicts if each.picture), group.worst)
-        found.append(
-            replace(
-                case,
-                name=group.name,
-                words=group.words,
-                sentences=tuple(group.sentences),
-                notes=tuple(group.notes),
-                timeline=timeline(group.worst),
-                picture=drawn.picture,
-                picture_url=drawn.picture_url,
-            )
+        case = replace(
+            _case(group.worst),
+            name=group.name,
+            words=group.words,
+            sentences=tuple(group.sentences),
+            notes=tuple(group.notes),
+            timeline=timeline(group.worst),
+            picture=drawn.picture,
+            picture_url=drawn.picture_url,
         )
-    return replace(_job(verdicts), cases=found)
+        found.append(case)
+    return _job(verdicts, found)
+
+
+def _case(verdict: Verdict) -> Case:
+    absent = None if verdict.of_run else verdict.missing[0]
+    return Case(
+        name=str(verdict.path) if absent is None else absent.scenario,
+        path=verdict.path,
+        line=0 if absent is None else absent.line,
+        status=verdict.status,
+        words=WORDS[verdict.status],
+        outcome=_outcome(verdict),
+        rank=verdict.severity,
+        kind=_kind(verdict),
+        sentences=tuple(failing(verdict)),
+        message=verdict.message,
+        notes=tuple(excused(verdict)),
+        trace=verdict.trace,
+        seconds=verdict.seconds,
+        quiet=verdict.status is Status.OK,
+        picture=verdict.picture,
+        picture_url=verdict.picture_url,
+    )
 
 
 def _outcome(verdict: Verdict) -> Outcome:
@@ -314,7 +526,8 @@ def _kind(verdict: Verdict) -> str:
 
 
 def _results(verdict: Verdict) -> list[dict[str, Any]]:
-    if _outcome(verdict) is not Outcome.FAILURE:
+    case = _case(verdict)
+    if case.outcome is not Outcome.FAILURE:
         return []
     number: Counter[str] = Counter()
     results = []
@@ -327,9 +540,7 @@ def _results(verdict: Verdict) -> list[dict[str, Any]]:
         for event in verdict.failing
     ]
     facts += [(each.rule, str(each), {}) for each in verdict.missing]
-    line = 0 if verdict.of_run else verdict.missing[0].line
-    name = f"{verdict.path}" if verdict.of_run else verdict.missing[0].scenario
-    known = _uri(verdict.path) if verdict.of_run else name
+    known = _uri(verdict.path) if verdict.of_run else case.name
     for rule, told, span in facts:
         number[rule] += 1
         same = f"{known}:{rule}:{number[rule]}"
@@ -337,8 +548,8 @@ def _results(verdict: Verdict) -> list[dict[str, Any]]:
             {
                 "ruleId": rule,
                 "level": "error",
-                "message": {"text": f"{name}: {told}"},
-                "locations": [_location(verdict.path, line or 1)],
+                "message": {"text": f"{case.name}: {told}"},
+                "locations": [_location(verdict.path, case.line or 1)],
                 "partialFingerprints": {
                     "primaryLocationLineHash": hashlib.sha256(same.encode()).hexdigest()[:16]
                 },
@@ -376,5 +587,15 @@ def _described(rule: str) -> str:
     return f"The noise of the joints shows a failure of class {label}."
 
 
-def _words(ruling: str) -> str:
-    return ruling.replace("-", " ")
+FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
+    "text": text,
+    "json": as_json,
+    "junit": lambda verdicts: junit(_by_run(verdicts)),
+    "github": lambda verdicts: github(_by_scenario(verdicts)),
+    "sarif": sarif,
+    "markdown": lambda verdicts: markdown(
+        _by_scenario(verdicts),
+        head="| scenario | status | findings |",
+        notes="Findings that do not count",
+    ),
+}

@@ -2,7 +2,7 @@
 
 from inspector.analysis import Analysis
 from inspector.localisation.localise import fault_links, has_stages
-from inspector.report.localisation import words
+from inspector.report.findings import words
 from inspector.text import counted
 from noiseclassifier import UNKNOWN, Event
 from noiseclassifier.labels import interval

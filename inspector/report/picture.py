@@ -55,6 +55,7 @@ def picture(
     if links is not None:
         strips.append(_strip(analysis, *levels.link_levels(links), links.links))
     beside = None if beside is None or beside.empty else beside
+    over = [] if beside is None else beside.loudest(SHOWN)
     alarmed = analysis.labels is not None and analysis.alarm is not None and beside is None
     told = _told(analysis)
     panels = {
@@ -62,7 +63,7 @@ def picture(
         "noise": (1.2, 0.0),
         "level": (1.1, 0.0),
         "probability": (0.8 * alarmed, 0.0),
-        "over": (0.0 if beside is None else ROW * min(len(beside.joints), SHOWN), TITLE),
+        "over": (ROW * len(over), TITLE),
         "spectrogram": (2.0, 0.0),
         "orders": (1.5 if ordered else 0.0, 0.0),
         "joints": (ROW * len(strips[0][2]), TITLE),
@@ -98,7 +99,7 @@ def picture(
 
 def over_reference(beside: Comparison, title: str) -> bytes:
     """Draw how much louder a run is than its reference, by joint and time."""
-    joints = [_short(beside.joints[place]) for place in beside.loudest(SHOWN)]
+    joints = [beside.joints[place] for place in beside.loudest(SHOWN)]
     panels = {"level": (1.1, TITLE), "over": (ROW * len(joints), TITLE)}
     figure, axes = _panels(panels, joints)
     _band(axes["level"], beside)
