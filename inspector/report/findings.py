@@ -59,11 +59,7 @@ def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
 
 
 def row(verdict: Verdict, event: Event, runs: str = "") -> Row:
-    """A finding as cells of a table.
-
-    Args:
-        runs: In how many repetitions it is, in words.
-    """
+    """A finding as cells of a table; `runs` says in how many repetitions it is."""
     known = verdict.localisations.get(event)
     _, joints, band = words(known) if known else ("", "", "")
     evidence, order = verdict.evidence.get(event), verdict.orders.get(event)
@@ -114,12 +110,7 @@ def excused(verdict: Verdict) -> list[str]:
 
 @dataclass(frozen=True)
 class Group:
-    """The runs of one scenario, or a single run.
-
-    Attributes:
-        name: The scenario, or the path of the run.
-        verdicts: The verdicts on its runs, the worst first.
-    """
+    """The runs of one scenario, the worst first, or a single run, by its path."""
 
     name: str
     verdicts: Sequence[Verdict]

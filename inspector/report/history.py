@@ -16,7 +16,7 @@ import numpy as np
 
 from inspector.errors import InspectorError
 from inspector.report.findings import groups
-from inspector.report.html import STYLE, add_text, document
+from inspector.report.html import STYLE, add_text, document, written
 from inspector.text import counted
 from inspector.verdict import Verdict, read_results
 from noisemodel.types import Array
@@ -235,7 +235,7 @@ def page(history: History) -> str:
         for change in found:
             add_text(body, "p", history.told(series, change), "step")
         _draw(body, history, series, found)
-    return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
+    return written(html)
 
 
 def _draw(body: ET.Element, history: History, series: Series, found: Sequence[Change]) -> None:

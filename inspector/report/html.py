@@ -60,16 +60,7 @@ def write(
     overwrite: bool = False,
     floor: float | None = None,
 ) -> None:
-    """Write the page of an inspected run, whole or not at all.
-
-    Args:
-        analysis: A run with what was found in it.
-        path: The file to write, by convention ``*.html``.
-        verdict: The verdict beside a reference; None without.
-        beside: How the run compares with the reference; None without.
-        overwrite: Whether a file that exists may be replaced.
-        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
-    """
+    """Write the page of an inspected run, whole or not at all; see `page`."""
     require()
     text = page(analysis, audit=audit, verdict=verdict, beside=beside, floor=floor)
     with replacing(path, overwrite=overwrite) as temporary:
@@ -87,10 +78,10 @@ def page(
     """Write the page of an inspected run.
 
     Args:
-        analysis: A run with what was found in it.
+        audit: What the log can show, a line each; may be empty.
         verdict: The verdict beside a reference; None without.
         beside: How the run compares with the reference; None without.
-        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s].
+        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
     from inspector.report.picture import picture
 
@@ -120,7 +111,7 @@ def page(
         " estimate from the velocities of rigid links: compare it, do not quote it.",
         "note",
     )
-    return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
+    return written(html)
 
 
 def _add_sound(body: ET.Element, analysis: Analysis) -> None:
@@ -137,15 +128,7 @@ def _add_sound(body: ET.Element, analysis: Analysis) -> None:
 
 @dataclass(frozen=True)
 class Table:
-    """A table with a title.
-
-    Attributes:
-        title: Empty without one.
-        head: Names of the columns; all empty without a head.
-        rows: Cells of each row.
-        numbers: Columns that hold numbers.
-        note: A sentence below the table; empty without one.
-    """
+    """A table: title, head and the note below may be empty; `numbers` are columns of numbers."""
 
     title: str
     head: tuple[str, ...]
@@ -171,7 +154,7 @@ def _add_table(body: ET.Element, table: Table) -> None:
         add_text(body, "p", table.note, "note")
 
 
-def _add_list(body: ET.Element, title: str, lines: tuple[str, ...] | list[str]) -> None:
+def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
     if lines:
         add_text(body, "h2", title)
         items = ET.SubElement(body, "ul")
@@ -192,15 +175,15 @@ def document(title: str, style: str, policy: str) -> tuple[ET.Element, ET.Elemen
 
 
 def add_text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
-    """Add an element with a text to another one.
-
-    Args:
-        text: Its text; what HTML cannot write is replaced.
-        kind: Its class in the style, empty without.
-    """
+    """Add an element with a text, of a class in the style, to another one."""
     element = ET.SubElement(parent, tag, {"class": kind} if kind else {})
     # HTML has no way to write these characters.
     element.text = re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]", "\ufffd", text)
+
+
+def written(html: ET.Element) -> str:
+    """A page as text."""
+    return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
 
 
 def _described(analysis: Analysis, beside: Comparison | None) -> str:

@@ -15,7 +15,7 @@ from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
 from inspector.report.findings import COUNTED, excused, failing
 from inspector.report.formats import summary
-from inspector.report.html import STYLE, add_text, document
+from inspector.report.html import STYLE, add_text, document, written
 from inspector.status import Status
 from inspector.verdict import Verdict
 from noisemodel.files import replacing
@@ -65,12 +65,7 @@ section img { background: #fff; border-radius: .2rem; }
 
 
 def prepare(folder: Path, *, overwrite: bool = False) -> None:
-    """Make the folder before long work is done for it.
-
-    Args:
-        folder: The folder; it is created if it does not exist.
-        overwrite: Whether a page in it may be replaced.
-    """
+    """Make the folder before long work is done for it; refuse one that has a page already."""
     try:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -82,13 +77,7 @@ def prepare(folder: Path, *, overwrite: bool = False) -> None:
 
 
 def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, folder: Path) -> Path:
-    """Draw a run over time into the folder.
-
-    Args:
-        analysis: The run with what was found in it.
-        verdict: The verdict on it: the picture is named after its file.
-        beside: How it compares with its reference; None without.
-    """
+    """Draw a run over time into the folder; the picture is named after the verdict's file."""
     from inspector.report.picture import picture
 
     path = verdict.path
@@ -114,11 +103,7 @@ def with_picture(verdict: Verdict, folder: Path) -> Verdict:
 
 
 def write(verdicts: Sequence[Verdict], folder: Path) -> Path:
-    """Write the page, whole or not at all.
-
-    Args:
-        verdicts: What was found in runs, with their pictures.
-    """
+    """Write the page, whole or not at all."""
     path = folder / PAGE
     with replacing(path, overwrite=True) as temporary:
         temporary.write_text(page(verdicts), encoding="utf-8")
@@ -126,11 +111,7 @@ def write(verdicts: Sequence[Verdict], folder: Path) -> Path:
 
 
 def page(verdicts: Sequence[Verdict]) -> str:
-    """Write the page.
-
-    Args:
-        verdicts: What was found in runs; their pictures lie in the folder of the page.
-    """
+    """The page as text; pictures lie in its folder."""
     html, body = document(f"Noise: {summary(verdicts)}", STYLE + ROWS, POLICY)
     add_text(body, "h1", "Noise of the joints")
     add_text(body, "p", summary(verdicts), "verdict")
@@ -149,7 +130,7 @@ def page(verdicts: Sequence[Verdict]) -> str:
     add_text(body, "h2", "Pictures")
     for number, verdict in enumerate(ranked, 1):
         _add_run(body, verdict, number, shared)
-    return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
+    return written(html)
 
 
 def _add_counts(body: ET.Element, ranked: Sequence[Verdict]) -> None:

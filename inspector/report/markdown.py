@@ -22,11 +22,7 @@ def spoken(text: str) -> str:
 
 
 def report(analysis: Analysis) -> str:
-    """Write the report of an analysed run.
-
-    Args:
-        analysis: The run with what was found in it.
-    """
+    """Write the report of an analysed run."""
     run = analysis.run
     facts = [
         f"{run.duration:.2f} s at {run.rate:g} Hz",

@@ -45,7 +45,6 @@ def picture(
     """Draw an inspected run.
 
     Args:
-        analysis: A run with what was found in it.
         beside: How it compares with its reference, which takes the place of the probability.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
