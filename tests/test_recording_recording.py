@@ -23,10 +23,10 @@ from inspector import colors
 from inspector.analysis import Analysis, Status, analyse_file
 from inspector.errors import InspectorError
 from inspector.levels import velocity_levels
-from inspector.recording import axes, layout, panels
-from inspector.recording.layout import height
+from inspector.recording import axes, panels
+from inspector.recording import run as recordings
 from inspector.recording.panels import HEIGHT, NOISE_POINTS, scaled
-from inspector.recording.run import linked, write
+from inspector.recording.run import height, linked, write
 from inspector.reference.judging import Scenario, compare
 from inspector.reference.levels import levels as levels_of
 from noiseclassifier import Event, Labels
@@ -778,8 +778,8 @@ def test_names_elsewhere_are_left_alone():
 def test_the_text_is_as_high_as_the_paragraphs_that_fit():
     title, short = "### ok\n\n", "x" * 70
     one, two = height(title + short), height(f"{title}{short}\n\n{short}")
-    assert two - one == layout.PARAGRAPH
-    assert height(f"{title}{short}\n{short}") - one == layout.LINE
-    assert height(title + 2 * short) - one == layout.LINE
+    assert two - one == recordings.PARAGRAPH
+    assert height(f"{title}{short}\n{short}") - one == recordings.LINE
+    assert height(title + 2 * short) - one == recordings.LINE
     assert height(f"{title}{short}\n\n{short * 30}") == one  # whose end would be below the edge
-    assert height(title + f"{short}\n\n" * 20) <= layout.TALLEST
+    assert height(title + f"{short}\n\n" * 20) <= recordings.TALLEST

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from rerun.blueprint import Blueprint
 
 from inspector import colors, levels
 from inspector.analysis import Analysis, analyse
@@ -19,7 +18,7 @@ from inspector.levels import FLOOR_DB, velocity_levels
 from inspector.library import Library
 from inspector.logs.read import Opened
 from inspector.recording import axes, panels, unstable
-from inspector.recording.axes import TIMELINE, Label, Panel
+from inspector.recording.axes import Label, Panel, Timed
 from inspector.recording.panels import HIGH_DB, LOW_DB
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
@@ -120,7 +119,6 @@ LETTERS = 16
 """Most letters of a name beside a row."""
 SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"
 """The markers of `classes.MARKERS` as text."""
-ROWS = ("class", "levels")
 
 
 def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
@@ -135,44 +133,30 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         told = f"FAIL   {failing} of {len(several.names)} runs" if failing else "PASS   no finding"
         axes.log_verdict(recording, "findings" if failing else "ok", told)
         height = _height(len(several.names))
-        panels = {name: Panel(name, height * len(several.names) + axes.AXIS) for name in ROWS}
-        panels["curves"] = Panel("curves", CURVE)
-        _log_classes(recording, several, panels["class"])
-        _log_levels(recording, several, panels["levels"], (begin, end))
-        _log_curves(recording, several, panels["curves"])
+        tall = height * len(several.names) + axes.AXIS
+        found = _log_classes(recording, several, Panel("class", tall))
+        loud = _log_levels(recording, several, Panel("levels", tall), (begin, end))
+        curves = _log_curves(recording, several, Panel("curves", CURVE))
         properties = {"runs": len(several.names), "model": several.sides[0].model}
         title = f"{several.names[0]} and {len(several.names) - 1} more"
         log_report(recording, title, report(several), properties)
-        recording.send_blueprint(layout(several, panels))
+        whole = layout(len(several.names), [found, loud], curves)
+        recording.send_blueprint(unstable.blueprint(whole, _loop(several)))
 
 
-def layout(several: Several, panels: dict[str, Panel]) -> Blueprint:
+def layout(runs: int, rows: Sequence[Timed], curves: Timed) -> Part:
     """Lay several runs out: a table above or at the left, everything over time below or beside."""
-    plots = {
-        name: axes.part(
-            panels[name],
-            axes.row_plot(f"/{name}"),
-            name={"class": "Classes", "levels": "Level above 10 Hz"}[name],
-        )
-        for name in ROWS
-    }
-    panel = panels["curves"]
-    curves = unstable.plot(
-        "", "/curves", between=(LOW_DB, HIGH_DB), legend=True, fixed=True, titled=False
-    )
-    over_time: list[tuple[Part, float]] = [(plots[name], panels[name].height) for name in ROWS]
-    if sum(height for _, height in over_time) > WHOLE - CURVE:
-        over_time = [(unstable.tabs(*plots.values()), panels["class"].height + TITLES)]
-    over_time.append((axes.part(panel, curves), panel.height))
-    report = unstable.text("Runs", "/report", titled=False)
+    over_time = list(rows)
+    if sum(height for _, height in rows) > WHOLE - CURVE:
+        over_time = [(unstable.tabs(*(part for part, _ in rows)), rows[0][1] + TITLES)]
+    over_time.append(curves)
+    table = unstable.text("Runs", "/report", titled=False)
     verdict = (unstable.drawing("/verdict"), axes.VERDICT)
-    text = unstable.above(verdict, (report, WHOLE - axes.VERDICT))
     rest = WHOLE - sum(height for _, height in over_time)
-    if rest > TABLE + ENTRY * len(several.names) - 1.0:
-        whole = unstable.above(verdict, (report, rest - axes.VERDICT), *over_time)
-    else:
-        whole = unstable.beside((text, 30.0), (unstable.above(*over_time), 70.0))
-    return unstable.blueprint(whole, TIMELINE, _loop(several))
+    if rest > TABLE + ENTRY * runs - 1.0:
+        return unstable.above(verdict, (table, rest - axes.VERDICT), *over_time)
+    text = unstable.above(verdict, (table, WHOLE - axes.VERDICT))
+    return unstable.beside((text, 30.0), (unstable.above(*over_time), 70.0))
 
 
 def report(several: Several) -> str:
@@ -272,7 +256,7 @@ def _names(several: Several, panel: Panel) -> list[Label]:
     return labels
 
 
-def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) -> None:
+def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) -> Timed:
     colours = panels.colours_of(*several.sides)
     lanes = [[each for each in side.lane if each[2]] for side in several.sides]
     edges = np.unique([0.0, *(time for lane in lanes for each in lane for time in each[:2])])
@@ -293,15 +277,8 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
             for event in side.findings
             if event.label == name
         ]
-        shape = panels.MARKERS[number % len(panels.MARKERS)]
-        style = rr.SeriesPoints(
-            names=[spoken(name)], colors=[axes.INK], markers=[shape], marker_sizes=[4.0]
-        )
-        time, place = np.array(sorted(marks)).T
-        recording.log(f"/class/mark/{name}", style, static=True)
-        recording.send_columns(
-            f"/class/mark/{name}", indexes=[axes.at(time)], columns=axes.scalars(place)
-        )
+        time, place = zip(*sorted(marks), strict=True)
+        panels.log_marks(recording, name, number, axes.INK, time, place)
     axes.log_left(recording, panel, _names(several, panel))
     shown = [*failing, "ok"]
     key = [
@@ -315,11 +292,12 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
         for row, name in enumerate(shown)
     ]
     axes.log_right(recording, panel, key)
+    return axes.rows(panel, "/class", name="Classes")
 
 
 def _log_levels(
     recording: rr.RecordingStream, several: Several, panel: Panel, span: tuple[float, float]
-) -> None:
+) -> Timed:
     step = max(levels.STEP, (span[1] - span[0]) / COLUMNS)
     columns = int(np.ceil((span[1] - span[0]) / step))
     edges: Array = span[0] + step * np.arange(columns + 1, dtype=np.float64)
@@ -333,6 +311,7 @@ def _log_levels(
     _log_rows(recording, several, panel, edges, rgba, called)
     axes.log_left(recording, panel, _names(several, panel))
     axes.log_scale(recording, panel, scale)
+    return axes.rows(panel, "/levels", name="Level above 10 Hz")
 
 
 def _columns(time: Array, level: Array, edges: Array) -> Array:
@@ -343,19 +322,19 @@ def _columns(time: Array, level: Array, edges: Array) -> Array:
     return np.where(np.isfinite(found), found, np.nan)
 
 
-def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -> None:
+def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -> Timed:
     chosen: Sequence[int] = sorted(several.order[:CURVES])
     for index, color in zip(chosen, colors.of_series(len(chosen)), strict=True):
         time, level = several.levels[index]
         path, name = f"/curves/{index:03d}", several.names[index]
-        axes.log_lines(recording, path, time, level[:, None], names=[name], colours=[color])
-    span = HIGH_DB - LOW_DB
-    marks = [
-        Label((mark - LOW_DB) / span, axes.written(mark), 44.0)
-        for mark in (-60.0, -40.0, -20.0, 0.0)
-    ]
-    axes.log_left(recording, panel, [Label(0.62, "above 10 Hz\n[dB re\n1 rad/s]", -22.0), *marks])
+        axes.log_line(recording, path, time, level, color, name=name)
+    title = Label(0.62, "above 10 Hz\n[dB re\n1 rad/s]", -22.0)
+    panels.log_level_axis(recording, panel, title)
     more = len(several.names) > len(chosen)
     axes.log_right(
         recording, panel, [Label(0.5, f"the worst\n{CURVES} runs" if more else "all runs")]
     )
+    plot = unstable.plot(
+        "", "/curves", between=(LOW_DB, HIGH_DB), legend=True, fixed=True, titled=False
+    )
+    return axes.part(panel, plot), panel.height

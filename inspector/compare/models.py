@@ -108,7 +108,7 @@ def layout(found: Comparisons) -> Blueprint:
     overview = unstable.above(
         (unstable.beside(*maps), share), (table, WHOLE - share), name="Robots"
     )
-    return unstable.blueprint(unstable.tabs(overview, *map(_robot, found)), axes.TIMELINE)
+    return unstable.blueprint(unstable.tabs(overview, *map(_robot, found)))
 
 
 def cells(found: Comparisons, name: str) -> Array:
@@ -200,7 +200,6 @@ def _log(recording: rr.RecordingStream, one: Comparison) -> None:
         unstable.log_stretches(
             recording,
             f"{_root(one)}/events/{label}",
-            axes.TIMELINE,
             own,
             between=(lower, upper),
             name=label,

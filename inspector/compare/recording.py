@@ -2,13 +2,12 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import rerun as rr
-from rerun.blueprint import Blueprint
 from rerun.urdf import UrdfTree
 
 from inspector import colors
@@ -31,10 +30,8 @@ from inspector.errors import InspectorError
 from inspector.export.sound import SMALL_RATE, common_gain, sound_of
 from inspector.levels import LINKS, SPECTRUM, link_levels
 from inspector.recording import axes, robot, unstable
-from inspector.recording.axes import TIMELINE, Label, Panel
-from inspector.recording.camera import Camera
-from inspector.recording.framing import log_cameras
-from inspector.recording.layout import limb_tabs
+from inspector.recording.axes import Label, Panel, Timed
+from inspector.recording.camera import log_cameras
 from inspector.recording.panels import (
     AFTER,
     BEFORE,
@@ -42,82 +39,77 @@ from inspector.recording.panels import (
     HIGH_DB,
     LOW_DB,
     SHADES,
-    Plot,
     Signal,
     found_stretches,
     in_levels,
+    limb_tabs,
     limbs,
     log_heat,
+    log_level_axis,
+    log_power,
     log_robot_levels,
+    log_row,
     log_signal,
     scaled,
+    signal_plot,
     signals,
 )
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.markdown import classes_of, spoken
 from inspector.thinning import extremes
-from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.run import part
-from noisemodel.types import Array
 
 SIDE_COLORS = {"before": BEFORE, "after": AFTER}
 
 NOISE_POINTS = 60_000
 """Of each run's noise."""
-LOWEST_POWER_DB = -20.0
-"""Sound power below this is drawn at it, in [dB re 1 pW]."""
 DETAILS = 184.0
 """Height of the panels that lie behind each other."""
 LEVEL, CHANGED, NOISE_PANEL = Panel("level", 118.0), Panel("change", 84.0), Panel("noise", DETAILS)
-BANDS, WIDTH = 48, 5.0
-"""Bands of a spectrogram, and the height of one in points."""
 SPAN_DB = 24.0
 """Change of level at the upper end of its axis, in [dB], or a multiple where it is larger."""
 
 
-@dataclass(frozen=True)
-class Ends:
-    """Lower and upper ends of axes.
-
-    Attributes:
-        noise: Of the noise.
-        change: Of the change of level, in [dB].
-    """
-
-    noise: tuple[float, float]
-    change: tuple[float, float]
-
-
-def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Ends:
-    """Log noises and their levels every 50 ms, with what changed shaded."""
-    between = _log_noise(recording, pair)
+def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> list[Timed]:
+    """Log both levels every 50 ms, and their change, with what changed shaded."""
     time, level = steps(pair)
     log_shades(recording, "/level/change", found, (LOW_DB, HIGH_DB))
     for place, (name, _) in enumerate(pair.sides):
-        _log_line(recording, f"/level/{name}", time, level[:, place], SIDE_COLORS[name])
-    span = HIGH_DB - LOW_DB
-    marks = [(mark, (mark - LOW_DB) / span) for mark in (-60.0, -40.0, -20.0, 0.0)]
+        axes.log_line(recording, f"/level/{name}", time, level[:, place], SIDE_COLORS[name])
     title = Label(0.62, "above 10 Hz\n[dB re\n1 rad/s]", -22.0)
-    axes.log_left(recording, LEVEL, [title, *_written(marks, 44.0)])
+    log_level_axis(recording, LEVEL, title)
     axes.log_right(recording, LEVEL, _sides())
     change = level[:, 1] - level[:, 0]
     peak = float(change[np.abs(change).argmax()])
     reach = SPAN_DB * max(float(np.ceil(abs(peak) / SPAN_DB)), 1.0)
-    _log_line(recording, "/change/noise", time, change, axes.INK)
-    _log_line(recording, "/change/none", time[[0, -1]], np.zeros(2), colors.CLASSES["unknown"])
+    axes.log_line(recording, "/change/noise", time, change, axes.INK)
+    nothing = colors.CLASSES["unknown"]
+    axes.log_line(recording, "/change/none", time[[0, -1]], np.zeros(2), nothing)
     log_shades(recording, "/change/finding", found, (-reach, reach))
-    marks = [(mark, 0.5 + mark / reach / 2) for mark in (-reach / 2, 0.0, reach / 2)]
-    axes.log_left(recording, CHANGED, [Label(0.6, "change\n[dB]", -22.0), *_written(marks, 44.0)])
-    axes.log_right(recording, CHANGED, [Label(0.5, f"largest\n{_signed(peak)}")])
-    return Ends(between, (-reach, reach))
+    marks = [
+        Label(0.5 + mark / reach / 2, axes.written(mark), 44.0)
+        for mark in (-reach / 2, 0.0, reach / 2)
+    ]
+    axes.log_left(recording, CHANGED, [Label(0.6, "change\n[dB]", -22.0), *marks])
+    signed = f"{peak:+.0f}".replace("-", "\u2212").replace("+0", "0")
+    axes.log_right(recording, CHANGED, [Label(0.5, f"largest\n{signed}")])
+    return [
+        _curve("Level", LEVEL, axes.ALL, (LOW_DB, HIGH_DB)),
+        _curve("Change", CHANGED, CHANGE_PATHS, (-reach, reach)),
+    ]
 
 
-def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> dict[str, Panel]:
+def _curve(title: str, panel: Panel, paths: Sequence[str], between: tuple[float, float]) -> Timed:
+    plot = unstable.plot(title, f"/{panel.name}", paths, between=between, fixed=True, titled=False)
+    return axes.part(panel, plot), panel.height
+
+
+def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[Part]:
     """Log the spectrograms of a joint's velocity in both runs, and their difference."""
     both = spectra(pair, joint)
     if not len(both[0].time):
-        return {}
+        return []
     edges, level = in_levels(both[0])[0], [in_levels(each)[1] for each in both]
     scale = SPECTRUM.following(np.stack(level))
     level = [np.maximum(each, scale.low) for each in level]
@@ -126,16 +118,19 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> dict[s
         "before": (level[0], scale),
         "after": (level[1], scale),
     }
-    panels = {}
+    parts = []
     for what, (values, own) in shown.items():
-        panel = panels[what] = Panel(f"spectrum_{what}", DETAILS)
+        panel = Panel(f"spectrum_{what}", DETAILS)
         path, title = f"/spectrogram/{what}", f"{joint or 'noise'}\n{what}"
         shades = SHADES if own is CHANGE else axes.SHADES
         log_heat(recording, panel, path, both[0].time, edges, values, own, title, shades=shades)
-    return panels
+        name = f"Spectrum{', ' if what == 'change' else ' '}{what}"
+        parts.append(axes.rows(panel, path, name=name)[0])
+    return parts
 
 
-def _log_noise(recording: rr.RecordingStream, pair: Pair) -> tuple[float, float]:
+def log_noise(recording: rr.RecordingStream, pair: Pair) -> list[Part]:
+    """Log both noises, and the sound powers of all links."""
     loudest = np.concatenate([side.noise[side.run.mask] for _, side in pair.sides])
     scale, unit = scaled(loudest)
     for name, side in pair.sides:
@@ -143,13 +138,14 @@ def _log_noise(recording: rr.RecordingStream, pair: Pair) -> tuple[float, float]
         time, values = extremes(
             pair.time[mask], side.noise[mask, None] / scale, points=NOISE_POINTS
         )
-        _log_line(recording, f"/noise/{name}", time, values[:, 0], SIDE_COLORS[name])
+        axes.log_line(recording, f"/noise/{name}", time, values[:, 0], SIDE_COLORS[name])
         if side.links is not None:
-            level = np.maximum(decibel(side.links.total / REFERENCE_POWER), LOWEST_POWER_DB)
-            _log_line(recording, f"/power/{name}", side.links.time, level, SIDE_COLORS[name])
+            log_power(recording, f"/power/{name}", side.links, side.links.total, SIDE_COLORS[name])
     axes.log_left(recording, NOISE_PANEL, [Label(0.5, f"noise p\u0302\n[{unit}]")])
     axes.log_right(recording, NOISE_PANEL, _sides())
-    return 0.0, 1.08 * max(float(loudest.max(initial=0.0)) / scale, 0.01)
+    between = (0.0, 1.08 * max(float(loudest.max(initial=0.0)) / scale, 0.01))
+    plot = unstable.plot("Noise", "/noise", axes.ALL, between=between, fixed=True, titled=False)
+    return [axes.part(NOISE_PANEL, plot, name="Noise")]
 
 
 def _sides() -> list[Label]:
@@ -159,21 +155,6 @@ def _sides() -> list[Label]:
     ]
 
 
-def _written(marks: Sequence[tuple[float, float]], shift: float) -> list[Label]:
-    return [Label(place, _signed(mark).lstrip("+"), shift) for mark, place in marks]
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.0f}".replace("-", "\u2212").replace("+0", "0")
-
-
-def _log_line(
-    recording: rr.RecordingStream, path: str, time: Array, values: Array, color: colors.Color
-) -> None:
-    name = path.rpartition("/")[2]
-    axes.log_lines(recording, path, time, values[:, None], names=[name], colours=[color])
-
-
 ROW, LEAST = 26.0, 50.0
 """Height of a class, and of all of them at least, in points."""
 FOUND = {"before": (0.06, 0.34), "after": (0.52, 0.80)}
@@ -181,16 +162,18 @@ ANNOTATED = {"before": (0.37, 0.45), "after": (0.83, 0.91)}
 """From where to where in its row each side is drawn, from above."""
 
 
-def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Panel:
+def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Timed:
     """Log found and annotated classes, and the changes."""
     names = [name for name in dict.fromkeys(_every(pair)) if name != "ok"]
     panel = Panel("class", max(ROW * len(names), LEAST) + axes.AXIS)
     for row, name in enumerate(names):
         for side, analysis in pair.sides:
-            place, stretches = (row, len(names)), found_stretches(analysis, name)
-            _log_class_row(recording, f"{side}/found", name, stretches, place, FOUND[side])
+            color, place = SIDE_COLORS[side], (row, len(names))
+            stretches = found_stretches(analysis, name)
+            path = f"/class/{side}"
+            log_row(recording, f"{path}/found", name, stretches, color, place, FOUND[side])
             blocks = [(b.start, b.stop) for b in analysis.run.blocks if b.label == name]
-            _log_class_row(recording, f"{side}/annotated", name, blocks, place, ANNOTATED[side])
+            log_row(recording, f"{path}/annotated", name, blocks, color, place, ANNOTATED[side])
     titles = [Label(label.place, spoken(label.text)) for label in axes.row_labels(names)]
     axes.log_left(recording, panel, titles or [Label(0.5, "no failure\nin either run")])
     told = [
@@ -208,7 +191,7 @@ def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Chang
             [_shade(change) for change in found],
             warnings=[change.kind == NEW for change in found],
         )
-    return panel
+    return axes.rows(panel, "/class")
 
 
 def log_shades(
@@ -223,7 +206,6 @@ def log_shades(
         unstable.log_stretches(
             recording,
             f"{path}/{kind}",
-            axes.TIMELINE,
             [(change.start, change.stop) for change in own],
             between=between,
             name=kind,
@@ -247,43 +229,18 @@ def _occurs(side: Analysis, name: str) -> bool:
     )
 
 
-def _log_class_row(
-    recording: rr.RecordingStream,
-    how: str,
-    name: str,
-    stretches: Sequence[tuple[float, float]],
-    place: tuple[int, int],
-    between: tuple[float, float],
-) -> None:
-    if not stretches:
-        return
-    row, count = place
-    upper, lower = (axes.TOP * (1.0 - (row + share) / count) for share in between)
-    side = how.partition("/")[0]
-    unstable.log_stretches(
-        recording,
-        f"/class/{how}/{name}",
-        axes.TIMELINE,
-        stretches,
-        between=(lower, upper),
-        name=f"{how.replace('/', ', ')}: {spoken(name)}",
-        color=SIDE_COLORS[side],
-        opaque=True,
-    )
-
-
 JOINT_POINTS = 2000
 """Points of a line: there are three for each signal of a joint."""
 
 
 def log_joints(
     recording: rr.RecordingStream, pair: Pair, limbs: Mapping[str, tuple[str, ...]]
-) -> list[Plot]:
-    """Log the joints' signals of both runs, paler before, and after less before."""
+) -> list[Part]:
+    """Log the joints' signals of both runs, paler before, and after less before: tabs of limbs."""
     before, after = (
         {_signal_name(signal): signal for signal in signals(side.run)} for _, side in pair.sides
     )
-    found = []
+    plots: dict[str, list[Part]] = {}
     for name in dict.fromkeys([*after, *before]):
         shown = {"before": before.get(name), "after": after.get(name)}
         shown["change"] = _difference(shown["before"], shown["after"])
@@ -306,11 +263,12 @@ def log_joints(
         for limb in limbs:
             both = [paths[what].get(limb) for what in ("before", "after") if what in paths]
             change = paths.get("change", {}).get(limb)
-            if over := tuple(path for path in both if path):
-                found.append(Plot(limb, f"{name} [{unit}]", over))
+            own = plots.setdefault(limb, [])
+            if over := [path for path in both if path]:
+                own.append(signal_plot(f"{name} [{unit}]", over))
             if change:
-                found.append(Plot(limb, f"change of {name} [{unit}]", (change,)))
-    return found
+                own.append(signal_plot(f"change of {name} [{unit}]", [change]))
+    return limb_tabs(plots)
 
 
 def _signal_name(signal: Signal) -> str:
@@ -342,8 +300,12 @@ ROBOT_SHADES = 16
 
 def log_links(
     recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair: Pair
-) -> tuple[Panel, list[str]]:
-    """Log the noise of links: colour both robots by it, and rows by how it changed."""
+) -> tuple[Part, list[Part]]:
+    """Log the noise of links: colour both robots by it, and rows by how it changed.
+
+    Returns:
+        The changes; sound powers, and levels of the links that changed most.
+    """
     assert pair.links is not None
     scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
     for tree, noise in zip(trees.values(), pair.links, strict=True):
@@ -352,11 +314,8 @@ def log_links(
     names = [level.name for level in by_link(pair)]
     for (side, _), noise in zip(pair.sides, pair.links, strict=True):
         for name in names[:BOTH]:
-            power = noise.vibration[:, [noise.links.index(name)]]
-            level = np.maximum(decibel(power / REFERENCE_POWER), LOWEST_POWER_DB)
-            path = f"/links/{name}/{side}"
-            shade = [SIDE_COLORS[side]]
-            axes.log_lines(recording, path, noise.time, level, names=[side], colours=shade)
+            power = noise.vibration[:, noise.links.index(name)]
+            log_power(recording, f"/links/{name}/{side}", noise, power, SIDE_COLORS[side])
     own = names[:SHOWN_LINKS]
     time, change = link_steps(pair, own)
     panel = Panel("links", DETAILS)
@@ -371,112 +330,21 @@ def log_links(
         )
     axes.log_left(recording, panel, axes.row_labels(own) or [Label(0.5, "no links")])
     axes.log_scale(recording, panel, CHANGE)
-    return panel, names[:BOTH]
+    parts = [unstable.plot("Sound power [dB re 1 pW]", "/power", axes.ALL, legend=True)]
+    if names:
+        both = [
+            unstable.plot(f"{name} [dB re 1 pW]", f"/links/{name}", axes.ALL, legend=True)
+            for name in names[:BOTH]
+        ]
+        parts.append(unstable.tabs(*both, name="Links, before and after"))
+    return axes.rows(panel, "/change/links", name="Links, change")[0], parts
 
 
-WHOLE = 832.0
-"""Height of all parts, in points, in a window of 1440 x 900."""
 ABOVE = 240.0
 """Least height of the report and the robots."""
 CHANGE_PATHS = ("/change/noise", "/change/none", "/change/finding/**", axes.SPAN)
 TITLES = 28.0
 """Height of a row of tabs."""
-
-
-@dataclass(frozen=True)
-class Contents:
-    """What a recording of two runs holds, that the layout depends on.
-
-    Attributes:
-        joints: Plots of joint signals.
-        classes: Panel of the classes.
-        spectra: Panels of the spectrograms, by what they show.
-        changes: Panel of the links' changes; None without links.
-        links: Links whose power before and after is shown.
-        cameras: From where each robot is seen; empty without one.
-        events: Whether any change is listed.
-        ends: Lower and upper ends of the axes of the noise and of the change.
-        sounds: Names of the sounds.
-        loop: Stretch of time that playing repeats, in [s].
-    """
-
-    joints: Sequence[Plot]
-    classes: Panel
-    spectra: Mapping[str, Panel]
-    changes: Panel | None
-    links: Sequence[str]
-    cameras: Mapping[str, Camera]
-    events: bool
-    ends: Ends
-    sounds: Sequence[str]
-    loop: tuple[float, float] | None
-
-
-def layout(contents: Contents) -> Blueprint:
-    """Lay a comparison out."""
-    report = unstable.text("Before \u2192 after", "/report")
-    events = unstable.events("Changes", "/events")
-    text = unstable.tabs(report, events) if contents.events else report
-    text = unstable.above((unstable.drawing("/verdict"), axes.VERDICT), (text, ABOVE))
-    head: list[tuple[Part, float]] = [(text, 34.0)]
-    for side, camera in contents.cameras.items():
-        head.append((unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0))
-    if contents.cameras:
-        head.append((unstable.drawing(f"/axis/{KEY.name}/right"), 8.0))
-    over_time = [
-        (
-            contents.classes,
-            axes.row_plot("/class"),
-        ),
-        (
-            LEVEL,
-            unstable.plot(
-                "Level", "/level", axes.ALL, between=(LOW_DB, HIGH_DB), fixed=True, titled=False
-            ),
-        ),
-        (
-            CHANGED,
-            unstable.plot(
-                "Change",
-                "/change",
-                CHANGE_PATHS,
-                between=contents.ends.change,
-                fixed=True,
-                titled=False,
-            ),
-        ),
-    ]
-    parts = [(axes.part(panel, plot), panel.height) for panel, plot in over_time]
-    whole = unstable.above(
-        (unstable.beside(*head), ABOVE), *parts, (_details(contents), DETAILS + TITLES)
-    )
-    return unstable.blueprint(whole, TIMELINE, contents.loop)
-
-
-def _details(contents: Contents) -> Part:
-    parts: list[Part] = []
-    if contents.changes is not None:
-        plot = axes.row_plot("/change/links")
-        parts.append(axes.part(contents.changes, plot, name="Links, change"))
-    for what, panel in contents.spectra.items():
-        plot = axes.row_plot(f"/spectrogram/{what}")
-        parts.append(
-            axes.part(panel, plot, name=f"Spectrum{', ' if what == 'change' else ' '}{what}")
-        )
-    plot = unstable.plot(
-        "Noise", "/noise", axes.ALL, between=contents.ends.noise, fixed=True, titled=False
-    )
-    parts.append(axes.part(NOISE_PANEL, plot, name="Noise"))
-    if contents.cameras:
-        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", axes.ALL, legend=True))
-    if contents.links:
-        both = [
-            unstable.plot(f"{name} [dB re 1 pW]", f"/links/{name}", axes.ALL, legend=True)
-            for name in contents.links
-        ]
-        parts.append(unstable.tabs(*both, name="Links, before and after"))
-    parts += [unstable.audio(f"Listen {name}", f"/sound/{name}") for name in contents.sounds]
-    return unstable.tabs(*parts, *limb_tabs(contents.joints))
 
 
 ASPECT = 1.35
@@ -492,52 +360,54 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
     """
     parts = (pair.before.sha256, pair.after.sha256, str(pair.alignment.lag))
     identity = hashlib.sha256(" ".join(parts).encode()).hexdigest()
+    found, time = changes(pair), pair.time
+    loop = largest_change(pair, found)
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
-        trees = {} if pair.links is None else _robots(pair, Path(folder))
-        contents = _log(recording, pair, trees, Path(folder))
-        recording.send_blueprint(layout(contents))  # takes the place of an older layout
+        axes.log_span(recording, float(time[0]), float(time[-1]))
+        trees, robots = _log_robots(recording, pair, Path(folder))
+        over_time = [log_changes(recording, pair, found), *log_levels(recording, pair, found)]
+        details = _log_details(recording, pair, trees, loop[0])
+        head = unstable.beside((_log_text(recording, pair, found), 34.0), *robots)
+        whole = unstable.above((head, ABOVE), *over_time, (details, DETAILS + TITLES))
+        recording.send_blueprint(unstable.blueprint(whole, loop))  # instead of an older layout
 
 
-def _robots(pair: Pair, folder: Path) -> dict[str, UrdfTree]:
-    """The robot before and after, as two robots."""
-    return {side: robot.of_run(each.run, folder, side=side) for side, each in pair.sides}
+def _log_robots(
+    recording: rr.RecordingStream, pair: Pair, folder: Path
+) -> tuple[dict[str, UrdfTree], list[Timed]]:
+    """Log the robot before and after, as two robots, and the scale of their colours."""
+    if pair.links is None:
+        return {}, []
+    assert pair.after.run.robot is not None
+    trees = {side: robot.of_run(each.run, folder, side=side) for side, each in pair.sides}
+    pairs = [(trees[side], each.run) for side, each in pair.sides]
+    for tree, own in pairs:
+        robot.log(recording, tree, own, coloured=True)
+    urdf = robot.drawn_file(pair.after.run.robot, folder)
+    cameras = log_cameras(recording, pairs, urdf, aspect=ASPECT)
+    views = [
+        (unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0)
+        for side, camera in zip(trees, cameras, strict=True)
+    ]
+    return trees, [*views, (unstable.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 
-def _log(
-    recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree], folder: Path
-) -> Contents:
-    run, found = pair.after.run, changes(pair)
-    panel, shown, cameras = None, list[str](), dict[str, Camera]()
-    axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
+def _log_details(
+    recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree], around: float
+) -> Part:
+    """Log what lies behind each other: links, spectra, noise, sounds, signals of joints."""
+    parts, of_links = list[Part](), list[Part]()
     if trees:
-        assert run.robot is not None
-        pairs = [(trees[side], each.run) for side, each in pair.sides]
-        for tree, own in pairs:
-            robot.log(recording, tree, own, coloured=True)
-        urdf = robot.drawn_file(run.robot, folder)
-        cameras = dict(zip(trees, log_cameras(recording, pairs, urdf, aspect=ASPECT), strict=True))
-        panel, shown = log_links(recording, trees, pair)
-    names = dict.fromkeys((*run.joint_names, *pair.before.run.joint_names))
-    limb_plots = log_joints(recording, pair, limbs(tuple(names), trees.get("after")))
-    loop, joint = largest_change(pair, found), _joint(pair)
-    axes.log_verdict(recording, *verdict(pair))
-    audible = _sounds(pair, loop[0])
-    start = float(pair.time[0])
-    for name, sound in audible.items():
-        unstable.log_audio(recording, f"/sound/{name}", sound, TIMELINE, start=start)
-    _log_text(recording, pair)
-    return Contents(
-        joints=limb_plots,
-        classes=log_changes(recording, pair, found),
-        ends=log_levels(recording, pair, found),
-        spectra=log_spectra(recording, pair, joint),
-        changes=panel,
-        links=shown,
-        cameras=cameras,
-        events=bool(found),
-        sounds=tuple(audible),
-        loop=loop,
-    )
+        changed, of_links = log_links(recording, trees, pair)
+        parts.append(changed)
+    parts += log_spectra(recording, pair, _joint(pair))
+    parts += [*log_noise(recording, pair), *of_links]
+    for name, sound in _sounds(pair, around).items():
+        unstable.log_audio(recording, f"/sound/{name}", sound, float(pair.time[0]))
+        parts.append(unstable.audio(f"Listen {name}", f"/sound/{name}"))
+    names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
+    parts += log_joints(recording, pair, limbs(tuple(names), trees.get("after")))
+    return unstable.tabs(*parts)
 
 
 def _joint(pair: Pair) -> str:
@@ -568,7 +438,8 @@ def _sounds(pair: Pair, around: float) -> dict[str, bytes]:
     return {name: s.file(gain, lead=lead) for name, s in made.items()}
 
 
-def _log_text(recording: rr.RecordingStream, pair: Pair) -> None:
+def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Part:
+    """Log the verdict and the report; they, with the list of changes behind the report."""
     properties = {
         "before_sha256": pair.before.sha256,
         "after_sha256": pair.after.sha256,
@@ -579,3 +450,8 @@ def _log_text(recording: rr.RecordingStream, pair: Pair) -> None:
         "vibration_change_db": whole(pair).change,
     }
     log_report(recording, f"{pair.before.name} → {pair.after.name}", report(pair), properties)
+    axes.log_verdict(recording, *verdict(pair))
+    text = unstable.text("Before \u2192 after", "/report")
+    if found:
+        text = unstable.tabs(text, unstable.events("Changes", "/events"))
+    return unstable.above((unstable.drawing("/verdict"), axes.VERDICT), (text, ABOVE))

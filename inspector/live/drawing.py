@@ -14,8 +14,7 @@ from inspector import colors
 from inspector.levels import SPECTRUM
 from inspector.live.robot import KEY
 from inspector.recording import axes, unstable
-from inspector.recording.axes import TIMELINE, Label, Panel, log_events, scalars, style_lines
-from inspector.recording.camera import Camera
+from inspector.recording.axes import Label, Panel, log_events, scalars, style_lines
 from inspector.recording.panels import (
     BANDS,
     FOUND,
@@ -26,7 +25,7 @@ from inspector.recording.panels import (
     readable,
     style_bands,
 )
-from inspector.recording.unstable import Part
+from inspector.recording.unstable import TIMELINE, Camera, Part
 from inspector.report.markdown import spoken
 from inspector.spectrogram import amplitudes, in_bands, window_length
 from inspector.thinning import extremes
@@ -330,7 +329,7 @@ class Drawing:
             middles = axes.TOP * (1.0 - (np.arange(width) + (upper + lower) / 2) / width)
             bands = np.where(values > 0.0, middles, np.nan).repeat(unstable.COPIES, axis=1)
             half = axes.TOP * (lower - upper) / 2 / width
-            unstable.send_bands(self._recording, path, TIMELINE, time, bands, half)
+            unstable.send_bands(self._recording, path, time, bands, half)
             return
         index = rr.TimeColumn(TIMELINE, duration=time.astype("timedelta64[ns]"))
         self._recording.send_columns(path, indexes=[index], columns=columns)
@@ -401,7 +400,7 @@ class Drawing:
             for panel, part in over_time
         ]
         whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*right), 64.0))
-        return unstable.blueprint(whole, TIMELINE, following=True)
+        return unstable.blueprint(whole, following=True)
 
     def _signals(self, shown: Mapping[str, Any]) -> Part:
         """Plots of joint signals and of scores, behind each other."""

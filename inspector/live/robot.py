@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 import noisemodel as nm
 from inspector.levels import LINKS
-from inspector.recording import axes, framing
+from inspector.recording import axes
+from inspector.recording import camera as cameras
 from inspector.recording import robot as scene
-from inspector.recording.camera import Camera, fitted
+from inspector.recording.camera import fitted
+from inspector.recording.unstable import Camera
 from noisemodel.extended import FAST, by_moments, second_moments, vibrating
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.robot import Limits, joint_limits
@@ -132,7 +134,7 @@ class LiveRobot:
         self._rotation = Rotation
         with TemporaryDirectory() as folder:
             tree = scene.load(robot, Path(folder), joint_names)
-            self._outermost = framing.outermost(scene.drawn_file(robot, Path(folder)))
+            self._outermost = cameras.outermost(scene.drawn_file(robot, Path(folder)))
             scene.log_shapes(recording, tree, coloured=True)
             self._kinds = scene.shapes(tree)
         self._tree = tree
@@ -156,7 +158,7 @@ class LiveRobot:
         self._slide, self._spin = np.where(slides, axis, 0.0), np.where(slides, 0.0, axis)
         self._place = np.array([joint.origin_xyz for joint in joints])
         self._turn = Rotation.from_euler("xyz", [joint.origin_rpy for joint in joints])
-        base = [str(tree.root_link().name), framing.VIEW] if floating else []
+        base = [str(tree.root_link().name), cameras.VIEW] if floating else []
         self.children = [joint.child_link for joint in joints] + base
         self._carriers = [joint.parent_link for joint in joints] + len(base) * [scene.WORLD]
         self._at_once, self._shown = at_once, 0
@@ -182,19 +184,19 @@ class LiveRobot:
         pose = None if base_pose is None else _known(base_pose)[None]
         seen = fitted(self._reached(first, pose), room=ROOM if pose is not None else 1.0)
         if pose is not None:
-            seen = framing.standing(seen, self._tree, moves=True)
-            framing.log_floor(self._recording, self._tree, seen, pose[:, :2] + AROUND)
+            seen = cameras.standing(seen, self._tree, moves=True)
+            cameras.log_floor(self._recording, self._tree, seen, pose[:, :2] + AROUND)
             return seen
         random = np.random.default_rng(0)
         everywhere = random.uniform(self._low, self._high, (POSES, len(position)))
         floor = seen.floor
         seen = fitted(self._reached(np.concatenate((first, everywhere)), None))
-        return framing.standing(replace(seen, floor=floor), self._tree, moves=False)
+        return cameras.standing(replace(seen, floor=floor), self._tree, moves=False)
 
     def _reached(self, position: Array, pose: Array | None) -> Iterator[Array]:
         angle = self._factor * position[:, self._columns] + self._offset
         angles = dict(zip(self._names, angle.T, strict=True))
-        return framing.reached(self._tree, self._outermost, angles, pose)
+        return cameras.reached(self._tree, self._outermost, angles, pose)
 
     def colour(self, time: float, links: Sequence[str], level: Array) -> None:
         """Colour the links, those whose colour changes.
@@ -235,7 +237,7 @@ class LiveRobot:
             return
         places, turns = self.transforms(position)
         if base_pose is not None:
-            below = base_pose[:3] * framing.ON_FLOOR
+            below = base_pose[:3] * cameras.ON_FLOOR
             places = np.vstack((places, base_pose[:3], below))
             turns = np.vstack((turns, base_pose[3:], UPRIGHT))
         self._waiting.append((time, places, turns))

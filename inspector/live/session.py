@@ -29,7 +29,7 @@ from inspector.live.samples import (
 )
 from inspector.live.sink import LATE, Sink
 from inspector.logs.wrongrobot import LONG, LimitWatch, check_joints
-from inspector.recording.camera import Camera
+from inspector.recording.unstable import Camera
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from inspector.status import Status
 from noiseclassifier import Event, merged

@@ -10,6 +10,7 @@ map. Everything else is drawn in a narrow view at either side.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -20,10 +21,9 @@ from inspector.colors import Color
 from inspector.errors import InspectorError
 from inspector.levels import Scale
 from inspector.recording import unstable
-from inspector.recording.unstable import Part
+from inspector.recording.unstable import TIMELINE, Part
 from noisemodel.types import Array, Mask, Real
 
-TIMELINE = "time"
 SPAN = "/span"
 """Lies in every plot over time, so that it reaches from the start to the end."""
 FARTHEST = 9e9
@@ -70,6 +70,20 @@ def log_lines(
     """
     style_lines(recording, path, names=names, colours=colours)
     recording.send_columns(path, indexes=[at(time)], columns=scalars(values))
+
+
+def log_line(
+    recording: rr.RecordingStream,
+    path: str,
+    time: Array,
+    values: Real,
+    color: Color,
+    *,
+    name: str = "",
+) -> None:
+    """Log one line, which is called as its path ends unless it is named."""
+    name = name or path.rpartition("/")[2]
+    log_lines(recording, path, time, values[:, None], names=[name], colours=[color])
 
 
 def style_lines(
@@ -135,10 +149,9 @@ APART = 17.0
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel over time.
+    """A panel over time; what is beside it lies at its name below ``/axis``.
 
     Attributes:
-        name: Entity path of what is beside it, below ``/axis``.
         height: With its time axis, in points, in a window of 1440 x 900; it grows with the window.
     """
 
@@ -179,9 +192,8 @@ def log_right(recording: rr.RecordingStream, panel: Panel, labels: Sequence[Labe
     _log_labels(recording, f"/axis/{panel.name}/right", panel, labels)
 
 
-def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: str = "") -> None:
+def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: str = "dB") -> None:
     """Log a scale of colours at the right of a panel, with its ticks in decibels."""
-    title = title or "dB"
     path, shift = f"/axis/{panel.name}/right", -22.0 / panel.height
     below = 2.0 * HALF + LINE * title.count("\n") + HALF  # the title ends, the highest tick begins
     top = 1.0 - below / (GROWN * panel.height - AXIS)
@@ -203,16 +215,21 @@ ALL = ("$origin/**", SPAN)
 """What a plot shows: all that lies below its path, from the start to the end."""
 
 
-def row_plot(path: str) -> Part:
-    """Plot the rows that lie below a path."""
-    name = path.rpartition("/")[2]
-    return unstable.plot(name, path, ALL, between=(0.0, TOP), fixed=True, titled=False)
+Timed: TypeAlias = tuple[Part, float]
+"""A panel over time with its height, in points."""
 
 
 def part(panel: Panel, plot: Part, *, name: str | None = None) -> Part:
     """A panel with what stands beside it."""
     left, right = (unstable.drawing(f"/axis/{panel.name}/{side}") for side in ("left", "right"))
     return unstable.beside((left, LEFT), (plot, MIDDLE), (right, RIGHT), name=name)
+
+
+def rows(panel: Panel, path: str, *, name: str | None = None) -> Timed:
+    """A panel of the rows that lie below a path."""
+    title = path.rpartition("/")[2]
+    plot = unstable.plot(title, path, ALL, between=(0.0, TOP), fixed=True, titled=False)
+    return part(panel, plot, name=name), panel.height
 
 
 def row_labels(names: Sequence[str]) -> list[Label]:

@@ -19,7 +19,8 @@ from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps
 from inspector.levels import Scale
 from inspector.recording import axes, robot, unstable
-from inspector.recording.axes import Label, Panel, at
+from inspector.recording.axes import Label, Panel, Timed, at
+from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
 from inspector.report.markdown import brief, classes_of, finding_of, spoken
@@ -43,10 +44,9 @@ def log_gaps(
     if found:
         times = [np.append(np.linspace(*gap, HATCHES + 1), gap[1]) for gap in found]
         stroke = np.append(np.resize(between, HATCHES + 1), np.nan)
-        line = np.tile(stroke, len(found))[:, None]
-        shade, names = [colors.CLASSES["unknown"]], ["gap: no samples"]
-        path = f"{path}/gap"
-        axes.log_lines(recording, path, np.concatenate(times), line, names=names, colours=shade)
+        line, shade = np.tile(stroke, len(found)), colors.CLASSES["unknown"]
+        name = "gap: no samples"
+        axes.log_line(recording, f"{path}/gap", np.concatenate(times), line, shade, name=name)
 
 
 MAX_JOINTS = 10
@@ -132,12 +132,8 @@ MARKERS: tuple[MarkerShapeLike, ...] = (
 """Of the classes, so that a finding shorter than a pixel is seen."""
 
 
-def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> Panel | None:
-    """Log the classes that a model found, and those that are annotated.
-
-    Returns:
-        The panel of the rows; None if nothing was found or annotated.
-    """
+def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed]:
+    """Log the classes that a model found, and those that are annotated; nothing without any."""
     run, labels = analysis.run, analysis.labels
     colours = colours_of(analysis)
     if labels is not None:
@@ -145,16 +141,19 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> Panel | No
     _log_events(recording, analysis, colours)
     names = classes_of(analysis)
     if not names:
-        return None
+        return []
     lost = gaps(run)
     count = len(names) + bool(lost)
     panel = Panel("class", ROW * count + axes.AXIS)
     for row, name in enumerate(names):
         found = found_stretches(analysis, name)
         blocks = [(block.start, block.stop) for block in run.blocks if block.label == name]
-        _log_row(recording, "found", name, found, colours[name], (row, count), FOUND)
-        _log_row(recording, "annotated", name, blocks, axes.INK, (row, count), ANNOTATED)
-    _log_marks(recording, analysis, names, colours, count)
+        place = (row, count)
+        log_row(recording, "/class/found", name, found, colours[name], place, FOUND)
+        log_row(recording, "/class/annotated", name, blocks, axes.INK, place, ANNOTATED)
+        if starts := [event.start for event in analysis.findings if event.label == name]:
+            middle = axes.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
+            log_marks(recording, name, row, colours[name], starts, [middle] * len(starts))
     if lost:
         log_gaps(recording, "/class", run, (0.1 * axes.TOP / count, 0.9 * axes.TOP / count))
     shown = [(spoken(name), readable(colours[name])) for name in names]
@@ -166,7 +165,7 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> Panel | No
     told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")] if both else []
     only = "found" if labels is not None else "annotated"
     axes.log_right(recording, panel, told or [Label(0.5, only)])
-    return panel
+    return [axes.rows(panel, "/class")]
 
 
 def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
@@ -197,7 +196,6 @@ def log_shades(
         unstable.log_stretches(
             recording,
             f"{path}/{name}",
-            axes.TIMELINE,
             [(event.start, event.stop) for event in analysis.findings if event.label == name],
             between=between,
             name=f"found: {spoken(name)}",
@@ -211,22 +209,27 @@ def found_stretches(analysis: Analysis, name: str) -> list[tuple[float, float]]:
     return found + [(start, stop) for start, stop, label in analysis.lane if label == name]
 
 
-def _log_row(
+def log_row(
     recording: rr.RecordingStream,
-    how: str,
+    path: str,
     name: str,
     stretches: Sequence[tuple[float, float]],
     color: colors.Color,
     place: tuple[int, int],
     between: tuple[float, float],
 ) -> None:
+    """Log when a class was, if it was, in a row; where in its row, from above.
+
+    Args:
+        place: Number of the row and of all rows.
+    """
     if stretches:
         row, count = place
         upper, lower = (axes.TOP * (1.0 - (row + share) / count) for share in between)
+        how = path.removeprefix("/class/").replace("/", ", ")
         unstable.log_stretches(
             recording,
-            f"/class/{how}/{name}",
-            axes.TIMELINE,
+            f"{path}/{name}",
             stretches,
             between=(lower, upper),
             name=f"{how}: {spoken(name)}",
@@ -235,39 +238,32 @@ def _log_row(
         )
 
 
-def _log_marks(
+def log_marks(
     recording: rr.RecordingStream,
-    analysis: Analysis,
-    names: Sequence[str],
-    colours: Mapping[str, colors.Color],
-    count: int,
+    name: str,
+    number: int,
+    color: colors.Color,
+    time: Sequence[float],
+    place: Sequence[float],
 ) -> None:
-    for row, name in enumerate(names):
-        starts = [event.start for event in analysis.findings if event.label == name]
-        if starts:
-            place = axes.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
-            points = rr.SeriesPoints(
-                names=[spoken(name)],
-                colors=[colours[name]],
-                markers=[MARKERS[row % len(MARKERS)]],
-                marker_sizes=[4.0],
-            )
-            recording.log(f"/class/mark/{name}", points, static=True)
-            recording.send_columns(
-                f"/class/mark/{name}",
-                indexes=[axes.at(np.array(starts))],
-                columns=axes.scalars(np.full(len(starts), place)),
-            )
+    """Log a marker of a class at the start of each finding, at its place in the panel."""
+    shape = MARKERS[number % len(MARKERS)]
+    points = rr.SeriesPoints(
+        names=[spoken(name)], colors=[color], markers=[shape], marker_sizes=[4.0]
+    )
+    path = f"/class/mark/{name}"
+    recording.log(path, points, static=True)
+    columns = axes.scalars(np.array(place))
+    recording.send_columns(path, indexes=[axes.at(np.array(time))], columns=columns)
 
 
 def _log_scores(
     recording: rr.RecordingStream, labels: Labels, colours: dict[str, colors.Color]
 ) -> None:
     centres = (labels.start + labels.stop) / 2
-    for index, name in enumerate(labels.classes):
-        score = labels.scores[:, index : index + 1]
-        names, shade = [spoken(name)], [colours[name]]
-        axes.log_lines(recording, f"/score/{name}", centres, score, names=names, colours=shade)
+    for name, score in zip(labels.classes, labels.scores.T, strict=True):
+        path, called = f"/score/{name}", spoken(name)
+        axes.log_line(recording, path, centres, score, colours[name], name=called)
 
 
 def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
@@ -304,31 +300,25 @@ LOW_DB, HIGH_DB = -80.0, 30.0
 """Ends of the level's axis, in [dB re 1 rad/s]."""
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A panel of a curve.
-
-    Attributes:
-        panel: The panel.
-        path: Entity path below which its lines lie.
-        between: Lower and upper end of its axis.
-    """
-
-    panel: Panel
-    path: str
-    between: tuple[float, float]
-
-
 def log_curves(
     recording: rr.RecordingStream, analysis: Analysis, beside: Comparison | None = None
-) -> list[Curve]:
+) -> list[Timed]:
     """Log the noise, its level and the repetitions' level, and the probability of a failure."""
     curves = [_log_noise(recording, analysis), _log_level(recording, analysis, beside)]
     if analysis.labels is not None and analysis.alarm is not None:
         curves.append(_log_probability(recording, analysis, analysis.alarm))
-    for curve in curves:
-        log_gaps(recording, curve.path, analysis.run, curve.between)
     return curves
+
+
+def _curve(
+    recording: rr.RecordingStream, analysis: Analysis, panel: Panel, between: tuple[float, float]
+) -> Timed:
+    """Shade findings and hatch gaps behind a curve, whose axis has these ends."""
+    path = f"/{panel.name}"
+    log_shades(recording, f"{path}/finding", analysis, between)
+    log_gaps(recording, path, analysis.run, between)
+    plot = unstable.plot(panel.name, path, axes.ALL, between=between, titled=False)
+    return axes.part(panel, plot), panel.height
 
 
 def scaled(values: Array) -> tuple[float, str]:
@@ -342,70 +332,65 @@ def scaled(values: Array) -> tuple[float, str]:
     return 10.0**power, "rad/s" if power == 0 else f"{10.0**power:g} rad/s"
 
 
-def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> Curve:
+def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> Timed:
     run, noise = analysis.run, analysis.noise
     scale, unit = scaled(noise[run.mask])
     time, values = extremes(run.time[run.mask], noise[run.mask, None] / scale, points=NOISE_POINTS)
-    between = (0.0, 1.08 * max(float(values.max(initial=0.0)), 0.01))
-    log_shades(recording, "/noise/finding", analysis, between)
-    names = [f"noise p\u0302 [{unit}]"]
-    path = "/noise/simplified"
-    axes.log_lines(recording, path, time, values, names=names, colours=[colors.NOISE])
-    axes.log_left(recording, NOISE, [Label(0.5, f"noise p\u0302\n[{unit}]")])
     peak = float(values.max(initial=0.0))
-    axes.log_right(
-        recording, NOISE, [Label(min(peak / between[1], 0.9), f"max\n{peak * scale:.3g}")]
-    )
-    return Curve(NOISE, "/noise", between)
+    between = (0.0, 1.08 * max(peak, 0.01))
+    name = f"noise p\u0302 [{unit}]"
+    axes.log_line(recording, "/noise/simplified", time, values[:, 0], colors.NOISE, name=name)
+    axes.log_left(recording, NOISE, [Label(0.5, f"noise p\u0302\n[{unit}]")])
+    label = Label(min(peak / between[1], 0.9), f"max\n{peak * scale:.3g}")
+    axes.log_right(recording, NOISE, [label])
+    return _curve(recording, analysis, NOISE, between)
 
 
 def _log_level(
     recording: rr.RecordingStream, analysis: Analysis, beside: Comparison | None
-) -> Curve:
-    between, lowest = (LOW_DB, HIGH_DB), 10.0
-    time, level = analysis.noise_level
-    log_shades(recording, "/level/finding", analysis, between)
+) -> Timed:
+    (time, level), lowest = analysis.noise_level, 10.0
     if beside is not None:
         time, level, lowest = beside.time, beside.noise[:, None], beside.octaves[0][0]
         names = [f"{each} repetition [dB re 1 rad/s]" for each in ("quietest", "loudest")]
         path, band = "/level/repetitions", [colors.BAND, colors.BAND]
         axes.log_lines(recording, path, time, beside.band, names=names, colours=band)
-    names = [f"noise above {lowest:g} Hz [dB re 1 rad/s]"]
-    path = "/level/noise"
-    axes.log_lines(recording, path, time, level, names=names, colours=[colors.LEVEL])
-    span = HIGH_DB - LOW_DB
-    marks = [
-        Label((mark - LOW_DB) / span, axes.written(mark), 44.0)
-        for mark in (-60.0, -40.0, -20.0, 0.0)
-    ]
-    title = Label(0.62, f"level above\n{lowest:g} Hz [dB re\n1 rad/s]", -20.0)
-    axes.log_left(recording, LEVEL, [title, *marks])
+    name = f"noise above {lowest:g} Hz [dB re 1 rad/s]"
+    axes.log_line(recording, "/level/noise", time, level[:, 0], colors.LEVEL, name=name)
+    title = f"level above\n{lowest:g} Hz [dB re\n1 rad/s]"
+    log_level_axis(recording, LEVEL, Label(0.62, title, -20.0))
     peak = float(np.nanmax(level, initial=LOW_DB))
-    place = min(max((peak - LOW_DB) / span, 0.05), 0.85)
+    place = min(max((peak - LOW_DB) / (HIGH_DB - LOW_DB), 0.05), 0.85)
     axes.log_right(recording, LEVEL, [Label(place, f"max\n{axes.written(peak)}")])
-    return Curve(LEVEL, "/level", between)
+    return _curve(recording, analysis, LEVEL, (LOW_DB, HIGH_DB))
 
 
-def _log_probability(recording: rr.RecordingStream, analysis: Analysis, alarm: float) -> Curve:
+def log_level_axis(recording: rr.RecordingStream, panel: Panel, title: Label) -> None:
+    """Log the title and the ticks of the axis of levels."""
+    marks = [
+        Label((tick - LOW_DB) / (HIGH_DB - LOW_DB), axes.written(tick), 44.0)
+        for tick in (-60.0, -40.0, -20.0, 0.0)
+    ]
+    axes.log_left(recording, panel, [title, *marks])
+
+
+def _log_probability(recording: rr.RecordingStream, analysis: Analysis, alarm: float) -> Timed:
     labels, run = analysis.labels, analysis.run
     assert labels is not None
     middles = (labels.start + labels.stop) / 2
-    failure = 1.0 - labels.scores[:, :1]
-    between = (0.0, 1.05)
-    log_shades(recording, "/probability/finding", analysis, between)
+    failure = 1.0 - labels.scores[:, 0]
     # Between frames that a gap parts there is no line.
     apart = np.flatnonzero(labels.start[1:] > labels.stop[:-1] + 1.0 / run.rate) + 1
     middles = np.insert(middles, apart, labels.start[apart])
-    failure = np.insert(failure, apart, np.nan, axis=0)
-    path, shade = "/probability/failure", [colors.LEVEL]
-    names = ["probability of a failure"]
-    axes.log_lines(recording, path, middles, failure, names=names, colours=shade)
-    ends, path = np.array([run.time[0], run.time[-1]]), "/probability/alarm"
-    names, shade = [f"alarm threshold {alarm:g}"], [colors.THRESHOLD]
-    axes.log_lines(recording, path, ends, np.full((2, 1), alarm), names=names, colours=shade)
+    failure = np.insert(failure, apart, np.nan)
+    path, name = "/probability/failure", "probability of a failure"
+    axes.log_line(recording, path, middles, failure, colors.LEVEL, name=name)
+    path, name = "/probability/alarm", f"alarm threshold {alarm:g}"
+    ends = run.time[[0, -1]]
+    axes.log_line(recording, path, ends, np.full(2, alarm), colors.THRESHOLD, name=name)
     axes.log_left(recording, PROBABILITY, [Label(0.5, "probability\nof a failure")])
     axes.log_right(recording, PROBABILITY, [Label(alarm, f"alarm {alarm:g}")])
-    return Curve(PROBABILITY, "/probability", between)
+    return _curve(recording, analysis, PROBABILITY, (0.0, 1.05))
 
 
 JOINT_POINTS = 4000
@@ -413,30 +398,12 @@ JOINT_POINTS = 4000
 UNITS = {"velocity": "rad/s", "position": "rad", "effort": "N m"}
 
 
-@dataclass(frozen=True)
-class Plot:
-    """Lines that share a plot.
-
-    Attributes:
-        limb: Whose joints they are of.
-        title: What they are, with the unit.
-        paths: Their entities.
-    """
-
-    limb: str
-    title: str
-    paths: tuple[str, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """A signal of joints.
+    """A signal of joints, of a kind such as "velocity" or "stage planned".
 
     Attributes:
-        kind: Such as "velocity" or "stage planned".
-        desired: Whether it is the desired one.
         values: Shape (samples, joints), in the unit of its kind.
-        joints: Names of its joints.
     """
 
     kind: str
@@ -470,9 +437,9 @@ def signals(run: Run) -> list[Signal]:
 
 def log_joints(
     recording: rr.RecordingStream, run: Run, limbs: Mapping[str, tuple[str, ...]]
-) -> list[Plot]:
-    """Log the joints' signals, at most 4000 points each."""
-    found: list[Plot] = []
+) -> list[Part]:
+    """Log the joints' signals, at most 4000 points each; tabs of a limb each."""
+    plots: dict[str, list[Part]] = {}
     whole = bool(run.mask.all())  # then a signal can stay in its file
     for kind, group in groupby(signals(run), key=lambda signal: signal.kind):
         both = list(group)[::-1]  # the first is drawn below the other
@@ -489,11 +456,20 @@ def log_joints(
             )
             for signal in both
         ]
-        found += [
-            Plot(limb, f"{kind} [{both[0].unit}]", tuple(p[limb] for p in paths if limb in p))
-            for limb in limbs
-        ]
-    return found
+        for limb in limbs:
+            shown = [each[limb] for each in paths if limb in each]
+            plots.setdefault(limb, []).append(signal_plot(f"{kind} [{both[0].unit}]", shown))
+    return limb_tabs(plots)
+
+
+def signal_plot(title: str, paths: Sequence[str]) -> Part:
+    """A plot of lines that lie at these paths."""
+    return unstable.plot(title, "/joints", (*paths, axes.SPAN), legend=True)
+
+
+def limb_tabs(plots: Mapping[str, Sequence[Part]]) -> list[Part]:
+    """A part for each limb, with its plots behind each other."""
+    return [unstable.tabs(*own, name=limb) for limb, own in plots.items()]
 
 
 def log_signal(
@@ -543,19 +519,15 @@ KEY = Panel("key", 285.0)
 """The scale beside the robot."""
 
 
-def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> Panel | None:
-    """Log the levels of the joints that vibrate most.
-
-    Returns:
-        Their panel; None without joints.
-    """
+def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed]:
+    """Log the levels of the joints that vibrate most; nothing without joints."""
     run = analysis.run
     if not run.joint_names:
-        return None
+        return []
     time, level = analysis.joint_levels
     stop = float(run.time[-1]) + 1.0 / run.rate
     scale, edges = levels.JOINTS.following(level), np.append(time, stop)
-    return _log_strips(recording, "joints", analysis, edges, level, run.joint_names, scale)
+    return [_log_strips(recording, "joints", analysis, edges, level, run.joint_names, scale)]
 
 
 BEFORE, AFTER, SAME = (86, 180, 233), (240, 160, 30), (62, 68, 80)
@@ -582,34 +554,29 @@ CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
 """Of levels; what is beyond is as blue or as orange as can be."""
 
 
-def log_over(recording: rr.RecordingStream, beside: Comparison) -> Panel:
+def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
     """Log by how much each joint is louder than its reference: the eight that are most."""
     which = beside.loudest(SHOWN)
     own, shown = [beside.joints[place] for place in which], beside.by_joint[:, which].T
-    panel = Panel("over", STRIP_ROW * len(own) + axes.AXIS)
     rgba = CHANGE.colours(np.nan_to_num(shown, nan=0.0), shades=SHADES)
     rgba[np.isnan(shown)] = axes.EMPTY
     edges = np.append(beside.time - HOP / 2, beside.time[-1] + HOP / 2)
-    names = [f"{each}, over the reference [dB]" for each in own]
-    path = "/strips/over"
-    axes.log_rows(recording, path, edges, rgba, names=names, width=STRIP_WIDTH, lines=STROKES)
-    axes.log_left(recording, panel, axes.row_labels(own))
-    axes.log_scale(recording, panel, CHANGE)
-    return panel
+    title, unit = "Over the reference", ", over the reference [dB]"
+    return _log_strip(recording, "over", title, edges, rgba, own, CHANGE, unit)
 
 
 def log_links(
     recording: rr.RecordingStream, tree: UrdfTree, analysis: Analysis, noise: LinkNoise
-) -> Panel:
+) -> Timed:
     """Log the noise of a robot's links: levels of those that vibrate most, power, colours."""
     time, level = levels.link_levels(noise)
-    _log_power(recording, "/power/total", noise, noise.total, colors.NOISE)
-    for place, index in enumerate(noise.loudest[:POWER_LINES]):
-        color = colors.of_series(POWER_LINES)[place]
+    log_power(recording, "/power/total", noise, noise.total, colors.NOISE)
+    shades = colors.of_series(POWER_LINES)
+    for index, shade in zip(noise.loudest[:POWER_LINES], shades, strict=False):
         path = f"/power/links/{noise.links[index]}"
-        _log_power(recording, path, noise, noise.power[:, index], color)
-    for place, (term, power) in enumerate(noise.terms.items()):
-        _log_power(recording, f"/power/terms/{term}", noise, power, colors.of_series(3)[place])
+        log_power(recording, path, noise, noise.power[:, index], shade)
+    for (term, power), shade in zip(noise.terms.items(), colors.of_series(3), strict=False):
+        log_power(recording, f"/power/terms/{term}", noise, power, shade)
     scale = levels.LINKS.following(level)
     log_robot_levels(recording, tree, noise, scale)
     axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
@@ -636,29 +603,40 @@ def _log_strips(
     level: Array,
     names: Sequence[str],
     scale: Scale,
-) -> Panel:
+) -> Timed:
+    """Log levels, shape (columns, rows), of those that vibrate most."""
     which = chosen(analysis, edges[:-1], level)
-    own = [names[index] for index in which]
-    panel = Panel(name, STRIP_ROW * len(own) + axes.AXIS)
     shown = level[:, which].T
     rgba = scale.colours(np.nan_to_num(shown, nan=-np.inf), shades=axes.SHADES)
     rgba = axes.blanked(rgba, np.asarray(~np.isnan(shown).all(axis=0)))
-    called = [f"{each} [{scale.unit}]" for each in own]
-    axes.log_rows(
-        recording, f"/strips/{name}", edges, rgba, names=called, width=STRIP_WIDTH, lines=STROKES
-    )
-    axes.log_left(recording, panel, axes.row_labels(own))
+    own, title = [names[index] for index in which], f"{name.capitalize()} above 10 Hz"
+    return _log_strip(recording, name, title, edges, rgba, own, scale, f" [{scale.unit}]")
+
+
+def _log_strip(
+    recording: rr.RecordingStream,
+    name: str,
+    title: str,
+    edges: Array,
+    rgba: NDArray[np.uint8],
+    names: Sequence[str],
+    scale: Scale,
+    unit: str,
+) -> Timed:
+    panel, path = Panel(name, STRIP_ROW * len(names) + axes.AXIS), f"/strips/{name}"
+    called = [f"{each}{unit}" for each in names]
+    axes.log_rows(recording, path, edges, rgba, names=called, width=STRIP_WIDTH, lines=STROKES)
+    axes.log_left(recording, panel, axes.row_labels(names))
     axes.log_scale(recording, panel, scale)
-    return panel
+    return axes.rows(panel, path, name=title)
 
 
-def _log_power(
+def log_power(
     recording: rr.RecordingStream, path: str, noise: LinkNoise, power: Array, color: colors.Color
 ) -> None:
-    with np.errstate(divide="ignore"):
-        level = np.maximum(10 * np.log10(power / REFERENCE_POWER), POWER_FLOOR_DB)
-    name = path.rpartition("/")[2]
-    axes.log_lines(recording, path, noise.time, level[:, None], names=[name], colours=[color])
+    """Log a sound power over time, as a level."""
+    level = np.maximum(decibel(power / REFERENCE_POWER), POWER_FLOOR_DB)
+    axes.log_line(recording, path, noise.time, level, color)
 
 
 TOP_HZ = 2000.0
@@ -671,13 +649,17 @@ HEIGHT = 160.0
 
 
 def log_spectrogram(
-    recording: rr.RecordingStream, analysis: Analysis, spectrum: Spectrogram, scale: Scale
-) -> Panel:
+    recording: rr.RecordingStream,
+    analysis: Analysis,
+    spectrum: Spectrogram,
+    scale: Scale,
+    title: str,
+) -> Part:
     """Log a spectrogram on a logarithmic axis, as rows of colours."""
     panel = Panel("spectrogram", HEIGHT)
     log_panel(recording, panel, spectrum, scale, "velocity\nspectrum")
     log_gaps(recording, "/spectrogram", analysis.run, (0.0, axes.TOP))
-    return panel
+    return axes.rows(panel, "/spectrogram", name=title)[0]
 
 
 def log_panel(
@@ -732,17 +714,14 @@ def log_heat(
     axes.log_scale(recording, panel, scale)
 
 
-def log_orders(
-    recording: rr.RecordingStream, analysis: Analysis, scale: Scale
-) -> tuple[str, Panel] | None:
+def log_orders(recording: rr.RecordingStream, analysis: Analysis, scale: Scale) -> list[Part]:
     """Log an order spectrogram: what goes with the speed of a joint is level in it.
 
-    Returns:
-        The joint and the panel; None where no joint moves for long enough.
+    Nothing where no joint moves for long enough.
     """
     found = orders(analysis)
     if found is None:
-        return None
+        return []
     joint, spectrum = found
     panel = Panel("orders", HEIGHT)
     edges, level = in_levels(spectrum)
@@ -750,7 +729,7 @@ def log_orders(
     written = "{:g}".format
     log_heat(recording, panel, path, spectrum.time, edges, level, scale, title, written=written)
     log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
-    return joint, panel
+    return [axes.rows(panel, "/orders", name=f"Orders of {joint}")[0]]
 
 
 def log_axis(
@@ -807,26 +786,11 @@ DETAIL_POINTS = 10_000
 """Samples of a line; a run at 20 kHz or less is shown whole."""
 
 
-@dataclass(frozen=True)
-class Detail:
-    """A moment as it was logged.
-
-    Attributes:
-        title: What it is, and when.
-        path: Entity path under which ``noise`` and ``velocity`` lie.
-        during: Start and stop, in [s].
-    """
-
-    title: str
-    path: str
-    during: tuple[float, float]
-
-
 def log_details(
     recording: rr.RecordingStream, analysis: Analysis, moments: Sequence[Moment]
-) -> list[Detail]:
+) -> list[Part]:
     """Log noise, and the velocities of the joints that vibrate most, sample by sample."""
-    run, found = analysis.run, []
+    run, found = analysis.run, list[Part]()
     for number, moment in enumerate(moments):
         half = max(DETAIL / 2, 4.0 / run.rate)
         edges = (moment.peak - half, moment.peak + half)
@@ -844,5 +808,9 @@ def log_details(
             one = [colors.NOISE] if kind == "noise" else colors.of_series(len(lines))
             thin = extremes(time, values[kind][valid], points=DETAIL_POINTS)
             axes.log_lines(recording, f"{path}/{kind}", *thin, names=lines, colours=one)
-        found.append(Detail(f"{spoken(moment.label)} at {moment.peak:.2f} s", path, edges))
+        title = f"Velocities [rad/s], {spoken(moment.label)} at {moment.peak:.2f} s"
+        found += [
+            unstable.plot(title, f"{path}/velocity", legend=True, during=edges),
+            unstable.plot("Noise [rad/s]", f"{path}/noise", during=edges),
+        ]
     return found

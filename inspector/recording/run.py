@@ -1,8 +1,9 @@
-"""A run as a rerun recording: what goes into it, in order, whole or not at all."""
+"""A run as a rerun recording: findings, robot and details at the left, time at the right."""
 
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from math import ceil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,11 +13,12 @@ from rerun.urdf import UrdfTree
 
 from inspector import levels
 from inspector.analysis import Analysis, worst, worst_joint, worst_signal
-from inspector.recording import axes, framing, panels, robot, unstable
-from inspector.recording.layout import Contents, layout
+from inspector.recording import axes, camera, panels, robot, unstable
+from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
 from inspector.report.markdown import report, spoken
 from inspector.spectrogram import spectrogram
+from noisemodel import Run
 from noisemodel.files import replacing
 
 APPLICATION = "inspector"
@@ -71,6 +73,16 @@ def log_report(
 
 ASPECT = 1.3
 """Least width of the robot's view by its height."""
+HEAD, PARAGRAPH, LINE, FOOT = 36.0, 31.0, 15.5, 28.0
+"""Heights in a text, in points: from the top to the middle of its title, to the first line of the
+next paragraph, to the next line, and from the last one to the end."""
+COLUMNS = 72
+"""Characters of a line at the left of a window of 1440 x 900, at least."""
+TALLEST = 264.0
+"""Most height of the text at the left, in points."""
+WHOLE, EVENTS, EVENT, DETAILS, TITLES = 836.0, 84.0, 23.0, 190.0, 28.0
+"""Heights of the whole window's parts, of the list of events without and for each, of the samples
+of a moment, and of a row of tabs, in points."""
 
 
 def write(
@@ -91,70 +103,118 @@ def write(
         beside: The run beside its reference; None without one.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
+    run, moments = analysis.run, worst(analysis)
+    beside = None if beside is None or beside.empty else beside
     identity = analysis.sha256
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
-        tree = robot.of_run(analysis.run, Path(folder)) if analysis.links is not None else None
-        contents = _log(recording, analysis, tree, Path(folder), sound, floor, beside)
-        recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
+        axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
+        tree, left = None, _log_findings(recording, analysis)
+        if analysis.links is not None:
+            tree = robot.of_run(run, Path(folder))
+            rest = WHOLE - DETAILS - sum(size for _, size in left)
+            left.append((_log_robot(recording, tree, run, Path(folder)), rest))
+        details = unstable.tabs(*panels.log_details(recording, analysis, moments))
+        over_time = [
+            *panels.log_classes(recording, analysis),
+            *panels.log_curves(recording, analysis, beside),
+            (_log_spectra(recording, analysis, floor, sound), panels.HEIGHT + TITLES),
+            _log_strips(recording, analysis, tree, beside),
+        ]
+        entities = {} if tree is None else robot.entities(tree)
+        _log_text(recording, analysis, linked(report(analysis), entities))
+        whole = unstable.beside(
+            (unstable.above(*left, (details, DETAILS)), 36.0), (unstable.above(*over_time), 64.0)
+        )
+        failures = [(moment.start, moment.stop) for moment in moments if moment.failure]
+        loop = failures[0] if failures else None
+        recording.send_blueprint(unstable.blueprint(whole, loop))  # instead of an older run's
 
 
-def _log(
-    recording: rr.RecordingStream,
-    analysis: Analysis,
-    tree: UrdfTree | None,
-    folder: Path,
-    sound: bytes,
-    floor: float | None,
-    beside: Comparison | None,
-) -> Contents:
-    run, links, moments, seen = analysis.run, analysis.links, worst(analysis), None
-    axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
-    strips = []
-    beside = None if beside is None or beside.empty else beside
-    if beside is not None:
-        strips.append(("Over the reference", panels.log_over(recording, beside)))
-    if (panel := panels.log_joint_levels(recording, analysis)) is not None:
-        strips.append(("Joints above 10 Hz", panel))
-    if tree is not None and links is not None:
-        assert run.robot is not None
-        robot.log(recording, tree, run, coloured=True)
-        urdf = robot.drawn_file(run.robot, folder)
-        (seen,) = framing.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
-        strips.append(("Links above 10 Hz", panels.log_links(recording, tree, analysis, links)))
-    shown_classes = panels.log_classes(recording, analysis)
-    curves = panels.log_curves(recording, analysis, beside)
-    joint = worst_joint(analysis)
+def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tuple[Part, float]]:
+    """Log the verdict; it, the report and the list of events, with their heights."""
+    axes.log_verdict(recording, analysis.status, verdict_of(analysis))
+    text = unstable.text("Findings", "/report", titled=False)
+    parts = [
+        (unstable.drawing("/verdict"), axes.VERDICT),
+        (text, height(report(analysis))),
+    ]
+    if count := len(panels.listed_events(analysis)):
+        events = unstable.events("Click a time to go there", "/events")
+        parts.append((events, EVENTS + EVENT * min(count, 4)))
+    return parts
+
+
+def _log_robot(recording: rr.RecordingStream, tree: UrdfTree, run: Run, folder: Path) -> Part:
+    """Log a robot and its motion; it, with the scale of its colours."""
+    assert run.robot is not None
+    robot.log(recording, tree, run, coloured=True)
+    urdf = robot.drawn_file(run.robot, folder)
+    (seen,) = camera.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
+    shown = unstable.robot("Robot, links coloured by level above 10 Hz", "/robot", seen)
+    return unstable.beside((shown, 88.0), (unstable.drawing("/axis/key/right"), 12.0))
+
+
+def _log_spectra(
+    recording: rr.RecordingStream, analysis: Analysis, floor: float | None, sound: bytes
+) -> Part:
+    """Log the spectrograms of the worst joint and the sound; they, and sound powers."""
+    run, links, joint = analysis.run, analysis.links, worst_joint(analysis)
     fast = worst_signal(analysis, joint)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
     scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
+    title = f"Spectrogram of {'the noise' if joint is None else run.joint_names[joint]}"
+    parts = [panels.log_spectrogram(recording, analysis, spectrum, scale, title)]
+    parts += panels.log_orders(recording, analysis, scale)
     panels.log_bars(recording, "/spectrum/now", spectrum)
-    axes.log_verdict(recording, analysis.status, verdict_of(analysis))
+    top = min(panels.TOP_HZ, run.rate / 2)
+    parts.append(unstable.bars(f"At the cursor, 0-{top:.0f} Hz [dB]", "/spectrum/now"))
+    if links is not None:
+        paths = ["/power/total", axes.SPAN]
+        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", paths))
+        if links.terms:
+            paths = ["/power/terms/**", *paths]
+            parts.append(unstable.plot("Terms A, B, C", "/power", paths, legend=True))
     if sound:
-        unstable.log_audio(recording, "/sound", sound, axes.TIMELINE, start=float(run.time[0]))
-    limb_plots = panels.log_joints(recording, run, panels.limbs(run.joint_names, tree))
-    shown = panels.log_details(recording, analysis, moments)
-    text = report(analysis)
-    _log_text(recording, analysis, text, {} if tree is None else robot.entities(tree))
-    failures = [moment for moment in moments if moment.failure]
-    return Contents(
-        text=text,
-        classes=shown_classes,
-        curves=curves,
-        joint="the noise" if joint is None else run.joint_names[joint],
-        spectrogram=panels.log_spectrogram(recording, analysis, spectrum, scale),
-        orders=panels.log_orders(recording, analysis, scale),
-        strips=strips,
-        joints=limb_plots,
-        details=shown,
-        camera=seen,
-        links=links is not None,
-        terms=links is not None and bool(links.terms),
-        events=len(panels.listed_events(analysis)),
-        scores=analysis.labels is not None,
-        sound=bool(sound),
-        rate=run.rate,
-        loop=(failures[0].start, failures[0].stop) if failures else None,
-    )
+        unstable.log_audio(recording, "/sound", sound, float(run.time[0]))
+        parts.append(unstable.audio("Listen", "/sound"))
+    return unstable.tabs(*parts)
+
+
+def _log_strips(
+    recording: rr.RecordingStream,
+    analysis: Analysis,
+    tree: UrdfTree | None,
+    beside: Comparison | None,
+) -> axes.Timed:
+    """Log levels of joints and links; they, scores, and each limb's signals."""
+    run, links = analysis.run, analysis.links
+    strips = [] if beside is None else [panels.log_over(recording, beside)]
+    strips += panels.log_joint_levels(recording, analysis)
+    if tree is not None and links is not None:
+        strips.append(panels.log_links(recording, tree, analysis, links))
+    parts = [part for part, _ in strips]
+    if analysis.labels is not None:
+        parts.append(unstable.plot("Scores", "/score", axes.ALL, legend=True))
+    if links is not None:
+        title = "Power of links [dB re 1 pW]"
+        parts.append(unstable.plot(title, "/power/links", axes.ALL, legend=True))
+    parts += panels.log_joints(recording, run, panels.limbs(run.joint_names, tree))
+    lowest = max((size for _, size in strips), default=160.0)
+    return unstable.tabs(*parts), lowest + TITLES
+
+
+def height(markdown: str) -> float:
+    """Height of a text as far as its parts fit, in points: none is cut through by the edge."""
+    found = HEAD - PARAGRAPH
+    for part in re.split(r"\n\n(?!- )", markdown.strip()):
+        below = found
+        for paragraph in part.split("\n\n"):
+            rows = paragraph.replace("**", "").split("\n")
+            below += PARAGRAPH + LINE * (sum(ceil(len(row) / COLUMNS) for row in rows) - 1)
+        if below + FOOT > TALLEST:
+            break
+        found = below
+    return max(found, HEAD) + FOOT
 
 
 def verdict_of(analysis: Analysis) -> str:
@@ -165,9 +225,7 @@ def verdict_of(analysis: Analysis) -> str:
     return f"{words[analysis.status]}   {found}".rstrip()
 
 
-def _log_text(
-    recording: rr.RecordingStream, analysis: Analysis, text: str, entities: Mapping[str, str]
-) -> None:
+def _log_text(recording: rr.RecordingStream, analysis: Analysis, text: str) -> None:
     run, links = analysis.run, analysis.links
     properties = {
         "input_sha256": analysis.sha256,
@@ -180,7 +238,7 @@ def _log_text(
         "link_noise": "" if links is None else links.kind,
         "findings": len(analysis.findings),
     }
-    log_report(recording, analysis.name, linked(text, entities), properties)
+    log_report(recording, analysis.name, text, properties)
 
 
 def linked(markdown: str, entities: Mapping[str, str]) -> str:

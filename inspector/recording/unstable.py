@@ -19,6 +19,7 @@ When rerun moves on, this module follows and no other.
 
 import ctypes
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -28,15 +29,16 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from inspector import colors
-from inspector.recording.camera import Camera
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
 
+
 Part: TypeAlias = rrb.View | rrb.Container
 """A view, or views that are arranged."""
 
+TIMELINE = "time"
 PLOTS = colors.BACKGROUNDS[0]
 ROBOT, GRID = (80, 84, 94), (112, 116, 126, 130)
 """Behind a robot, lighter than a quiet one, and the lines of its floor."""
@@ -108,6 +110,27 @@ def bars(name: str, origin: str) -> Part:
     return rrb.BarChartView(origin=origin, name=name, plot_legend=rrb.PlotLegend(visible=False))
 
 
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Where a view of a robot is seen from.
+
+    Attributes:
+        eye: Where the camera stands, shape (3,), in [m].
+        target: What it looks at, shape (3,), in [m].
+        floor: Height of the floor, in [m].
+        spacing: Distance of the lines on the floor, in [m].
+        frame: Frame of transforms that the view is drawn in, and all this.
+        moves: Whether that frame moves with a base, over a floor that is drawn by itself.
+    """
+
+    eye: Array
+    target: Array
+    floor: float
+    spacing: float
+    frame: str = ""
+    moves: bool = False
+
+
 def robot(name: str, origin: str, camera: Camera) -> Part:
     """Draw what moves, on its floor, from where a camera stands."""
     return rrb.Spatial3DView(
@@ -164,11 +187,7 @@ def beside(*parts: tuple[Part, float], name: str | None = None) -> Part:
 
 
 def blueprint(
-    content: Part,
-    timeline: str,
-    loop: tuple[float, float] | None = None,
-    *,
-    following: bool = False,
+    content: Part, loop: tuple[float, float] | None = None, *, following: bool = False
 ) -> rrb.Blueprint:
     """Fill the window with a part; panels stay closed.
 
@@ -176,11 +195,11 @@ def blueprint(
         loop: Stretch of time that is selected, and that playing repeats, in [s].
     """
     playing: Literal["following", "paused"] = "following" if following else "paused"
-    time = rrb.TimePanel(state="collapsed", timeline=timeline, play_state=playing)
+    time = rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state=playing)
     if loop is not None:
         time = rrb.TimePanel(
             state="collapsed",
-            timeline=timeline,
+            timeline=TIMELINE,
             play_state="paused",
             loop_mode="selection",
             time_selection=rrb.components.AbsoluteTimeRange(*map(_nanoseconds, loop)),
@@ -195,18 +214,12 @@ def blueprint(
     )
 
 
-def log_audio(
-    recording: rr.RecordingStream, path: str, sound: bytes, timeline: str, *, start: float = 0.0
-) -> None:
-    """Log a sound that is played from a time on.
-
-    Args:
-        start: When the sound starts, in [s].
-    """
+def log_audio(recording: rr.RecordingStream, path: str, sound: bytes, start: float) -> None:
+    """Log a sound that is played from a time on, in [s]."""
     instant = np.array([_nanoseconds(start)], dtype="timedelta64[ns]")
     recording.send_columns(
         path,
-        indexes=[rr.TimeColumn(timeline, duration=instant)],
+        indexes=[rr.TimeColumn(TIMELINE, duration=instant)],
         columns=rr.AssetAudio.columns(blob=[sound], media_type=["audio/wav"]),
     )
 
@@ -243,7 +256,6 @@ COPIES = 12
 def log_stretches(
     recording: rr.RecordingStream,
     path: str,
-    timeline: str,
     stretches: Sequence[tuple[float, float]],
     *,
     between: tuple[float, float],
@@ -272,7 +284,7 @@ def log_stretches(
     times = np.array([(start, stop, stop + 1) for start, stop in apart], dtype=np.int64).ravel()
     values = np.tile([middle, middle, np.nan], len(apart))[:, None].repeat(copies, axis=1)
     style_bands(recording, path, [name] * copies, [color] * copies)
-    send_bands(recording, path, timeline, times, values, half)
+    send_bands(recording, path, times, values, half)
 
 
 def style_bands(
@@ -289,7 +301,6 @@ def style_bands(
 def send_bands(
     recording: rr.RecordingStream,
     path: str,
-    timeline: str,
     times: NDArray[np.int64],
     values: Array,
     half: float,
@@ -302,7 +313,7 @@ def send_bands(
     """
     recording.send_columns(
         path,
-        indexes=[rr.TimeColumn(timeline, duration=times.astype("timedelta64[ns]"))],
+        indexes=[rr.TimeColumn(TIMELINE, duration=times.astype("timedelta64[ns]"))],
         columns=rr.Measurements.columns(values=values, variances=np.full_like(values, half**2)),
     )
 
@@ -341,7 +352,7 @@ def _nanoseconds(seconds: float) -> int:
     return round(seconds * 1e9)
 
 
-def _tensors(values: Real, names: Sequence[str] | None = None) -> Any:
+def _tensors(values: Real) -> Any:
     """An Arrow array of tensors, as rerun's columns hold them.
 
     Rerun makes tensors one by one, by casts for which Arrow loads its functions for computing: a
@@ -361,8 +372,8 @@ def _tensors(values: Real, names: Sequence[str] | None = None) -> Any:
         union, count, [None, pa.py_buffer(codes), pa.py_buffer(places)], children=children
     )
     sizes = pa.array(np.tile(np.array(shape, dtype=np.uint64), count))
-    called = pa.array([names and list(names)] * count, type=kinds["names"].type)
-    columns = [_lists(kinds["shape"].type, sizes, count), called, buffer]
+    unnamed = pa.nulls(count, kinds["names"].type)
+    columns = [_lists(kinds["shape"].type, sizes, count), unnamed, buffer]
     return pa.StructArray.from_arrays(columns, fields=list(kinds.values()))
 
 
