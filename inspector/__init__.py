@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from inspector.live import LiveSession
     from inspector.logs.motion import Imported
     from inspector.logs.read import read_log, read_logs
-    from inspector.recording.notebook import show
+    from inspector.recording.viewer import show
     from inspector.reference.store import Reference
     from inspector.status import Status, Unknown
 
@@ -37,7 +37,7 @@ _MODULES = {
     "load_library": "inspector.library",
     "read_log": "inspector.logs.read",
     "read_logs": "inspector.logs.read",
-    "show": "inspector.recording.notebook",
+    "show": "inspector.recording.viewer",
 }
 
 

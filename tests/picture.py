@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from inspector.recording.picture import (
+from inspector.recording.viewer import (
     final_state,
     headless_viewer,
     missing_packages,

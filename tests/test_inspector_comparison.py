@@ -9,8 +9,7 @@ from commandline import call
 from recordings import read
 from rerun.chunk import RrdReader
 
-from inspector.compare import picture
-from inspector.compare.models import cells, levels, shades, write, write_csv
+from inspector.compare.models import cells, draw, levels, shades, write, write_csv
 from noisemodel import ROBOTS, Comparisons, compare
 from noisemodel.compare import excitation
 
@@ -106,7 +105,7 @@ def test_levels_are_relative_to_the_root_mean_square(found):
 
 def test_a_picture_is_drawn_without_a_display(found, tmp_path):
     pytest.importorskip("matplotlib")
-    picture.draw(found, tmp_path / "out.png")
+    draw(found, tmp_path / "out.png")
     assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -181,7 +180,7 @@ def test_what_cannot_be_compared_is_one_line(arguments, status, message):
 
 
 def test_without_matplotlib_a_picture_is_refused_before_any_work(monkeypatch, tmp_path):
-    monkeypatch.setattr(picture, "find_spec", lambda _: None)
+    monkeypatch.setattr("inspector.report.picture.find_spec", lambda _: None)
     status, _, err = inspector("--robots", "panda", "--picture", tmp_path / "out.png")
     assert (status, err.count("\n")) == (3, 1)
     assert 'a picture needs matplotlib; `pip install "noise-inspector[report]"`' in err

@@ -164,7 +164,7 @@ def test_many_joints_are_cut_to_the_loudest_with_a_remark(tmp_path):
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(html, "find_spec", lambda _: None)
+    monkeypatch.setattr("inspector.report.picture.find_spec", lambda _: None)
     with pytest.raises(InspectorError, match=r'pip install "noise-inspector\[report\]"'):
         html.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inspector.assets import demo_run, model_files
-from inspector.compare.alignment import Align, align
 from inspector.compare.changes import (
     by_band,
     by_class,
@@ -19,7 +18,7 @@ from inspector.compare.changes import (
     summary,
     whole,
 )
-from inspector.compare.pair import PairError, alike, compare, part
+from inspector.compare.pair import Align, PairError, align, alike, compare, part
 from inspector.compare.recording import write
 from inspector.library import load_library
 from noiseclassifier import Event, Labels

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import inspector
-from inspector.recording import notebook, viewer
+from inspector.recording import viewer
 from inspector.recording.viewer import ViewerError
 from noisemodel import Run, RunFileError
 
@@ -27,7 +27,7 @@ def plain(monkeypatch, tmp_path):
     """Plain Python with a display, and a cache of its own."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(viewer, "has_display", lambda: True)
-    monkeypatch.setattr(notebook, "in_notebook", lambda: False)
+    monkeypatch.setattr(viewer, "in_notebook", lambda: False)
 
 
 @pytest.fixture
@@ -70,8 +70,8 @@ def test_what_is_no_run_is_named(tmp_path, opened):
 
 
 def test_a_notebook_without_the_widget_is_an_error_with_what_to_install(run, monkeypatch):
-    monkeypatch.setattr(notebook, "in_notebook", lambda: True)
-    monkeypatch.setattr(notebook, "find_spec", lambda _: None)
+    monkeypatch.setattr(viewer, "in_notebook", lambda: True)
+    monkeypatch.setattr(viewer, "find_spec", lambda _: None)
     with pytest.raises(ViewerError, match=r'pip install "rerun-sdk\[notebook\]"'):
         inspector.show(run)
 
@@ -97,9 +97,9 @@ def kernel(monkeypatch):
             Unicode=lambda code: setattr(seen, "code", code) or trait
         ),
     }
-    monkeypatch.setattr(notebook, "in_notebook", lambda: True)
-    monkeypatch.setattr(notebook, "find_spec", lambda _: object())
-    monkeypatch.setattr(notebook, "import_module", modules.get)
+    monkeypatch.setattr(viewer, "in_notebook", lambda: True)
+    monkeypatch.setattr(viewer, "find_spec", lambda _: object())
+    monkeypatch.setattr(viewer, "import_module", modules.get)
     monkeypatch.delenv("RERUN_NOTEBOOK_ASSET", raising=False)
     return seen
 
@@ -110,8 +110,8 @@ def test_a_notebook_gets_the_recording_and_fetches_nothing_from_outside(run, ker
     assert isinstance(widget, kernel.rerun.Viewer)
     assert widget.size == (800, 500)
     assert [data[:4] for data in kernel.sent] == [b"RRF2"]
-    assert notebook.os.environ["RERUN_NOTEBOOK_ASSET"] == "inline"
-    assert (widget._esm, kernel.code, widget._code) == (notebook.LOADER, "// 23 MB", True)
+    assert viewer.os.environ["RERUN_NOTEBOOK_ASSET"] == "inline"
+    assert (widget._esm, kernel.code, widget._code) == (viewer.LOADER, "// 23 MB", True)
 
 
 def test_a_notebook_whose_owner_names_an_address_has_the_viewer_fetched_there(run, kernel):
@@ -140,20 +140,20 @@ def test_a_widget_is_ready_before_its_code_and_then_draws():
                 const end = await widget.render({ model, el });
                 return [ready < 2000, el.textContent, end];
             }""",
-            [quote(notebook.LOADER), code],
+            [quote(viewer.LOADER), code],
         ) == [True, "drawn", "ended"]
 
 
 def test_plain_python_is_no_notebook_and_a_kernel_is(monkeypatch):
     monkeypatch.undo()
     monkeypatch.delitem(sys.modules, "IPython", raising=False)
-    assert not notebook.in_notebook()
+    assert not viewer.in_notebook()
     shell = types.SimpleNamespace(kernel=object())
     ipython = types.SimpleNamespace(get_ipython=lambda: shell)
     monkeypatch.setitem(sys.modules, "IPython", ipython)
-    assert notebook.in_notebook()
+    assert viewer.in_notebook()
     ipython.get_ipython = object  # a terminal's shell has no kernel
-    assert not notebook.in_notebook()
+    assert not viewer.in_notebook()
 
 
 def test_importing_the_package_loads_no_viewer():

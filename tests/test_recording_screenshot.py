@@ -9,7 +9,7 @@ from inspector.analysis import analyse_file
 from inspector.assets import demo_run
 from inspector.cli import main
 from inspector.errors import InspectorError
-from inspector.recording import picture
+from inspector.recording import viewer
 from inspector.recording.run import write
 from inspector.recording.viewer import ViewerError
 from noisemodel import Run
@@ -25,10 +25,10 @@ def recording(folder: Path) -> Path:
 
 @pytest.mark.slow  # test_recording_picture takes one of the demo
 def test_a_picture_is_taken_without_a_display_and_the_viewer_reports_nothing(tmp_path):
-    if picture.missing_packages():
-        pytest.skip(f"needs {' and '.join(picture.missing_packages())}")
+    if viewer.missing_packages():
+        pytest.skip(f"needs {' and '.join(viewer.missing_packages())}")
     output = tmp_path / "out.png"
-    assert picture.shoot(recording(tmp_path), output, 2.0, size=(800, 500)) == ()
+    assert viewer.shoot(recording(tmp_path), output, 2.0, size=(800, 500)) == ()
     png = output.read_bytes()
     assert png.startswith(b"\x89PNG")
     assert struct.unpack(">II", png[16:24]) == (800, 500)
@@ -36,34 +36,34 @@ def test_a_picture_is_taken_without_a_display_and_the_viewer_reports_nothing(tmp
 
 
 def test_system_packages_that_are_missing_are_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(picture, "find_library", lambda _: None)
-    monkeypatch.setattr(picture, "DRIVER_FOLDERS", (tmp_path,))
-    monkeypatch.setattr(picture.sys, "platform", "linux")
+    monkeypatch.setattr(viewer, "find_library", lambda _: None)
+    monkeypatch.setattr(viewer, "DRIVER_FOLDERS", (tmp_path,))
+    monkeypatch.setattr(viewer.sys, "platform", "linux")
     with pytest.raises(ViewerError, match="`apt-get install libvulkan1 mesa-vulkan-drivers`"):
-        picture.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
-    monkeypatch.setattr(picture, "find_library", lambda _: "libvulkan.so.1")
+        viewer.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
+    monkeypatch.setattr(viewer, "find_library", lambda _: "libvulkan.so.1")
     with pytest.raises(ViewerError, match="`apt-get install mesa-vulkan-drivers`"):
-        picture.require()
+        viewer.require_driver()
 
 
 def test_a_viewer_that_ends_is_one_line(monkeypatch):
     monkeypatch.setattr(
-        picture.viewer,
+        viewer,
         "command",
         lambda *_: ["/bin/sh", "-c", "echo Error: no luck >&2; exit 7"],
     )
     with (
         pytest.raises(ViewerError, match=r"ended with status 7 \(no luck\)"),
-        picture.headless_viewer(),
+        viewer.headless_viewer(),
     ):
         pass
 
 
 def test_a_size_is_width_and_height():
-    assert picture.parse_size("1920x1080") == (1920, 1080)
+    assert viewer.parse_size("1920x1080") == (1920, 1080)
     for wrong in ("1920", "12x12", "ax900", "99999x900"):
         with pytest.raises(InspectorError, match=f"a size of '{wrong}', expected"):
-            picture.parse_size(wrong)
+            viewer.parse_size(wrong)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_size_is_width_and_height():
     ],
 )
 def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(picture, "require", lambda: None)
+    monkeypatch.setattr(viewer, "require_driver", lambda: None)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["inspector", "view", *arguments, "-o", "out.png"])
     with pytest.raises(SystemExit) as end:
@@ -97,7 +97,7 @@ def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monk
     ],
 )
 def test_a_wrong_suffix_or_time_is_wrong_usage(arguments, text, tmp_path, monkeypatch):
-    monkeypatch.setattr(picture, "require", lambda: None)
+    monkeypatch.setattr(viewer, "require_driver", lambda: None)
     monkeypatch.chdir(tmp_path)
     status, _, err = call(*arguments)
     assert status == 2

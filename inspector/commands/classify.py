@@ -230,9 +230,10 @@ def _page(
     """What writes the page on all runs, if a folder is named; its files are checked."""
     if folder is None:
         return []
-    from inspector.report import html, index
+    from inspector.report import index
+    from inspector.report.picture import require
 
-    html.require()
+    require("a report")
     index.prepare(folder, overwrite=overwrite)
     return [(str(folder), lambda verdicts: index.write(verdicts, folder))]
 

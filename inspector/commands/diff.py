@@ -139,10 +139,10 @@ def diff(
 def _prepare(folder: Path, *, overwrite: bool) -> None:
     """Make the folder of the report, before long work is done for it."""
     from inspector.errors import InspectorError
-    from inspector.report import html
+    from inspector.report.picture import require
     from noisemodel.files import refuse_existing
 
-    html.require()
+    require("a report")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

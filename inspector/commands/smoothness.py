@@ -61,9 +61,9 @@ def smoothness(
     """
     from inspector import assets
     from inspector import smoothness as ranking
-    from inspector.compare.picture import require
     from inspector.library import load_library
     from inspector.progress import progress
+    from inspector.report.picture import require
     from noisemodel.files import refuse_existing
 
     if picture:

@@ -90,7 +90,7 @@ def tune(
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
     from json import dumps
 
-    from inspector.compare.picture import require
+    from inspector.report.picture import require
     from inspector.training.tune import Search
     from inspector.training.tune import tune as tune_profile
     from noisemodel.files import refuse_existing

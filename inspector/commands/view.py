@@ -174,11 +174,11 @@ def _check(paths: list[Path], target: Path, request: Request) -> None:
 def _picture(run: Path, output: Path, request: Request) -> None:
     """Write a PNG of what the viewer shows, without a display."""
     from inspector.export.sound import worst_time
-    from inspector.recording import picture as screenshot
+    from inspector.recording import viewer
     from inspector.recording.run import write
 
-    screenshot.require()
-    points, at = screenshot.parse_size(request.size), request.at
+    viewer.require_driver()
+    points, at = viewer.parse_size(request.size), request.at
     with TemporaryDirectory() as folder:
         recording, seconds = run, at or 0.0
         if run.suffix != ".rrd":
@@ -192,7 +192,7 @@ def _picture(run: Path, output: Path, request: Request) -> None:
             recording = Path(folder) / "run.rrd"
             seconds = worst_time(found) if at is None else at
             write(found, recording, floor=request.floor, beside=beside)
-        complaints = screenshot.shoot(
+        complaints = viewer.shoot(
             recording, output, seconds, size=points, overwrite=request.overwrite
         )
     typer.echo(f"{output}: {run} at {seconds:.2f} s")
@@ -204,8 +204,9 @@ def _page(run: Path, output: Path, request: Request) -> None:
     """Write one HTML page about a run: pictures, tables, sound."""
     from inspector.audit.audit import text
     from inspector.report import html
+    from inspector.report.picture import require
 
-    html.require()
+    require("a report")
     found, verdict, beside = _analysed(opened(run, request.reading), request)
     assert found.audit is not None
     html.write(
@@ -308,9 +309,8 @@ def _one(runs: list["Opened"], target: Path, request: Request) -> float:
 
 def _two(runs: list["Opened"], target: Path, request: Request) -> None:
     """Write the recording of a run before and after a change."""
-    from inspector.compare.alignment import Align
     from inspector.compare.changes import changes, summary
-    from inspector.compare.pair import compare
+    from inspector.compare.pair import Align, compare
     from inspector.compare.recording import write
 
     before, after = runs

@@ -1,4 +1,4 @@
-"""Rerun's viewer: open a recording in it or in a browser, or explain how to."""
+"""Rerun's viewer: a recording in a window, a browser, a notebook's cell or a picture."""
 
 import hashlib
 import os
@@ -14,18 +14,26 @@ import tempfile
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stdout, suppress
+from ctypes.util import find_library
 from dataclasses import dataclass
 from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler
+from importlib import import_module
 from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
 from threading import Thread
-from typing import IO
+from typing import IO, TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from inspector.errors import InspectorError
-from noisemodel import OutputError
+import noisemodel as nm
+from inspector.errors import InspectorError, OptionError
+from noisemodel.files import refuse_existing, replacing
+
+if TYPE_CHECKING:
+    from rerun.experimental import ViewerClient
+
 
 SETTLE = 2.0
 """Time within which a viewer that listens and cannot open its window ends, in [s]."""
@@ -124,7 +132,7 @@ def scratch_path(run: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         why = f"{folder}: cannot be made a folder ({error.strerror})"
-        raise OutputError(f"{why}; name the recording with -o FILE.rrd") from error
+        raise nm.OutputError(f"{why}; name the recording with -o FILE.rrd") from error
     _make_room(folder)
     key = hashlib.sha256(str(run.resolve()).encode()).hexdigest()[:8]
     return folder / f"{run.stem}-{key}.rrd"
@@ -413,3 +421,257 @@ def _wait_for(port: int, server: Process) -> None:
     raise ViewerError(
         f"the viewer does not respond on port {port}, {SERVE_TIMEOUT:g} s after its start"
     )
+
+
+DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
+WINDOW = (1440, 900)
+"""Of the picture, in points; beyond, a software driver takes minutes."""
+MAGIC = b"RRF2"
+"""What rerun's recordings begin with."""
+TIMEOUT = 120.0
+"""How long the viewer may take to draw everything, in [s]."""
+REPORTS_TIMEOUT = 20.0
+"""Time after which a view's report is not due to data that is still arriving, in [s]."""
+
+
+def missing_packages() -> tuple[str, ...]:
+    """The system packages that pictures need and that are missing, by their names in Debian."""
+    if not sys.platform.startswith("linux"):
+        return ()  # others draw without Vulkan
+    packages = [] if find_library("vulkan") else ["libvulkan1"]
+    return (*packages, *([] if _drivers("*.json") else ["mesa-vulkan-drivers"]))
+
+
+def require_driver() -> None:
+    """Refuse a picture before long work is done for it."""
+    missing = missing_packages()
+    if missing:
+        raise ViewerError(
+            "a picture takes a Vulkan driver;"
+            f" `apt-get install {' '.join(missing)}` brings one (Fedora: mesa-vulkan-drivers)"
+        )
+
+
+def shoot(
+    recording: Path,
+    output: Path,
+    seconds: float,
+    *,
+    size: tuple[int, int] = WINDOW,
+    overwrite: bool = False,
+) -> tuple[str, ...]:
+    """Take a picture of a recording.
+
+    Args:
+        seconds: Where the time cursor stands, in [s].
+    """
+    require_driver()
+    check_recording(recording)
+    refuse_existing(output, overwrite=overwrite)
+    with headless_viewer(size) as client:
+        png = picture(client, recording, seconds)
+        state = final_state(client)
+    with replacing(output, overwrite=overwrite) as temporary:
+        temporary.write_bytes(png)
+    return tuple(str(report) for view in state.views for report in view.reports)
+
+
+def check_recording(path: Path) -> None:
+    """Refuse a file that is no recording: the viewer would draw a picture of its welcome."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(MAGIC))
+    except OSError as error:
+        raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
+    if head != MAGIC:
+        raise InspectorError(f"{path}: not a recording; name an .rrd file, or a run file (.npz)")
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Read the size of a picture."""
+    numbers = re.fullmatch(r"(\d{3,4})x(\d{3,4})", text)
+    if numbers is None:
+        raise OptionError(f"a size of {text!r}, expected width and height such as 1440x900")
+    return int(numbers[1]), int(numbers[2])
+
+
+@contextmanager
+def headless_viewer(size: tuple[int, int] = WINDOW) -> "Iterator[ViewerClient]":
+    """Run rerun's viewer without a window, on loopback, and end it with all its children."""
+    from inspector.recording import unstable
+
+    port = free_port()
+    start = ("--headless", "--port", str(port), "--hide-welcome-screen")
+    window = ("--window-size", f"{size[0]}x{size[1]}")
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        started(*start, *window, env=_environment(folder)) as process,
+    ):
+        try:
+            until = time.monotonic() + TIMEOUT
+            while True:
+                if problem := process.ended():
+                    raise ViewerError(problem)
+                try:
+                    client = unstable.client(f"rerun+http://{HOST}:{port}/proxy")
+                    client.get_state()
+                    break
+                except Exception as error:  # the client raises what it likes until the viewer is up
+                    if time.monotonic() > until:
+                        raise ViewerError(f"the viewer does not respond ({error})") from error
+                    time.sleep(0.1)
+            yield client
+        finally:
+            process.kill()
+
+
+def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
+    """Open a recording at a time and wait until nothing moves any more.
+
+    Args:
+        seconds: Where the time cursor stands, in [s].
+    """
+    client.open(str(recording.resolve()))
+    until = time.monotonic() + TIMEOUT
+    while client.get_state().loading and time.monotonic() < until:
+        time.sleep(0.1)
+    client.set_time("time", duration=seconds)
+    frames: list[bytes] = []
+    problem = ""
+    # The first frames lack what is still arriving: a picture is done when it stays the same.
+    while time.monotonic() < until and not (len(frames) > 2 and frames[-1] == frames[-3]):
+        time.sleep(0.3)
+        try:
+            frames.append(client.take_screenshot())
+        except Exception as error:  # a viewer under load misses its own deadlines: try again
+            problem = str(error).partition("\n")[0]
+    if not frames:
+        raise ViewerError(f"the viewer draws nothing within {TIMEOUT:g} s ({problem})")
+    return frames[-1]
+
+
+def final_state(client: "ViewerClient") -> Any:
+    """The viewer's state once its views report nothing, or after 20 s what they report then."""
+    until = time.monotonic() + REPORTS_TIMEOUT
+    while True:
+        state = client.get_state()
+        if time.monotonic() > until or not any(view.reports for view in state.views):
+            return state
+        time.sleep(0.5)
+
+
+def _environment(folder: str) -> dict[str, str]:
+    """Environment for the viewer: no settings of the user, software rendering if possible."""
+    software = _drivers("lvp_icd*.json")
+    driver = {"VK_DRIVER_FILES": str(software[0])} if software else {}
+    return os.environ | {"HOME": folder, "XDG_RUNTIME_DIR": folder, "RUST_LOG": "error"} | driver
+
+
+def _drivers(pattern: str) -> list[Path]:
+    return sorted(path for folder in DRIVER_FOLDERS for path in folder.glob(pattern))
+
+
+CELL = ("auto", 760)
+"""Width and height of a notebook's viewer, in pixels; it is as wide as its cell."""
+LOADER = """
+export default {
+  async render({ model, el }) {
+    const code = new Blob([model.get("_code")], { type: "text/javascript" });
+    const url = URL.createObjectURL(code);
+    const { default: viewer } = await import(url);
+    URL.revokeObjectURL(url);
+    return viewer.render({ model, el });
+  },
+};
+"""
+"""Begins the viewer's code, which is 23 MB long. If that were the widget's own code, and took more
+than two seconds to begin, anywidget (0.11) would forget what is sent to the widget: size, data.
+"""
+
+
+def show(
+    run: nm.Run | str | Path,
+    *,
+    robot: bool = True,
+    kind: str = "normal",
+    size: tuple[int | str, int] = CELL,
+) -> None:
+    """Show a run in rerun's viewer: joints, noise, spectrogram, classes, the moving robot.
+
+    In a notebook the viewer appears below the cell, after some seconds: all of it, 23 MB, is sent
+    by the kernel's machine, unless ``RERUN_NOTEBOOK_ASSET`` is set, which is rerun's. From plain
+    Python a window opens, which stays when the program ends.
+
+    Args:
+        run: A run, or a run file.
+        robot: Whether to draw the robot.
+        kind: Kind of the extended noise.
+        size: Width and height of a notebook's viewer, in pixels; ``"auto"`` is as wide as the cell.
+
+    Raises:
+        ViewerError: If there is neither a notebook nor a display, or the viewer is not installed.
+        InspectorError: If the robot's shape cannot be had.
+        NoiseModelError: If the run cannot be read, or its robot.
+    """
+    inside = in_notebook()
+    if inside and find_spec("rerun_notebook") is None:
+        raise ViewerError(
+            'a notebook takes rerun\'s widget; `pip install "rerun-sdk[notebook]"` brings it'
+        )
+    if inside:
+        with tempfile.TemporaryDirectory() as folder:
+            show_recording(_recorded(run, Path(folder) / "run.rrd", robot=robot, kind=kind), size)
+        return
+    recording = scratch_path(Path("shown.npz") if isinstance(run, nm.Run) else Path(run))
+    _recorded(run, recording, robot=robot, kind=kind)
+    if not has_display():
+        raise ViewerError(
+            f"there is no display; the recording is in {recording},"
+            f" `inspector view --web` shows a run file in a browser"
+        )
+    problem = open_window(recording)
+    if problem:
+        raise DisplayError(f"{problem}; the recording is in {recording}")
+
+
+def in_notebook() -> bool:
+    """Whether this runs in a kernel that shows widgets, as Jupyter's does."""
+    loaded = sys.modules.get("IPython")
+    return loaded is not None and hasattr(loaded.get_ipython(), "kernel")
+
+
+def show_recording(recording: Path, size: tuple[int | str, int]) -> None:
+    """Show a recording below the cell that runs."""
+    width, height = size
+    widget = widget_class()(width=width, height=height)
+    import_module("IPython.display").display(widget)
+    widget.send_rrd(recording.read_bytes())
+
+
+def widget_class() -> Any:
+    """The class of a widget whose data all come from this machine."""
+    # Otherwise the widget fetches its code from app.rerun.io.
+    os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "inline")
+    with redirect_stdout(StringIO()):  # it prints that it does so
+        rerun = import_module("rerun_notebook")
+    code = str(rerun.ESM_MOD)
+    if code.startswith(("http://", "https://")):
+        return rerun.Viewer
+    sent = import_module("traitlets").Unicode(code).tag(sync=True)
+    return type("Viewer", (rerun.Viewer,), {"_esm": LOADER, "_code": sent})
+
+
+def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:
+    from inspector.analysis import analyse_file
+    from inspector.export.sound import of_recording
+    from inspector.library import load_library
+    from inspector.recording.run import write
+
+    library = load_library()
+    with tempfile.TemporaryDirectory() as folder:
+        path = run if not isinstance(run, nm.Run) else Path(folder) / "run.npz"
+        if isinstance(run, nm.Run):
+            run.save(path)
+        found = analyse_file(Path(path), library, links=robot, kind=kind)
+        write(found, recording, overwrite=True, sound=of_recording(found))
+    return recording

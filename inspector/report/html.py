@@ -4,18 +4,17 @@ import re
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from inspector.analysis import Analysis
-from inspector.errors import InspectorError
 from inspector.export.sound import clip, worst_time
 from inspector.reference.judging import Comparison
 from inspector.report.findings import excused
 from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
+from inspector.report.picture import picture, require
 from inspector.verdict import Verdict
 from noisemodel.extended import vibrating_pieces
 from noisemodel.files import replacing
@@ -44,12 +43,6 @@ li { margin: .2rem 0; }
 """
 
 
-def require() -> None:
-    """Refuse a page before long work is done for it."""
-    if find_spec("matplotlib") is None:
-        raise InspectorError('a report needs matplotlib; `pip install "noise-inspector[report]"`')
-
-
 def write(
     analysis: Analysis,
     path: Path,
@@ -61,7 +54,7 @@ def write(
     floor: float | None = None,
 ) -> None:
     """Write the page of an inspected run, whole or not at all; see `page`."""
-    require()
+    require("a report")
     text = page(analysis, audit=audit, verdict=verdict, beside=beside, floor=floor)
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -83,8 +76,6 @@ def page(
         beside: How the run compares with the reference; None without.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
-    from inspector.report.picture import picture
-
     html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
     add_text(body, "p", spoken(analysis.headline), "verdict")

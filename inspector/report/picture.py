@@ -3,12 +3,14 @@
 import io
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, chosen, gaps, worst_joint, worst_signal
+from inspector.errors import InspectorError
 from inspector.levels import Scale
 from inspector.reference.judging import Comparison
 from inspector.report.markdown import classes_of, spoken
@@ -37,6 +39,12 @@ SHADE = 0.35
 """Opacity of a finding behind a curve."""
 MOST_OVER_DB = 12.0
 """Largest level over the reference that has a colour of its own."""
+
+
+def require(what: str = "a picture") -> None:
+    """Refuse a picture, or what it is for, before long work is done for it."""
+    if find_spec("matplotlib") is None:
+        raise InspectorError(f'{what} needs matplotlib; `pip install "noise-inspector[report]"`')
 
 
 def picture(

@@ -14,11 +14,11 @@ import noisemodel as nm
 from inspector.analysis import extents
 from inspector.audit.signals import without_placeholder
 from inspector.colors import SERIES, Color, of_classes
-from inspector.compare import picture
 from inspector.errors import InspectorError, OptionError
 from inspector.logs.hold import without_hold
 from inspector.logs.wrongrobot import check_joints
 from inspector.progress import progress
+from inspector.report.picture import require as require
 from inspector.text import counted
 from noiseclassifier import Assessment
 from noiseclassifier.profile import HIGHEST, LOWEST, NOMINAL
@@ -410,8 +410,6 @@ SIZE = (14.0, 5.0)
 DPI = 100
 BLUE = SERIES[6]
 GREY = "0.6"
-
-require = picture.require
 
 
 def draw(assessment: Assessment, path: Path, *, title: str, overwrite: bool = False) -> None:
