@@ -292,7 +292,7 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
         for row, name in enumerate(shown)
     ]
     axes.log_right(recording, panel, key)
-    return axes.rows(panel, "/class", name="Classes")
+    return axes.timed(panel, name="Classes")
 
 
 def _log_levels(
@@ -311,7 +311,7 @@ def _log_levels(
     _log_rows(recording, several, panel, edges, rgba, called)
     axes.log_left(recording, panel, _names(several, panel))
     axes.log_scale(recording, panel, scale)
-    return axes.rows(panel, "/levels", name="Level above 10 Hz")
+    return axes.timed(panel, name="Level above 10 Hz")
 
 
 def _columns(time: Array, level: Array, edges: Array) -> Array:
@@ -334,7 +334,5 @@ def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -
     axes.log_right(
         recording, panel, [Label(0.5, f"the worst\n{CURVES} runs" if more else "all runs")]
     )
-    plot = unstable.plot(
-        "", "/curves", between=(LOW_DB, HIGH_DB), legend=True, fixed=True, titled=False
-    )
-    return axes.part(panel, plot), panel.height
+    paths, ends = ("$origin/**",), (LOW_DB, HIGH_DB)
+    return axes.timed(panel, title="", between=ends, paths=paths, legend=True)

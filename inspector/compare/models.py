@@ -189,8 +189,9 @@ def _log(recording: rr.RecordingStream, one: Comparison) -> None:
     for part, pressure in pressures.items():
         time, level = levels(one, pressure)
         for index, (kind, color) in enumerate(shown.items()):
-            path = f"{_root(one)}/{part}/{kind}"
-            axes.log_lines(recording, path, time, level[:, [index]], names=[kind], colours=[color])
+            axes.log_line(
+                recording, f"{_root(one)}/{part}/{kind}", time, level[:, index], color, name=kind
+            )
         panel = _panel(one, part)
         axes.log_left(recording, panel, [Label(0.5, f"{PARTS[part]}\n[dB re its rms]")])
         named = [
@@ -206,16 +207,8 @@ def _log(recording: rr.RecordingStream, one: Comparison) -> None:
     panel = _panel(one, "events")
     for row, label in enumerate(labels):
         own = [(event.start, event.stop) for event in one.events if event.label == label]
-        upper, lower = (axes.TOP * (1.0 - (row + share) / len(labels)) for share in (0.15, 0.85))
-        unstable.log_stretches(
-            recording,
-            f"{_root(one)}/events/{label}",
-            own,
-            between=(lower, upper),
-            name=label,
-            color=states[label],
-            opaque=True,
-        )
+        path, place = f"{_root(one)}/events/{label}", (row, len(labels))
+        axes.log_row(recording, path, label, own, states[label], place, (0.15, 0.85))
     axes.log_left(recording, panel, axes.row_labels(labels) or [Label(0.5, "no events")])
     axes.log_right(recording, panel, [Label(0.5, "events")])
 
@@ -230,25 +223,19 @@ def _panel(one: Comparison, part: str) -> Panel:
 
 
 def _robot(one: Comparison) -> Part:
-    parts = []
-    for part, between in (
-        ("events", (0.0, axes.TOP)),
-        ("vibration", RANGE_DB),
-        ("level", RANGE_DB),
-    ):
-        path, every = f"{_root(one)}/{part}", ("$origin/**", axes.SPAN)
-        plot = unstable.plot("", path, every, between=between, fixed=True, titled=False)
-        panel = _panel(one, part)
-        parts.append((axes.part(panel, plot), panel.height))
-    spectrograms = [_spectrogram(one, kind) for kind in one.kinds]
-    height = HEIGHT + TITLES
-    return unstable.above(*parts, (unstable.tabs(*spectrograms), height), name=_short(one.name))
-
-
-def _spectrogram(one: Comparison, kind: str) -> Part:
-    panel = _panel(one, f"spectrogram/{kind}")
-    plot = unstable.plot("", f"/{panel.name}", between=(0.0, axes.TOP), fixed=True, titled=False)
-    return axes.part(panel, plot, name=kind)
+    """The tab of a robot or run: events, levels and spectrograms."""
+    ends = {"events": (0.0, axes.TOP), "vibration": RANGE_DB, "level": RANGE_DB}
+    parts = [
+        axes.timed(_panel(one, part), title="", between=between) for part, between in ends.items()
+    ]
+    spectrograms = [
+        axes.timed(_panel(one, f"spectrogram/{kind}"), title="", name=kind, paths=("$origin/**",))[
+            0
+        ]
+        for kind in one.kinds
+    ]
+    details = (unstable.tabs(*spectrograms), HEIGHT + TITLES)
+    return unstable.above(*parts, details, name=_short(one.name))
 
 
 def _root(one: Comparison) -> str:

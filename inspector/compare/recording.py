@@ -44,11 +44,11 @@ from inspector.recording.panels import (
     in_levels,
     limb_tabs,
     limbs,
+    log_class,
     log_heat,
     log_level_axis,
     log_power,
     log_robot_levels,
-    log_row,
     log_signal,
     scaled,
     signal_plot,
@@ -95,14 +95,9 @@ def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change
     signed = f"{peak:+.0f}".replace("-", "\u2212").replace("+0", "0")
     axes.log_right(recording, CHANGED, [Label(0.5, f"largest\n{signed}")])
     return [
-        _curve("Level", LEVEL, axes.ALL, (LOW_DB, HIGH_DB)),
-        _curve("Change", CHANGED, CHANGE_PATHS, (-reach, reach)),
+        axes.timed(LEVEL, title="Level", between=(LOW_DB, HIGH_DB)),
+        axes.timed(CHANGED, title="Change", between=(-reach, reach), paths=CHANGE_PATHS),
     ]
-
-
-def _curve(title: str, panel: Panel, paths: Sequence[str], between: tuple[float, float]) -> Timed:
-    plot = unstable.plot(title, f"/{panel.name}", paths, between=between, fixed=True, titled=False)
-    return axes.part(panel, plot), panel.height
 
 
 def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[Part]:
@@ -125,7 +120,7 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[P
         shades = SHADES if own is CHANGE else axes.SHADES
         log_heat(recording, panel, path, both[0].time, edges, values, own, title, shades=shades)
         name = f"Spectrum{', ' if what == 'change' else ' '}{what}"
-        parts.append(axes.rows(panel, path, name=name)[0])
+        parts.append(axes.timed(panel, path, name=name)[0])
     return parts
 
 
@@ -144,8 +139,7 @@ def log_noise(recording: rr.RecordingStream, pair: Pair) -> list[Part]:
     axes.log_left(recording, NOISE_PANEL, [Label(0.5, f"noise p\u0302\n[{unit}]")])
     axes.log_right(recording, NOISE_PANEL, _sides())
     between = (0.0, 1.08 * max(float(loudest.max(initial=0.0)) / scale, 0.01))
-    plot = unstable.plot("Noise", "/noise", axes.ALL, between=between, fixed=True, titled=False)
-    return [axes.part(NOISE_PANEL, plot, name="Noise")]
+    return [axes.timed(NOISE_PANEL, title="Noise", name="Noise", between=between)[0]]
 
 
 def _sides() -> list[Label]:
@@ -170,10 +164,9 @@ def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Chang
         for side, analysis in pair.sides:
             color, place = SIDE_COLORS[side], (row, len(names))
             stretches = found_stretches(analysis, name)
-            path = f"/class/{side}"
-            log_row(recording, f"{path}/found", name, stretches, color, place, FOUND[side])
+            log_class(recording, f"{side}/found", name, stretches, color, place, FOUND[side])
             blocks = [(b.start, b.stop) for b in analysis.run.blocks if b.label == name]
-            log_row(recording, f"{path}/annotated", name, blocks, color, place, ANNOTATED[side])
+            log_class(recording, f"{side}/annotated", name, blocks, color, place, ANNOTATED[side])
     titles = [Label(label.place, spoken(label.text)) for label in axes.row_labels(names)]
     axes.log_left(recording, panel, titles or [Label(0.5, "no failure\nin either run")])
     told = [
@@ -191,7 +184,7 @@ def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Chang
             [_shade(change) for change in found],
             warnings=[change.kind == NEW for change in found],
         )
-    return axes.rows(panel, "/class")
+    return axes.timed(panel)
 
 
 def log_shades(
@@ -337,7 +330,7 @@ def log_links(
             for name in names[:BOTH]
         ]
         parts.append(unstable.tabs(*both, name="Links, before and after"))
-    return axes.rows(panel, "/change/links", name="Links, change")[0], parts
+    return axes.timed(panel, "/change/links", name="Links, change")[0], parts
 
 
 ABOVE = 240.0

@@ -225,10 +225,22 @@ def part(panel: Panel, plot: Part, *, name: str | None = None) -> Part:
     return unstable.beside((left, LEFT), (plot, MIDDLE), (right, RIGHT), name=name)
 
 
-def rows(panel: Panel, path: str, *, name: str | None = None) -> Timed:
-    """A panel of the rows that lie below a path."""
-    title = path.rpartition("/")[2]
-    plot = unstable.plot(title, path, ALL, between=(0.0, TOP), fixed=True, titled=False)
+def timed(
+    panel: Panel,
+    path: str = "",
+    *,
+    title: str | None = None,
+    name: str | None = None,
+    between: tuple[float, float] = (0.0, TOP),
+    paths: Sequence[str] = ALL,
+    legend: bool = False,
+) -> Timed:
+    """A panel of what lies below a path, its own unless given: of rows, or of an axis with ends."""
+    path = path or f"/{panel.name}"
+    title = path.rpartition("/")[2] if title is None else title
+    plot = unstable.plot(
+        title, path, paths, between=between, fixed=True, titled=False, legend=legend
+    )
     return part(panel, plot, name=name), panel.height
 
 
@@ -345,6 +357,31 @@ def log_rows(
                     np.full(len(shown), lines)
                 ),
             ],
+        )
+
+
+def log_row(
+    recording: rr.RecordingStream,
+    path: str,
+    name: str,
+    stretches: Sequence[tuple[float, float]],
+    color: Color,
+    place: tuple[int, int],
+    between: tuple[float, float],
+) -> None:
+    """Log stretches of time in a row, if there are any.
+
+    Args:
+        stretches: Start and stop of each, in [s].
+        place: Number of the row, and of all rows.
+        between: From where to where in the row, from above.
+    """
+    if stretches:
+        row, count = place
+        upper, lower = (TOP * (1.0 - (row + share) / count) for share in between)
+        ends = (lower, upper)
+        unstable.log_stretches(
+            recording, path, stretches, between=ends, name=name, color=color, opaque=True
         )
 
 

@@ -149,8 +149,8 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
         found = found_stretches(analysis, name)
         blocks = [(block.start, block.stop) for block in run.blocks if block.label == name]
         place = (row, count)
-        log_row(recording, "/class/found", name, found, colours[name], place, FOUND)
-        log_row(recording, "/class/annotated", name, blocks, axes.INK, place, ANNOTATED)
+        log_class(recording, "found", name, found, colours[name], place, FOUND)
+        log_class(recording, "annotated", name, blocks, axes.INK, place, ANNOTATED)
         if starts := [event.start for event in analysis.findings if event.label == name]:
             middle = axes.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
             log_marks(recording, name, row, colours[name], starts, [middle] * len(starts))
@@ -165,7 +165,7 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")] if both else []
     only = "found" if labels is not None else "annotated"
     axes.log_right(recording, panel, told or [Label(0.5, only)])
-    return [axes.rows(panel, "/class")]
+    return [axes.timed(panel)]
 
 
 def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
@@ -209,33 +209,18 @@ def found_stretches(analysis: Analysis, name: str) -> list[tuple[float, float]]:
     return found + [(start, stop) for start, stop, label in analysis.lane if label == name]
 
 
-def log_row(
+def log_class(
     recording: rr.RecordingStream,
-    path: str,
+    how: str,
     name: str,
     stretches: Sequence[tuple[float, float]],
     color: colors.Color,
     place: tuple[int, int],
     between: tuple[float, float],
 ) -> None:
-    """Log when a class was, if it was, in a row; where in its row, from above.
-
-    Args:
-        place: Number of the row and of all rows.
-    """
-    if stretches:
-        row, count = place
-        upper, lower = (axes.TOP * (1.0 - (row + share) / count) for share in between)
-        how = path.removeprefix("/class/").replace("/", ", ")
-        unstable.log_stretches(
-            recording,
-            f"{path}/{name}",
-            stretches,
-            between=(lower, upper),
-            name=f"{how}: {spoken(name)}",
-            color=color,
-            opaque=True,
-        )
+    """Log when a class was found or annotated, as `how` says; see `axes.log_row`."""
+    path, called = f"/class/{how}/{name}", f"{how.replace('/', ', ')}: {spoken(name)}"
+    axes.log_row(recording, path, called, stretches, color, place, between)
 
 
 def log_marks(
@@ -628,7 +613,7 @@ def _log_strip(
     axes.log_rows(recording, path, edges, rgba, names=called, width=STRIP_WIDTH, lines=STROKES)
     axes.log_left(recording, panel, axes.row_labels(names))
     axes.log_scale(recording, panel, scale)
-    return axes.rows(panel, path, name=title)
+    return axes.timed(panel, path, name=title)
 
 
 def log_power(
@@ -659,7 +644,7 @@ def log_spectrogram(
     panel = Panel("spectrogram", HEIGHT)
     log_panel(recording, panel, spectrum, scale, "velocity\nspectrum")
     log_gaps(recording, "/spectrogram", analysis.run, (0.0, axes.TOP))
-    return axes.rows(panel, "/spectrogram", name=title)[0]
+    return axes.timed(panel, name=title)[0]
 
 
 def log_panel(
@@ -729,7 +714,7 @@ def log_orders(recording: rr.RecordingStream, analysis: Analysis, scale: Scale) 
     written = "{:g}".format
     log_heat(recording, panel, path, spectrum.time, edges, level, scale, title, written=written)
     log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
-    return [axes.rows(panel, "/orders", name=f"Orders of {joint}")[0]]
+    return [axes.timed(panel, name=f"Orders of {joint}")[0]]
 
 
 def log_axis(
