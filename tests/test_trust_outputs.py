@@ -105,6 +105,20 @@ def test_an_output_that_exists_is_kept(place, monkeypatch, command, read, output
     assert f"{target}: exists already" in err
 
 
+def test_accepting_keeps_runs_in_the_folder_of_the_reference(place):
+    good = place / "good"
+    for name in ("pick-1", "pick-2", "pick"):
+        shutil.copy(good / "0.npz", good / f"{name}.npz")
+    before = {each: each.read_bytes() for each in good.iterdir()}
+    for name, status in (("run.npz", 0), ("good/0.npz", 3), ("good/pick-1.npz", 3)):
+        assert call("accept", name, "--reason", "quiet", "-o", "good")[0] == status
+        assert before == {each: each.read_bytes() for each in before}
+    assert {each.name for each in set(good.iterdir()) - set(before)} == {
+        "reference.toml",
+        "run.npz",
+    }
+
+
 def test_each_command_that_reads_and_writes_is_in_the_table():
     others = WITHOUT | {"config", "history"}
     assert {command for command, *_ in TABLE} == set(COMMANDS) - others

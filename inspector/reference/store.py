@@ -9,6 +9,7 @@ import hashlib
 import json
 import os
 import re
+import zipfile
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -401,10 +402,18 @@ def save(reference: Reference, folder: Path) -> None:
     with replacing(folder / NAME, overwrite=True) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
     for path in folder.glob("*.npz"):  # of scenarios that were renamed
-        if path.name not in names and re.fullmatch(
-            r"[\w.-]+~[0-9a-f]{8}\.npz|[\w.-]+\.npz", path.name
-        ):
+        if path.name not in names and _holds_levels(path):
             path.unlink(missing_ok=True)
+
+
+def _holds_levels(path: Path) -> bool:
+    """Whether a file is one of `_write_levels`: runs may lie in the folder, too."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            arrays = archive.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return False
+    return "level_0.npy" in arrays and "guide_0.npy" in arrays
 
 
 def _from_store(run: str, folder: Path) -> str:
@@ -429,7 +438,7 @@ def _write_levels(path: Path, scenario: Scenario) -> str:
         arrays[f"level_{number}"] = encoded(each.level)
         arrays[f"guide_{number}"] = each.guide
         arrays[f"pace_{number}"] = each.pace
-    with replacing(path, overwrite=True) as temporary:
+    with replacing(path, overwrite=_holds_levels(path)) as temporary:
         with temporary.open("wb") as stream:
             np.savez_compressed(stream, **arrays)
         return hashlib.sha256(temporary.read_bytes()).hexdigest()
