@@ -641,11 +641,11 @@ def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path
             " (--episode)"
         )
     targets = tuple(output / f"{name}.npz" for name in names)
-    duplicates = [path for place, path in enumerate(targets) if path in targets[:place]]
-    if duplicates:
-        raise InspectorError(
-            f"{duplicates[0]}: two logs would be written there; import them one by one"
-        )
+    there = set[Path]()
+    for path in targets:
+        if path in there:
+            raise InspectorError(f"{path}: two logs would be written there; import them one by one")
+        there.add(path)
     try:
         output.mkdir(exist_ok=True)
     except OSError as error:
