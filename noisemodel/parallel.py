@@ -1,8 +1,8 @@
 """One call per item: here, in several processes by joblib, or on the workers of a Dask scheduler.
 
 An item with which a process dies is named, and the others get their results: joblib loses all that
-is not done with a process that dies, so what was in work then is tried again, item by item. Dask
-tries again by itself.
+is not done with a process that dies, and Dask blames all that its worker had, so what was in work
+then is tried again, item by item.
 """
 
 import logging
@@ -96,14 +96,20 @@ def _on_cluster(
 
     futures = client.map(function, items, pure=False)
     index = {future.key: place for place, future in enumerate(futures)}
+    suspects = []
     for future in as_completed(futures, loop=client.loop):
         place = index[future.key]
         try:
-            result = future.result()
+            yield place, future.result()
+        except KilledWorker:
+            suspects.append(place)
+        future.release()
+    for place in suspects:  # a worker has more than one item at a time
+        try:
+            result = client.submit(function, items[place], pure=False).result()
         except KilledWorker:
             result = died(items[place])
         yield place, result
-        future.release()
 
 
 def _in_processes(
