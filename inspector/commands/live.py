@@ -41,8 +41,8 @@ ReferenceFolder = Annotated[
     Path | None,
     typer.Option(
         "--reference",
-        help="Accepted runs, or a folder of good ones, that the stream is compared with: 6 s"
-        " every 3 s, told at most 4.3 s later, and all of it at its end.",
+        help="Compare the stream with these accepted runs, or a folder of good ones: every 3 s the"
+        " last 6 s, and all of it at the end. A finding is reported at most 4.3 s late.",
     ),
 ]
 

@@ -46,7 +46,8 @@ class Gate:
         self._reference = reference
         self._found: dict[tuple[str, float], Event] = {}
         self._told: dict[Event, Evidence] = {}
-        self._compared, self._begin, self._heard = False, 0.0, 0.0
+        self._begin: float | None = None  # of what was compared so far
+        self._heard = 0.0
 
     def take(self, event: Event, over: bool) -> None:
         """Print a finding when it is there, and when it is over; beside a reference, keep it."""
@@ -61,12 +62,10 @@ class Gate:
         Args:
             latest: Levels of the last 6 s, 3 s of which have been there before.
         """
-        assert self._reference is not None
-        if not self._compared:
-            self._compared, self._begin, self._heard = True, latest.start, latest.start
+        if self._begin is None:
+            self._begin = self._heard = latest.start
         found = tuple(self._found.values())
-        verdict = Verdict(NAME, Status.OK, events=found, begin=self._begin)
-        verdict = self._beside(verdict, self._reference, latest)
+        verdict = self._beside(Verdict(NAME, Status.OK, events=found, begin=self._begin), latest)
         for event in verdict.failing:
             if event.start > latest.time[-1] or event.stop < latest.start:
                 continue
@@ -145,7 +144,7 @@ class Gate:
             tuple(summary.findings),
             duration=summary.samples / summary.rate,
         )
-        if self._reference is None or (summary.levels is None and not self._compared):
+        if self._reference is None or (summary.levels is None and self._begin is None):
             return verdict
         if summary.levels is None:  # too long to be compared as a whole
             status = Status.FINDINGS if self._told else Status.OK
@@ -154,12 +153,12 @@ class Gate:
             )
         else:
             verdict = replace(verdict, begin=summary.levels.start)
-            verdict = self._beside(verdict, self._reference, summary.levels)
+            verdict = self._beside(verdict, summary.levels)
         if summary.status is Status.CANNOT_TELL and summary.model and verdict.status is Status.OK:
             return replace(verdict, status=Status.CANNOT_TELL)  # too little of it was seen
         return verdict
 
-    @staticmethod
-    def _beside(verdict: Verdict, reference: Reference, levels: Levels) -> Verdict:
-        verdict = beside(verdict, reference.compare(levels), reference)
-        return judge(verdict, reference, today=date.today())
+    def _beside(self, verdict: Verdict, levels: Levels) -> Verdict:
+        assert self._reference is not None
+        verdict = beside(verdict, self._reference.compare(levels), self._reference)
+        return judge(verdict, self._reference, today=date.today())
