@@ -456,6 +456,25 @@ def test_levels_of_a_tone_are_its_root_mean_square_in_its_octave(simulate):
     assert np.isnan(found.level[:, :, 1]).all()
 
 
+def test_repetitions_of_which_no_joint_is_in_all_are_no_reference_for_each_other(simulate):
+    runs = []
+    for number, columns in enumerate([[0, 1], [1, 2], [0, 2]], 1):
+        run = simulate.run("pick", number)
+        named = tuple(run.joint_names[column] for column in columns)
+        signals = {
+            name: getattr(run, name)[:, columns]
+            for name in ("velocity", "velocity_desired", "position_desired")
+        }
+        part = replace(run, joint_names=named, desired_joint_names=named, position=None, **signals)
+        runs.append(levels(part, name="pick"))
+    reference = Reference(Path("good"), store.of_runs(runs))
+    assert [len(each.repetitions) for each in reference.scenarios] == [3]
+    compared = reference.compare(runs[0])
+    assert compared.scenarios == ()
+    assert compared.share(judging.Kind.GENERAL) == 1.0
+    assert compared.exceedances == ()
+
+
 def test_a_desired_velocity_that_is_a_placeholder_tells_no_error(tmp_path, simulate):
     run = simulate.run("pick", 1)
     zeros = replace(run, velocity_desired=np.zeros_like(run.velocity))

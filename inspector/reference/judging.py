@@ -350,7 +350,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     if frames and joints and octaves:
         matched, aligned, told = _matching(run, known, joints)
         remarks += told
-        references = [each for scenario in matched for each in scenario.repetitions]
+        references = _repetitions(matched)
         count = len(references)
         if references:
             quieter = _quieter(run, references, aligned, joints, octaves)
@@ -367,7 +367,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
                     " compared with other motions"
                 )
         left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
-        others = [each for s in known if s not in matched for each in s.repetitions]
+        others = _repetitions([each for each in known if each not in matched])
         if len(left) and (others or references):
             found = _over_others(run, left, others or references, joints, octaves)
             covered = np.isfinite(_largest(found.reshape(len(left), -1)))
@@ -403,7 +403,7 @@ def leave_one_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
         if shared:
             joints = tuple(j for j in run.joints if all(j in each.joints for each in shared))
             octaves = tuple(o for o in run.octaves if all(o in each.octaves for each in shared))
-            aligned = align(*_guides(run, shared, joints))
+            aligned = _aligned(run, shared, joints)
             over, _ = _over_repetitions(run, shared, aligned, joints, octaves)
             found.append(_top(scores_of(over)))
     return tuple(found)
@@ -469,7 +469,7 @@ def _common(
             own = run.robot
         there = ", ".join(sorted(robots)) or "nothing"
         return (), (), [f"no reference: it is of {there}, and the run of {own}"]
-    every = [each for scenario in known for each in scenario.repetitions]
+    every = _repetitions(known)
     joints = tuple(j for j in run.joints if any(j in each.joints for each in every))
     octaves = tuple(o for o in run.octaves if any(o in each.octaves for each in every))
     remarks = []
@@ -506,11 +506,14 @@ def _view(
     return found
 
 
-def _guides(
-    run: Levels, others: Sequence[Levels], joints: Sequence[str]
-) -> tuple[Array, list[Array]]:
-    """Slow positions of the joints that all have; from zero if one is integrated."""
+def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> list[Aligned]:
+    """Where the run lies in each of the others, by the joints that all have; nothing without one.
+
+    Positions count from zero if some are integrated.
+    """
     shared = [j for j in joints if all(j in each.joints for each in (run, *others))]
+    if not shared:
+        return []
     every = [
         np.asarray(each.guide[:, [each.joints.index(j) for j in shared]], dtype=np.float64)
         for each in (run, *others)
@@ -520,7 +523,7 @@ def _guides(
             guide - each.first[[each.joints.index(j) for j in shared]]
             for guide, each in zip(every, (run, *others), strict=True)
         ]
-    return every[0], every[1:]
+    return align(every[0], every[1:])
 
 
 def _matching(
@@ -529,31 +532,27 @@ def _matching(
     """Scenarios of the run's motion, of several the one with its name; all their repetitions."""
     usable = [each for each in known if len(each.repetitions[-1].guide)]
     named = [each for each in usable if run.name in each.names]
-    aligned = _aligned(run, named, joints)
+    aligned = _aligned(run, _repetitions(named), joints)
     # A run that lies on the motion of its name needs no other scenario.
     newest = np.cumsum([len(each.repetitions) for each in named], dtype=int) - 1
     if named and aligned and all(_share(aligned[place]) >= SAME_NAME for place in newest):
         return named, aligned, []
-    own, others = _guides(run, [each.repetitions[-1] for each in usable], joints)
-    if not own.shape[1]:
-        return [], [], []
-    shares = [_share(each) for each in align(own, others)]
-    pairs = list(zip(usable, shares, strict=True))
-    best = max(shares, default=0.0)
+    aligned = _aligned(run, [each.repetitions[-1] for each in usable], joints)
+    # Nothing is aligned where no joint is shared.
+    pairs = [(each, _share(own)) for each, own in zip(usable, aligned, strict=False)]
+    best = max((share for _, share in pairs), default=0.0)
     found = [each for each, share in pairs if share >= max(SAME_MOTION, ALIKE * best)]
     named = [each for each, share in pairs if run.name in each.names and share >= SAME_NAME]
     told = []
     if len(found) > 1 and not named:
         names = ", ".join(each.name for each in found)
         told.append(f"its motion is that of {names}, and its name is of none: all count")
-    return named or found, _aligned(run, named or found, joints), told
+    aligned = _aligned(run, _repetitions(named or found), joints)
+    return (named or found) if aligned else [], aligned, told
 
 
-def _aligned(run: Levels, scenarios: Sequence[Scenario], joints: Sequence[str]) -> list[Aligned]:
-    """Where the run lies in each repetition of some scenarios; nothing if they share no joint."""
-    references = [each for scenario in scenarios for each in scenario.repetitions]
-    own, others = _guides(run, references, joints)
-    return align(own, others) if own.shape[1] else []
+def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
+    return [each for scenario in scenarios for each in scenario.repetitions]
 
 
 def _share(aligned: Aligned) -> float:
@@ -565,9 +564,7 @@ def share_of_motion(run: Levels, other: Levels) -> float:
     """Share of a run that lies on the motion of another."""
     if not len(run.guide) or not len(other.guide) or not set(run.joints) & set(other.joints):
         return 0.0
-    own, (guide,) = _guides(run, [other], run.joints)
-    (aligned,) = align(own, [guide])
-    return _share(aligned)
+    return _share(*_aligned(run, [other], run.joints))
 
 
 def floor_of(
