@@ -87,9 +87,9 @@ def accept(
             typer.echo(
                 f"inspector: {each.path}: {event}: accepted with it; is that wanted?", err=True
             )
-    for change in changes:
-        typer.echo(str(change))
-    kept = len(after.scenarios) - len({change.name for change in changes})
+    for name, words in changes:
+        typer.echo(f"{name}: {words}")
+    kept = len(after.scenarios) - len({name for name, _ in changes})
     typer.echo(f"{store / kept_in.NAME}: written; {kept} other scenarios stay as they were")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library
 from inspector.logs.read import Source, sources
-from inspector.reference.judging import Comparison, Kind, compare, share_of_motion
+from inspector.reference.judging import Comparison, Kind, compare, same_motion
 from inspector.reference.levels import HOP, Levels
 from inspector.reference.store import Reference, levels_of, of_runs
 from inspector.reference.verdicts import References
@@ -252,7 +252,7 @@ def difference(
         ]
     broken = {each.path for each in failed}
     sides = [[each for each in side if Path(each.run) not in broken] for side in sides]
-    rows = _rows(references, sides, verdicts, margin)
+    rows = _rows(references[0], sides, verdicts, margin)
     if (
         sides[0]
         and sides[1]
@@ -285,7 +285,7 @@ def _measured(runs: Sequence[Source], root: Path, failed: list[Failed]) -> list[
 
 
 def _rows(
-    references: Sequence[Reference],
+    reference: Reference,
     sides: Sequence[Sequence[Levels]],
     verdicts: Sequence[Mapping[Path, Verdict]],
     margin: float,
@@ -303,7 +303,7 @@ def _rows(
         if name in runs[1]:
             after, verdict = runs[1][name], None
         else:
-            renamed = next((n for n in come if _same(runs[1][n][-1], before[-1])), "")
+            renamed = next((n for n in come if same_motion(runs[1][n][-1], before[-1])), "")
             if not renamed:
                 reason = f"{len(before)} before, none after"
                 paths = tuple(Path(each.run) for each in before)
@@ -311,17 +311,13 @@ def _rows(
                 continue
             come.remove(renamed)
             after, verdict = runs[1][renamed], (Outcome.RENAMED, f"is called {renamed} after")
-        rows.append(_row(name, before, after, references[0], verdicts, margin, verdict))
+        rows.append(_row(name, before, after, reference, verdicts, margin, verdict))
     for name in come:
         after = runs[1][name]
-        findings = tuple(_findings(after, verdicts[1], {}, NEW))
+        findings = tuple(_findings(after, verdicts[1], (), NEW))
         paths = tuple(Path(each.run) for each in after)
         rows.append(Row(name, Outcome.ADDED, "only after", (), paths, findings=findings))
     return rows
-
-
-def _same(one: Levels, other: Levels) -> bool:
-    return one.robot == other.robot and share_of_motion(one, other) > 0.8
 
 
 def _row(
@@ -340,10 +336,10 @@ def _row(
     margin = max([least, *(each.margins[Kind.REPETITIONS].db for each in found if each.scenarios)])
     scores = [each.worst for each in found if each.scenarios and np.isfinite(each.worst)]
     changes = _changes(found)
-    earlier = {path: verdicts[0][path] for path in map(Path, (each.run for each in before))}
+    earlier = [event for each in before for event in verdicts[0][Path(each.run)].events]
     findings = [
         *_findings(after, verdicts[1], earlier, NEW),
-        *_findings(before, verdicts[0], {}, RESOLVED),
+        *_findings(before, verdicts[0], (), RESOLVED),
     ]
     outcome, reason = given or _outcome(found, back, scores, margin, changes, verdicts[1])
     remarks = dict.fromkeys(remark for each in found for remark in each.remarks)
@@ -416,20 +412,19 @@ def _changes(found: Sequence[Comparison]) -> tuple[Change, ...]:
 def _findings(
     runs: Sequence[Levels],
     verdicts: Mapping[Path, Verdict],
-    earlier: Mapping[Path, Verdict],
+    earlier: Sequence[Event],
     kind: str,
 ) -> list[Finding]:
     """Findings of runs that the other side does not have as loud."""
     found = []
-    before = [event for one in earlier.values() for event in one.events]
     for run in runs:
         path = Path(run.run)
         for event in verdicts[path].events:
             known = verdicts[path].evidence.get(event)
             if known is None or known.excused:
                 continue
-            alike = [other for other in before if other.label == event.label]
+            alike = [other for other in earlier if other.label == event.label]
             there = bool(match([event], alike, collar=4 * HOP))
-            named = LOUDER if there and kind == NEW else kind
+            named = LOUDER if there else kind
             found.append(Finding(named, path, event, known.db, known.level, known))
     return found

@@ -567,6 +567,11 @@ def share_of_motion(run: Levels, other: Levels) -> float:
     return _share(*_aligned(run, [other], run.joints))
 
 
+def same_motion(run: Levels, other: Levels) -> bool:
+    """Whether two runs are one scenario, whatever they are called."""
+    return run.robot == other.robot and share_of_motion(run, other) > SAME_MOTION
+
+
 def floor_of(
     references: Sequence[NDArray[np.float32]], share: float = FLOOR_SHARE
 ) -> NDArray[np.float32]:

@@ -12,8 +12,8 @@ import re
 import zipfile
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from datetime import date, datetime
 from functools import lru_cache
 from math import isfinite
@@ -33,6 +33,7 @@ from inspector.reference.judging import (
     leave_one_moment_out,
     leave_one_out,
     margin_of,
+    same_motion,
     share_of_motion,
 )
 from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encoded, levels, octaves
@@ -72,7 +73,6 @@ class Reference:
     path: Path
     scenarios: tuple[Scenario, ...] = ()
     stored: bool = False
-    remarks: tuple[str, ...] = field(default=())
 
     @classmethod
     def load(cls, path: str | Path, reading: Reading | None = None) -> "Reference":
@@ -220,8 +220,50 @@ def accept_into(
     reason: str,
     by: str,
     renames: bool = True,
-) -> "tuple[Reference, list[Change]]":
-    """Accept runs into a store, which is made if it does not exist, while nobody else does."""
+) -> tuple[Reference, list[tuple[str, str]]]:
+    """Accept runs into a store: their scenarios are added or replaced, all others stay.
+
+    Runs of an accepted scenario that are as it is join its repetitions, of which the newest ten
+    stay; runs that differ replace them. A scenario whose motion has another name is renamed.
+
+    Args:
+        folder: The store, which is made if it does not exist.
+        renames: Whether a scenario whose logs are gone may have got another name.
+
+    Returns:
+        The store as it is now, and by the names of scenarios what changed.
+    """
+    with _alone_in(folder):
+        there = os.path.lexists(folder / NAME)
+        reference = Reference.load(folder) if there else Reference(folder, stored=True)
+        kept = {each.name: each for each in reference.scenarios}
+        found = of_runs([replace(each, run=_from_store(each.run, folder)) for each in runs])
+        names, changes = {each.name for each in found}, []
+        for new in found:
+            facts: dict[str, Any] = {"accepted": date.today(), "by": by, "reason": reason}
+            facts["wanted"] = tuple(wanted.get(new.name, ()))
+            old = kept.get(new.name)
+            if old is None and renames:
+                others = [each for each in kept.values() if each.name not in names]
+                old = _former(new, others, folder.absolute().parent)
+                if old is not None:
+                    del kept[old.name]
+                    facts["renamed_from"] = (*old.renamed_from, old.name)
+                    changes.append((new.name, f"renamed from {old.name}"))
+            if old is None:
+                words = f"new, {counted(len(new.repetitions), 'repetition')}"
+                kept[new.name] = replace(new, **facts)
+            else:
+                kept[new.name], words = _updated(old, new, facts)
+            changes.append((new.name, words))
+        after = Reference(folder, tuple(kept[name] for name in sorted(kept)), stored=True)
+        save(after, folder)
+    return after, changes
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Make a folder, and accept into it while nobody else does."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         held = os.open(folder, os.O_RDONLY)
@@ -230,87 +272,16 @@ def accept_into(
     try:
         with suppress(OSError):  # a file system without locks
             fcntl.flock(held, fcntl.LOCK_EX)
-        there = os.path.lexists(folder / NAME)
-        before = Reference.load(folder) if there else Reference(folder, (), stored=True)
-        runs = [replace(each, run=_from_store(each.run, folder)) for each in runs]
-        after, changes = accepted(
-            before,
-            runs,
-            wanted=wanted,
-            reason=reason,
-            by=by,
-            today=date.today(),
-            renames=renames,
-        )
-        save(after, folder)
+        yield
     finally:
         os.close(held)
-    return after, changes
-
-
-@dataclass(frozen=True)
-class Change:
-    """What accepting does to a scenario, in a line.
-
-    Attributes:
-        name: The scenario.
-        words: What changes.
-    """
-
-    name: str
-    words: str
-
-    def __str__(self) -> str:
-        return f"{self.name}: {self.words}"
-
-
-def accepted(
-    reference: Reference,
-    runs: Sequence[Levels],
-    *,
-    wanted: Mapping[str, Sequence[Expected]],
-    reason: str,
-    by: str,
-    today: date,
-    renames: bool = True,
-) -> tuple[Reference, list[Change]]:
-    """Accept runs: their scenarios are added or replaced, all others stay.
-
-    Runs of an accepted scenario that are as it is join its repetitions, of which the newest ten
-    stay; runs that differ replace them. A scenario whose motion has another name is renamed.
-
-    Args:
-        renames: Whether a scenario whose logs are gone may have got another name.
-    """
-    kept = {each.name: each for each in reference.scenarios}
-    found, changes = of_runs(runs), []
-    for new in found:
-        facts: dict[str, Any] = {"accepted": today, "by": by, "reason": reason}
-        facts["wanted"] = tuple(wanted.get(new.name, ()))
-        old = kept.get(new.name)
-        if old is None and renames:
-            others = [each for each in kept.values() if each.name not in {e.name for e in found}]
-            old = _former(new, others, reference.path.absolute().parent)
-            if old is not None:
-                del kept[old.name]
-                facts["renamed_from"] = (*old.renamed_from, old.name)
-                changes.append(Change(new.name, f"renamed from {old.name}"))
-        if old is None:
-            words = f"new, {counted(len(new.repetitions), 'repetition')}"
-            kept[new.name] = replace(new, **facts)
-        else:
-            kept[new.name], words = _updated(old, new, facts)
-        changes.append(Change(new.name, words))
-    scenarios = tuple(kept[name] for name in sorted(kept))
-    return Reference(reference.path, scenarios, stored=True), changes
 
 
 def _former(new: Scenario, others: Sequence[Scenario], home: Path) -> Scenario | None:
     """The scenario that a new one is under another name: its motion is the same, its logs gone."""
     for each in others:
         gone = not any((home / one.run).exists() for one in each.repetitions)
-        same = each.robot == new.robot and gone
-        if same and share_of_motion(new.repetitions[-1], each.repetitions[-1]) > 0.8:
+        if gone and same_motion(new.repetitions[-1], each.repetitions[-1]):
             return each
     return None
 

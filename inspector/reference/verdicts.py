@@ -220,7 +220,7 @@ def beside(
         quieter=round(comparison.quieter, 2) if comparison.quieter > _least(comparison) else 0.0,
         speed=_known(comparison.slope),
         failures=tuple(_failures(comparison, reference)),
-        words=_words(comparison, reference),
+        words=_words(comparison),
         bounds={str(kind): each.bound for kind, each in comparison.margins.items()},
     )
     covered = shares[Kind.GENERAL] < 1.0
@@ -258,7 +258,7 @@ def _least(comparison: Comparison) -> float:
     return known.db if known else float("inf")
 
 
-def _words(comparison: Comparison, reference: Reference) -> str:
+def _words(comparison: Comparison) -> str:
     parts = [str(comparison)]
     if comparison.quieter > _least(comparison):
         parts.append(f"{comparison.quieter:.1f} dB quieter than each repetition")
@@ -267,7 +267,7 @@ def _words(comparison: Comparison, reference: Reference) -> str:
         parts.append(f"aligned at {slope:.2f} of its speed")
     if comparison.run.guided_by.startswith("measured"):
         parts.append(f"aligned by {comparison.run.guided_by}: the log has no desired motion")
-    return "; ".join(filter(None, [*parts, *comparison.remarks, *reference.remarks]))
+    return "; ".join(filter(None, [*parts, *comparison.remarks]))
 
 
 def _events(
@@ -287,7 +287,16 @@ def _events(
         near = [event.start for event in absorbed if abs(event.start - start) <= 4 * HOP]
         label, score, novel = _named(labels, each, absorbed)
         event = Event(label, min(near, default=start), stop, score, novel)
-        found.append((event, _evidence(each)))
+        evidence = Evidence(
+            each.kind.value,
+            round(each.db, 2),
+            round(each.peak, 4),
+            each.joint,
+            each.signal,
+            each.octave,
+            round(each.level, 2),
+        )
+        found.append((event, evidence))
     for event in left:
         covered = comparison.covered(event.start, event.stop)
         excused = f"as loud as {_references(comparison)}" if covered else ""
@@ -300,18 +309,6 @@ def _references(comparison: Comparison) -> str:
     if not comparison.scenarios:
         return "other motions of this robot"
     return f"{comparison.repetitions} of {' and '.join(comparison.scenarios)}"
-
-
-def _evidence(each: Exceedance) -> Evidence:
-    return Evidence(
-        each.kind.value,
-        round(each.db, 2),
-        round(each.peak, 4),
-        each.joint,
-        each.signal,
-        each.octave,
-        round(each.level, 2),
-    )
 
 
 def _named(
@@ -356,24 +353,19 @@ def _failures(comparison: Comparison, reference: Reference) -> Iterable[tuple[st
 
 def frozen(run: Levels, references: Sequence[Levels]) -> float | None:
     """From when on a run stands still while its references move, in [s]; None if it does not."""
-    moving = []
+    count = min(len(each.pace) for each in (run, *references))
+    usual, moving = [], []
     for each in references:
-        count = min(len(each.pace), len(run.pace))
-        usual = float(np.sqrt(np.mean(np.square(each.pace)))) if len(each.pace) else 0.0
+        own = float(np.sqrt(np.mean(np.square(each.pace)))) if len(each.pace) else 0.0
         slow = run.pace[:count] < STOPPED * each.pace[:count]
-        moving.append(slow & (each.pace[:count] > MOVES * usual) & (usual > 1e-3))
-    if not moving:
-        return None
-    count = min(map(len, moving))
-    still = np.flatnonzero(np.all([each[:count] for each in moving], axis=0))
-    usual = float(
-        np.median([np.sqrt(np.mean(np.square(e.pace))) if len(e.pace) else 0.0 for e in references])
-    )
+        moving.append(slow & (each.pace[:count] > MOVES * own) & (own > 1e-3))
+        usual.append(own)
+    still = np.flatnonzero(np.all(moving, axis=0))
     # A delay or a pause is none: the rest of the run must stand still, too.
     if len(still) * HOP < STILL_FOR:
         return None
     rest = run.pace[still[0] :]
-    return float(run.time[still[0]]) if rest.max(initial=0.0) < STOPPED * usual else None
+    return float(run.time[still[0]]) if rest.max(initial=0.0) < STOPPED * np.median(usual) else None
 
 
 def judge(
