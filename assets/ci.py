@@ -26,8 +26,7 @@ from markdown_it import MarkdownIt
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
-from inspector.assets import model_files
-from inspector.library import load_library
+from inspector.library import load_library, model_files
 from inspector.reference.verdicts import References
 from inspector.report.formats import as_json
 from inspector.verdict import classify_files

@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from inspector.analysis import Analysis, analyse  # type: ignore[no-redef,unused-ignore] # of a cycle
+    from inspector.errors import Status, Unknown
     from inspector.library import load_library
     from inspector.live import LiveSession
     from inspector.logs.motion import Imported
     from inspector.logs.read import read_log, read_logs
     from inspector.recording.viewer import show
     from inspector.reference.store import Reference
-    from inspector.status import Status, Unknown
 
 __all__ = [
     "Analysis",
@@ -31,8 +31,8 @@ _MODULES = {
     "Imported": "inspector.logs.motion",
     "LiveSession": "inspector.live",
     "Reference": "inspector.reference.store",
-    "Status": "inspector.status",
-    "Unknown": "inspector.status",
+    "Status": "inspector.errors",
+    "Unknown": "inspector.errors",
     "analyse": "inspector.analysis",
     "load_library": "inspector.library",
     "read_log": "inspector.logs.read",

@@ -17,7 +17,7 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector.audit.audit import Audit, audit, shortcomings, summary
 from inspector.audit.signals import without_placeholder
-from inspector.errors import InspectorError
+from inspector.errors import IGNORED, InspectorError, Status, Unknown
 from inspector.levels import FLOOR_DB, STEP, velocity_levels
 from inspector.library import (
     CannotTellError,
@@ -30,7 +30,6 @@ from inspector.library import (
 from inspector.localisation.extent import extent
 from inspector.logs.hold import without_hold
 from inspector.logs.read import Opened, open_run
-from inspector.status import IGNORED, Status, Unknown
 from noiseclassifier import Event
 from noiseclassifier.lasting import HOP as LASTING_HOP
 from noiseclassifier.lasting import MARGIN as LASTING_MARGIN
@@ -45,6 +44,7 @@ from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
+    from inspector.levels import Spectrogram
     from inspector.localisation.order import Order
     from inspector.localisation.stage import Localisation
     from noisemodel.extended import LinkNoise
@@ -490,6 +490,30 @@ def worst_joint(analysis: Analysis) -> int | None:
     _, level = analysis.joint_levels
     power = np.nansum(10.0 ** (level / 10.0), axis=0)
     return int(np.argmax(power))
+
+
+def orders(analysis: Analysis) -> "tuple[str, Spectrogram] | None":
+    """Compute the order spectrogram of the noise over the angle of one joint.
+
+    The joint is the first finding's with an order; else the one that vibrates most while it
+    moves.
+
+    Returns:
+        The joint, and its spectrogram, see `inspector.localisation.order`; None without motion.
+    """
+    from inspector.localisation.order import SLOWEST, order_spectrogram
+
+    run = analysis.run
+    if analysis.audit is None or not run.joint_names:
+        return None
+    known = [run.joint_names.index(each.joint) for each in analysis.orders.values()]
+    _, level = analysis.joint_levels
+    fastest = [np.abs(run.velocity[rows]).max(axis=0) for rows in pieces(run.velocity)]
+    moving = np.max(fastest, axis=0) > SLOWEST
+    power = np.nansum(10.0 ** (level / 10.0), axis=0)
+    joint = known[0] if known else int(np.argmax(np.where(moving, power, -1.0)))
+    found = order_spectrogram(run, analysis.noise, joint)
+    return None if found is None else (run.joint_names[joint], found)
 
 
 def worst_signal(analysis: Analysis, joint: int | None) -> Array:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from inspector.errors import OptionError
-from inspector.status import EXIT, OUTPUT_LOST, Status
+from inspector.errors import EXIT, OUTPUT_LOST, OptionError, Status
 from inspector.text import printable
 
 if TYPE_CHECKING:

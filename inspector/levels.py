@@ -1,4 +1,4 @@
-"""Levels above 10 Hz in decibels, in steps of 50 ms, and the scales that all pictures share.
+"""What pictures show of a signal: levels above 10 Hz in decibels, spectrograms, fewer points.
 
 Levels are absolute. What the colours span follows the run, of several runs the loudest; while
 samples come in, it is fixed.
@@ -6,6 +6,7 @@ samples come in, it is fixed.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,12 @@ from numpy.typing import NDArray
 from inspector import colors
 from noisemodel.extended import LinkNoise, vibrating_pieces
 from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.runfile import rows_at_once
 from noisemodel.types import Array, Mask, Real
 
 STEP = 0.05
 """Time over which a level is taken, in [s]."""
-RANGE_DB = 60.0
+SPAN_DB = 60.0
 """Range of a scale that follows a run, in [dB]."""
 FLOOR_DB = -100.0
 """Least level of a velocity, below any encoder's, in [dB re 1 rad/s]; lower levels are raised."""
@@ -68,7 +70,7 @@ class Scale:
         """
         loudest = float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
         high = max(10.0 * np.ceil(loudest / 10.0), self.high - 30.0)
-        return replace(self, low=float(high) - RANGE_DB, high=float(high))
+        return replace(self, low=float(high) - SPAN_DB, high=float(high))
 
     def down_to(self, low: float | None) -> "Scale":
         """The scale from a chosen level on, in [dB]; as it is if None."""
@@ -131,3 +133,133 @@ def link_levels(noise: LinkNoise) -> tuple[Array, Array]:
     counts = np.diff(np.append(firsts, len(noise.time)))
     mean = np.add.reduceat(noise.vibration, firsts, axis=0) / counts[:, None]
     return noise.time[firsts] - width / 2, decibel(mean / REFERENCE_POWER)
+
+
+WINDOW = 0.1024
+"""Length of the window in [s]: the paper's 1024 samples at 10 kHz."""
+COLUMNS = 400
+"""Most windows of a spectrogram."""
+RANGE_DB = 70.0
+"""Range of its level, in [dB]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrogram:
+    """Amplitudes of a signal in windows.
+
+    Attributes:
+        time: Centres of the windows, shape (columns,), in [s].
+        frequency: Shape (bins,), in [Hz]; the mean is left out.
+        amplitude: Shape (bins, columns), in the unit of the signal; 0 in windows that touch a gap.
+        valid: False for windows that touch a gap, shape (columns,).
+    """
+
+    time: Array
+    frequency: Array
+    amplitude: Array
+    valid: Mask
+
+    @cached_property
+    def decibel(self) -> Array:
+        """Levels of the amplitudes, shape (bins, columns), in [dB]; -inf where there is none."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(20 * np.log10(self.amplitude))
+
+    @cached_property
+    def level(self) -> Array:
+        """Shape (bins, columns), in [dB] relative to the largest amplitude, at least -70."""
+        largest = self.amplitude.max(initial=0.0) or 1.0
+        floor = 10 ** (-RANGE_DB / 20)
+        return np.asarray(20 * np.log10(np.maximum(self.amplitude / largest, floor)))
+
+
+def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spectrogram:
+    """Compute the spectrogram of a signal for viewing.
+
+    Args:
+        signal: Such as noise, shape (samples,).
+        rate: Samples per second, in [Hz].
+        start: Time of the first sample, in [s].
+        valid: False in gaps, shape (samples,).
+    """
+    length = min(window_length(rate), len(signal))
+    hop = max(1, length // 4, -(-(len(signal) - length) // (COLUMNS - 1)))
+    windows = np.lib.stride_tricks.sliding_window_view(signal, length)[::hop]
+    whole = np.lib.stride_tricks.sliding_window_view(valid, length)[::hop].all(axis=1)
+    columns = np.arange(len(windows), dtype=np.float64)
+    bins = np.arange(1, length // 2 + 1, dtype=np.float64)
+    return Spectrogram(
+        time=start + (columns * hop + length / 2) / rate,
+        frequency=bins * rate / length,
+        amplitude=amplitudes(windows).T * whole,
+        valid=np.asarray(whole),
+    )
+
+
+def in_bands(frequency: Array, amplitude: Array, edges: Array) -> Array:
+    """The largest amplitude in each of several bands, such as the bands of a logarithmic axis.
+
+    Args:
+        frequency: In order, shape (bins,).
+        edges: Of the bands, in order, in the unit of the frequency, shape (bands + 1,).
+    """
+    firsts = np.searchsorted(frequency, edges[:-1])
+    lasts = np.searchsorted(frequency, edges[1:])
+    middles = np.sqrt(edges[:-1] * edges[1:])
+    nearest = np.abs(frequency[:, None] - middles).argmin(axis=0)
+    rows = [
+        amplitude[first:last].max(axis=0) if last > first else amplitude[near]
+        for first, last, near in zip(firsts, lasts, nearest, strict=True)
+    ]
+    return np.stack(rows)
+
+
+def window_length(rate: float) -> int:
+    """Length of a window, in samples; at least 8."""
+    return max(round(WINDOW * rate), 8)
+
+
+def amplitudes(windows: Array) -> Array:
+    """Amplitude spectra of Hann windows, each freed of its mean."""
+    hann = _hann(windows.shape[1])
+    centred = windows - windows.mean(axis=1, keepdims=True)
+    return np.asarray(np.abs(np.fft.rfft(centred * hann, axis=1))[:, 1:] * 2 / hann.sum())
+
+
+@lru_cache(maxsize=4)
+def _hann(length: int) -> Array:
+    """Periodic Hann window."""
+    return np.hanning(length + 1)[:-1]
+
+
+def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
+    """Keep the least and the greatest value of each bucket of samples.
+
+    Args:
+        time: Shape (samples,), in [s].
+        points: How many points each series may have at most.
+
+    Returns:
+        Times, shape (kept,), and values, shape (kept, series), kept ≤ points; everything, if
+        there are not more samples than points.
+    """
+    if len(time) <= points or not values.shape[1]:
+        return time, np.asarray(values, dtype=np.float64)
+    size = -(-len(time) // (points // 2))
+    starts = np.arange(0, len(time), size)
+    thin = np.empty((2 * len(starts), values.shape[1]))
+    many = size * max(1, rows_at_once(values) // size)
+    parts = [_buckets(values[first : first + many], size) for first in range(0, len(time), many)]
+    thin[0::2] = np.concatenate([least for least, _ in parts])
+    thin[1::2] = np.concatenate([greatest for _, greatest in parts])
+    halves = np.minimum(starts + size // 2, len(time) - 1)
+    return time[np.stack((starts, halves), axis=1).ravel()], thin
+
+
+def _buckets(values: Real, size: int) -> tuple[Real, Real]:
+    """Least and greatest values of the buckets of a piece, shape (buckets, series) each."""
+    whole = len(values) // size * size
+    parts = [values[:whole].reshape(-1, size, values.shape[1]), values[None, whole:]]
+    parts = [part for part in parts if part.size]
+    least = np.concatenate([part.min(axis=1) for part in parts])
+    return least, np.concatenate([part.max(axis=1) for part in parts])

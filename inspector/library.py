@@ -1,4 +1,4 @@
-"""Choose a model for a run and let it label the run's noise."""
+"""The demo run and the models: those that ship, the one for a run, and what it labels."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,15 +8,18 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector import assets
 from inspector.errors import InspectorError
 from inspector.logs.hold import without_hold
 from noiseclassifier.profile import NOMINAL
+from noisemodel.files import also_reading
 from noisemodel.run import pieces_of
 from noisemodel.types import Array, Mask, Real
 
 Library = Mapping[str, nc.Model]
 """Models by name."""
+HERE = Path(__file__).parent
+FOLDERS = (HERE / "assets", HERE.parent / "assets", HERE.parent)
+"""In an installed wheel, and in a checkout."""
 
 
 class CannotTellError(InspectorError):
@@ -42,17 +45,52 @@ class Labelled:
     lasting: tuple[nc.Event, ...] = ()
 
 
-def load_library(paths: Sequence[str | Path] = ()) -> Library:
+def folder(kind: str) -> Path:
+    """Find a folder of shipped files.
+
+    Args:
+        kind: "runs" or "models".
+    """
+    for place in FOLDERS:
+        if any((place / kind).glob("*.npz")):
+            return place / kind
+    raise InspectorError(f"this installation lacks its {kind}; install noise-inspector again")
+
+
+def demo_run() -> Path:
+    """Name the run file that ships: a simulated Panda that touches a table unexpectedly."""
+    return folder("runs") / "demo.npz"
+
+
+def model_files(chosen: Sequence[str | Path] | None = None) -> tuple[Path, ...]:
+    """Name model files: those that were chosen, or all that ship.
+
+    Args:
+        chosen: Model files, or names of models that ship; None or empty for all of these.
+    """
+    shipped = {path.stem: path for path in sorted(folder("models").glob("*.npz"))}
+    found = []
+    for path in map(Path, chosen or shipped.values()):
+        known = shipped.get(str(path))
+        if known is None and not path.exists():
+            raise InspectorError(
+                f"{path}: no such model; name a file, or one that ships: {', '.join(shipped)}"
+            )
+        found.append(path if path.exists() else shipped[str(path)])
+    also_reading(found)
+    return tuple(found)
+
+
+def load_library(chosen: Sequence[str | Path] | None = None) -> Library:
     """Read models, by the stems of their files.
 
     Args:
-        paths: Model files, or names of models that ship; all of these unless given.
+        chosen: Model files, or names of models that ship; all of these unless given.
 
     Raises:
         FileError: If a file is no model.
     """
-    files = assets.model_files([Path(path) for path in paths])
-    return {path.stem: nc.load(path) for path in files}
+    return {path.stem: nc.load(path) for path in model_files(chosen)}
 
 
 def for_robot(library: Library, robot: str | None) -> Library:

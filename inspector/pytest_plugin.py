@@ -112,7 +112,7 @@ class Noise:
             The verdicts; none with ``--noise-accept``, which accepts the runs.
         """
         __tracebackhide__ = True
-        from inspector.status import Status
+        from inspector.errors import Status
         from noisemodel import Run
 
         allowed = self._allowed(allow)
@@ -202,8 +202,8 @@ class Noise:
     def _allowed(self, allow: "str | Iterable[Allowed]") -> tuple[Allowed, ...]:
         """What may be there, of classes that there are."""
         __tracebackhide__ = True
+        from inspector.errors import Status
         from inspector.reference.verdicts import classes_found
-        from inspector.status import Status
         from noisemodel.errors import hint
 
         known = (*classes_found(self._library), Status.CANNOT_TELL.value)
@@ -223,12 +223,10 @@ class Noise:
     def _library(self) -> "Library":
         """The models, read once per process."""
         if _LIBRARY not in self._config.stash:
-            from inspector import assets
             from inspector.library import load_library
 
             named = self._config.getoption("--noise-model")
-            files = assets.model_files([Path(name) for name in named] if named else None)
-            self._config.stash[_LIBRARY] = load_library(files)
+            self._config.stash[_LIBRARY] = load_library(named)
         return self._config.stash[_LIBRARY]
 
     def _scenario(self, name: str = "") -> str:

@@ -27,12 +27,11 @@ import numpy as np
 
 from inspector.analysis import analyse
 from inspector.audit.signals import without_placeholder
-from inspector.errors import InspectorError, without_path
+from inspector.errors import InspectorError, Status, without_path
 from inspector.library import Library
 from inspector.logs.hold import hold_length, without_hold
 from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.report.picture import require
-from inspector.status import Status
 from inspector.text import cell, counted
 from inspector.verdict import EXPECTED
 from noisemodel import Run

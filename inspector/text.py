@@ -1,11 +1,19 @@
-"""Text: what of files a terminal, a CI's log or a spreadsheet would take for more; numbers."""
+"""Text: what of files a terminal, a CI's log or a spreadsheet would take for more; progress."""
 
 import re
+import sys
+from collections.abc import Iterable, Iterator
+from time import monotonic
+from typing import TypeVar
+
+T = TypeVar("T")
 
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 """Control characters, ends of lines, and what turns the direction of writing."""
 FORMULA = ("=", "+", "-", "@")
 """What a cell begins with that a spreadsheet computes."""
+EVERY = 10.0
+"""Time between two lines of progress, in [s]."""
 
 
 def printable(text: str) -> str:
@@ -31,3 +39,37 @@ def counted(number: int, noun: str) -> str:
 def plain(value: float, digits: int = 3) -> str:
     """A number rounded to significant digits, without an exponent up to a million: "3540"."""
     return f"{float(f'{value:.{digits}g}'):g}"
+
+
+def program_version() -> str:
+    """The version that is installed; "0" of a program that is run from its folder."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("noise-inspector")
+    except PackageNotFoundError:
+        return "0"
+
+
+def progress(items: Iterable[T], what: str, *, total: int) -> Iterator[T]:
+    """Items as they come, with a progress bar on a terminal, or a line every 10 s elsewhere."""
+    if total < 2:
+        yield from items
+    elif sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import track
+
+        yield from track(items, what, total=total, console=Console(stderr=True), transient=True)
+    else:
+        yield from _lines(items, what, total)
+
+
+def _lines(items: Iterable[T], what: str, total: int) -> Iterator[T]:
+    begun = said = monotonic()
+    for number, item in enumerate(items, start=1):
+        yield item
+        now = monotonic()
+        if now - said >= EVERY and number < total:
+            said = now
+            left = (now - begun) / number * (total - number)
+            print(f"{what}: {number} of {total}, {left:.0f} s left", file=sys.stderr, flush=True)

@@ -27,11 +27,10 @@ from typing import IO, TYPE_CHECKING, Any
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import Analysis, analyse, analyse_noise
-from inspector.errors import FileError, InspectorError, without_path
+from inspector.errors import EXIT, FileError, InspectorError, Status, Unknown, without_path, worst
 from inspector.library import Library
 from inspector.logs.read import Reading, Source, open_source
-from inspector.status import EXIT, Status, Unknown, worst
-from inspector.version import program_version
+from inspector.text import program_version
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_json, text_of
 from noisemodel import OutputError

@@ -22,7 +22,7 @@ from zlib import crc32
 import numpy as np
 
 import noiseclassifier as nc
-from inspector.progress import progress
+from inspector.text import progress
 from inspector.training.train import ANY_RATE, evaluate, train
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset

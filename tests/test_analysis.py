@@ -15,14 +15,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inspector.analysis import Analysis, analyse, analyse_noise, with_links
-from inspector.assets import demo_run, model_files
 from inspector.audit.audit import audit
 from inspector.audit.signals import without_placeholder
-from inspector.library import load_library
+from inspector.errors import Status, Unknown
+from inspector.library import demo_run, load_library, model_files
 from inspector.report import html, markdown
 from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
-from inspector.status import Status, Unknown
 from inspector.verdict import Verdict, classify_file, exit_status
 from noiseclassifier import Event, Labels
 from noisemodel import Robot, Run

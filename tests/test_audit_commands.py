@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-from inspector.assets import demo_run
+from inspector.library import demo_run
 
 PANDA = Path(__file__).parents[2] / "shared" / "data" / "panda"
 

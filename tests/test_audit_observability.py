@@ -4,7 +4,6 @@ from generalmodel import fixed
 from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.assets import demo_run, model_files
 from inspector.audit.audit import (
     OSCILLATIONS,
     Observability,
@@ -14,7 +13,7 @@ from inspector.audit.audit import (
     shortcomings,
     summary,
 )
-from inspector.library import CannotTellError, label_run, load_library
+from inspector.library import CannotTellError, demo_run, label_run, load_library, model_files
 from inspector.verdict import Status, classify_file, exit_status
 from noiseclassifier import Profile
 from noiseclassifier.signals import MOTION

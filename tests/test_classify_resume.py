@@ -14,17 +14,15 @@ import pytest
 import workers
 from commandline import call
 
-from inspector import assets, verdict
-from inspector.assets import demo_run, model_files
-from inspector.errors import InspectorError
-from inspector.library import load_library
+from inspector import verdict
+from inspector.errors import InspectorError, Status, Unknown
+from inspector.library import demo_run, load_library, model_files
 from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.read import Reading, Source, open_source
-from inspector.status import Status, Unknown
+from inspector.text import program_version
 from inspector.verdict import Evidence, StateError, Verdict, classify_files, digest, kept
-from inspector.version import program_version
 from noiseclassifier import Event
 from noisemodel import OutputError
 
@@ -161,7 +159,7 @@ def test_a_state_of_another_version_is_refused(tmp_path, key, value, problem):
 
 def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
     state, other = tmp_path / "state.jsonl", tmp_path / "other.npz"
-    shutil.copy(assets.model_files()[0], other)
+    shutil.copy(model_files()[0], other)
     call("classify", demo_run(), "--resume", state)
     for options, differs in [
         (("--unknown", "ignore"), "--unknown"),

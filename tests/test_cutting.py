@@ -5,8 +5,8 @@ import pytest
 
 from inspector import LiveSession
 from inspector.analysis import analyse
+from inspector.errors import Status
 from inspector.library import load_library
-from inspector.status import Status
 from noiseclassifier.lasting import SHORTEST
 from noisemodel import Run, decimated
 

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from inspector.assets import demo_run
+from inspector.library import demo_run
 
 ROOT = Path(__file__).parents[1]
 yaml = pytest.importorskip("ruamel.yaml", reason="needs ruamel.yaml, which rosbags brings")

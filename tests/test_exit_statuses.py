@@ -11,9 +11,9 @@ from commandline import call
 from generalmodel import run_at
 
 from inspector import cli
-from inspector.assets import demo_run
+from inspector.errors import Status
+from inspector.library import demo_run
 from inspector.report.formats import as_json
-from inspector.status import Status
 from inspector.verdict import Verdict
 from noisemodel import Block
 

@@ -11,9 +11,8 @@ from commandline import call
 from mcap.reader import make_reader
 
 from inspector.analysis import estimate
-from inspector.assets import demo_run, model_files
 from inspector.export.tables import collect, export
-from inspector.library import load_library
+from inspector.library import demo_run, load_library, model_files
 from noisemodel import Block, Run, simplified
 
 LIBRARY = load_library(model_files())

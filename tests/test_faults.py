@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inspector.assets import demo_run
+from inspector.library import demo_run
 from noisemodel import Run
 
 pytestmark = [

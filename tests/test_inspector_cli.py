@@ -9,7 +9,7 @@ import pytest
 from commandline import call as inspector
 from generalmodel import fixed
 
-from inspector.assets import demo_run, model_files
+from inspector.library import demo_run, model_files
 from inspector.recording import viewer
 from noisemodel import Run
 

@@ -6,9 +6,9 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from inspector.errors import Status, Unknown
 from inspector.localisation.stage import Localisation
 from inspector.report.formats import ANNOTATIONS, COMMENT, FORMATS, MARKER, as_json, sarif, text
-from inspector.status import Status, Unknown
 from inspector.verdict import Evidence, Missing, Ruled, Ruling, Verdict, exit_status
 from noiseclassifier import Event
 

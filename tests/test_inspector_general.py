@@ -13,10 +13,10 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import analyse
 from inspector.audit.audit import Observability, audit
+from inspector.errors import Status
 from inspector.library import CannotTellError, label_run, signals_of
 from inspector.logs.hold import without_hold
 from inspector.report.markdown import report
-from inspector.status import Status
 from inspector.training.train import classified
 
 LIBRARY = {"general": trained()}

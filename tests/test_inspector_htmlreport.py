@@ -11,9 +11,8 @@ import pytest
 from commandline import call
 
 from inspector.analysis import analyse_file
-from inspector.assets import demo_run, model_files
 from inspector.errors import InspectorError
-from inspector.library import load_library
+from inspector.library import demo_run, load_library, model_files
 from inspector.report import html
 from noiseclassifier import Event
 from noisemodel import Block, Run

@@ -6,13 +6,13 @@ import pytest
 from commandline import call
 from generalmodel import fixed
 
-from inspector.assets import model_files
 from inspector.library import (
     CannotTellError,
     for_robot,
     label_noise,
     label_run,
     load_library,
+    model_files,
 )
 from noiseclassifier.signals import JOINTS, MOTION
 from noisemodel import Run

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from inspector.analysis import analyse
-from inspector.spectrogram import orders
+from inspector.analysis import analyse, orders
 from noisemodel import Run
 
 RATE = 1000.0

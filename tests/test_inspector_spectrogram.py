@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from inspector.spectrogram import COLUMNS, RANGE_DB, in_bands, spectrogram
+from inspector.levels import COLUMNS, RANGE_DB, in_bands, spectrogram
 
 
 def everywhere(signal):

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inspector.thinning import extremes
+from inspector.levels import extremes
 
 
 @given(st.integers(1, 5000), st.integers(2, 300), st.integers(0, 2**32 - 1))

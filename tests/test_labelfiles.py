@@ -8,9 +8,9 @@ from commandline import call
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from inspector.assets import demo_run
 from inspector.errors import InspectorError
 from inspector.export.labels import FORMATS, read_labels, write_labels
+from inspector.library import demo_run
 from noiseclassifier import Event, noisytest
 from noisemodel import Block, OutputError, Run, RunError
 

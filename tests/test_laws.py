@@ -20,9 +20,8 @@ from simulated import simulated
 
 import noisemodel as nm
 from inspector.analysis import analyse
-from inspector.assets import demo_run
-from inspector.library import load_library, signals_of
-from inspector.status import Status, Unknown
+from inspector.errors import Status, Unknown
+from inspector.library import demo_run, load_library, signals_of
 
 FLOOR = 0.3
 """Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling

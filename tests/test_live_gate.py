@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-from inspector.assets import demo_run
+from inspector.library import demo_run
 from inspector.reference.judging import Kind
 from inspector.reference.levels import LevelStream, levels
 from inspector.reference.store import Reference

@@ -13,7 +13,6 @@ from rerun.chunk import RrdReader
 
 import inspector
 import noisemodel as nm
-from inspector import assets
 from inspector.analysis import analyse
 from inspector.library import label_run, load_library
 from inspector.live import LiveError
@@ -36,7 +35,7 @@ def strict():
 @pytest.fixture(scope="module")
 def library():
     """The model that ships."""
-    return load_library(assets.model_files())
+    return load_library()
 
 
 def motion(seconds, joints=3, hum=(1.0, 2.0)):

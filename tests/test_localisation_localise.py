@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from inspector.analysis import analyse_file
-from inspector.assets import demo_run, model_files
-from inspector.library import load_library
+from inspector.library import demo_run, load_library, model_files
 from inspector.localisation.localise import Localisation, band, localise
 from inspector.localisation.stage import quiet_stretches
 from inspector.report.findings import words

@@ -9,12 +9,12 @@ import pytest
 
 from inspector.analysis import Analysis
 from inspector.audit.audit import audit
+from inspector.errors import Status
 from inspector.localisation.order import Order, best_lines, order
 from inspector.report.formats import FORMATS, as_json, text
 from inspector.report.html import found
 from inspector.report.markdown import report, sentence
 from inspector.report.picture import picture
-from inspector.status import Status
 from inspector.verdict import Verdict
 from noiseclassifier import Event
 from noisemodel import Run

@@ -14,8 +14,8 @@ from commandline import call
 from csvlogs import TIME, log, swing, write
 
 import inspector
-from inspector.assets import demo_run
 from inspector.errors import InspectorError, LogError
+from inspector.library import demo_run
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.read import Reading, Source, logs_in, open_run, open_source, sources
 from noisemodel import Run, RunFileError, UnknownRobotError

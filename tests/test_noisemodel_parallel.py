@@ -197,7 +197,7 @@ def test_an_item_with_which_workers_of_a_cluster_die_costs_only_itself(cluster):
 
 @pytest.mark.slow
 def test_files_are_classified_on_a_cluster_as_here(cluster, tmp_path, monkeypatch):
-    from inspector.assets import demo_run
+    from inspector.library import demo_run
 
     monkeypatch.chdir(tmp_path)
     for number in range(3):

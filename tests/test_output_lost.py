@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from commandline import call
 
-from inspector.assets import demo_run
+from inspector.library import demo_run
 
 ROOT = Path(__file__).parents[1]
 NO_SPACE = "cannot be written (No space left on device)"

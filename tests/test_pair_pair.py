@@ -3,7 +3,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inspector.assets import demo_run, model_files
 from inspector.compare.changes import (
     by_band,
     by_class,
@@ -20,7 +19,7 @@ from inspector.compare.changes import (
 )
 from inspector.compare.pair import Align, PairError, align, alike, compare, part
 from inspector.compare.recording import write
-from inspector.library import load_library
+from inspector.library import demo_run, load_library, model_files
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
 

@@ -4,8 +4,8 @@ import io
 import sys
 import time
 
-from inspector import progress as module
-from inspector.progress import progress
+from inspector import text as module
+from inspector.text import progress
 
 
 def test_a_line_every_ten_seconds_says_how_many_are_left(capsys, monkeypatch):

@@ -8,8 +8,7 @@ from recordings import read
 
 from inspector import colors
 from inspector.analysis import analyse_file
-from inspector.assets import demo_run, model_files
-from inspector.library import load_library
+from inspector.library import demo_run, load_library, model_files
 from inspector.recording.run import write
 from inspector.report import html
 from inspector.report.markdown import LOCALISATION, finding_of

@@ -3,8 +3,7 @@ import struct
 import pytest
 
 from inspector.analysis import analyse_file
-from inspector.assets import demo_run, model_files
-from inspector.library import load_library
+from inspector.library import demo_run, load_library, model_files
 from inspector.recording.run import write
 
 picture = pytest.importorskip("picture")

@@ -6,9 +6,9 @@ import pytest
 from commandline import call
 
 from inspector.analysis import analyse_file
-from inspector.assets import demo_run
 from inspector.cli import main
 from inspector.errors import InspectorError
+from inspector.library import demo_run
 from inspector.recording import viewer
 from inspector.recording.run import write
 from inspector.recording.viewer import ViewerError

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from commandline import call
 
-from inspector.assets import demo_run
+from inspector.errors import Status
+from inspector.library import demo_run
 from inspector.localisation.stage import Localisation
 from inspector.report import history
 from inspector.report.formats import as_json
-from inspector.status import Status
 from inspector.verdict import Beside, Verdict
 from noiseclassifier import Event
 

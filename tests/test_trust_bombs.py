@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from inspector.assets import model_files
 from inspector.errors import LogError
-from inspector.library import load_library
+from inspector.library import load_library, model_files
 from inspector.logs.read import read_log
 from noisemodel import Robot, RobotError, Run, RunFileError, meshes
 from noisemodel.errors import MeshError

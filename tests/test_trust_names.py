@@ -12,7 +12,7 @@ from commandline import call
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspector.assets import demo_run
+from inspector.library import demo_run
 from inspector.text import cell, uncell
 from noisemodel import Block, Run
 

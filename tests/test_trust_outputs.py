@@ -10,8 +10,8 @@ import pytest
 from commandline import call
 from generalmodel import run_at
 
-from inspector import assets
 from inspector.cli import COMMANDS
+from inspector.library import model_files
 from inspector.report.formats import as_json
 from noisemodel import OutputError
 from noisemodel.files import also_reading, reading, refuse_read, replacing
@@ -64,7 +64,7 @@ def place(tmp_path, monkeypatch):
         for seed in range(2):
             run_at(125.0, seed=seed).save(tmp_path / name / f"{seed}.npz")
     run_at(125.0).save(tmp_path / "run.npz")
-    shutil.copy(assets.model_files()[0], tmp_path / "model.npz")
+    shutil.copy(model_files()[0], tmp_path / "model.npz")
     time = np.arange(400) / 100
     for name in ("log.csv", "desired.csv"):
         rows = "".join(f"{each:g},{np.sin(each):g}\n" for each in time)

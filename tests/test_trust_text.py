@@ -8,7 +8,7 @@ import pytest
 
 import noiseclassifier as nc
 from inspector import verdict
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, Status
 from inspector.export.labels import read_labels
 from inspector.live import LiveError, LiveSession
 from inspector.live.input import reader_of
@@ -16,7 +16,6 @@ from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import column_signal, time_column
 from inspector.logs.read import read_log
 from inspector.reference import store
-from inspector.status import Status
 from inspector.text import counted, plain
 from inspector.training import tune
 from inspector.verdict import classify_file

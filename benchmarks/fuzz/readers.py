@@ -25,10 +25,9 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector import verdict
 from inspector.analysis import analyse
-from inspector.assets import model_files
 from inspector.errors import InspectorError
 from inspector.export.labels import read_labels
-from inspector.library import load_library
+from inspector.library import load_library, model_files
 from inspector.live import input as feeding
 from inspector.live.samples import Clock, Warnings
 from inspector.logs.clocks import ordered, stamps_of

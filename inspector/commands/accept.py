@@ -52,7 +52,6 @@ def accept(
     import os
     from fnmatch import fnmatchcase
 
-    from inspector import assets
     from inspector.errors import InspectorError
     from inspector.library import load_library
     from inspector.logs.read import sources
@@ -74,7 +73,7 @@ def accept(
         raise InspectorError(f"no run is of {' or '.join(only or [])} (--only)")
     named = {each.run for each in levels}
     found = [each for each in sources(runs, ctx.obj)[0] if str(each.shown) in named]
-    verdicts = _classified(found, load_library(assets.model_files(model)), ctx.obj, jobs)
+    verdicts = _classified(found, load_library(model), ctx.obj, jobs)
     after, changes = kept_in.accept_into(
         store,
         levels,
@@ -97,9 +96,8 @@ def _classified(
     runs: "Sequence[Source]", library: "Library", reading: "Reading", jobs: int
 ) -> "list[Verdict]":
     """What the general model says of runs, all of which can be read."""
-    from inspector.errors import InspectorError
-    from inspector.progress import progress
-    from inspector.status import Status
+    from inspector.errors import InspectorError, Status
+    from inspector.text import progress
     from inspector.verdict import classify_files
 
     classified = classify_files(runs, library, reading=reading, jobs=jobs)

@@ -37,13 +37,12 @@ def audit(
       3  bad input: a file cannot be read
       4  cannot tell: a log can show no failure class
     """
-    from inspector import assets
     from inspector.audit.audit import as_json, audit_all, text
     from inspector.library import load_library
 
     reading: Reading = ctx.obj
 
-    library = load_library(assets.model_files(model))
+    library = load_library(model)
     found, failed, assumed, others = audit_all(logs, library, reading)
     if others:
         typer.echo(f"inspector: {others}", err=True)

@@ -25,7 +25,7 @@ from inspector.commands.options import (
     say_assumed,
 )
 from inspector.commands.outputs import files_of, tried, written
-from inspector.status import OUTPUT_LOST, Status, Unknown, worst
+from inspector.errors import OUTPUT_LOST, Status, Unknown, worst
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -119,18 +119,17 @@ def classify(
     Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost, 70 bug.
     With several runs it is the highest-priority one: 70 > 5 > 3 > 1 > 4 > 0.
     """
-    from inspector import assets
     from inspector.library import load_library
     from inspector.logs.read import sources
-    from inspector.progress import progress
     from inspector.reference.verdicts import Gate, References
     from inspector.report.formats import FORMATS, published, text
+    from inspector.text import progress
     from inspector.verdict import classify_files, exit_status
 
     del localise  # of 0.6: each finding is localised now
     if reference is not None and no_reference:
         raise typer.BadParameter("--reference and --no-reference exclude each other")
-    library = load_library(assets.model_files(model))
+    library = load_library(model)
     found, others = sources(runs, ctx.obj)
     shown = [each.shown for each in found]
     beside = References() if no_reference else References.found(shown, reference, ctx.obj)

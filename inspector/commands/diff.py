@@ -20,7 +20,7 @@ from inspector.commands.options import (
     jobs_or_dask,
 )
 from inspector.commands.outputs import files_of, tried, written
-from inspector.status import OUTPUT_LOST, Unknown, worst
+from inspector.errors import OUTPUT_LOST, Unknown, worst
 
 if TYPE_CHECKING:
     from inspector.library import Library
@@ -99,7 +99,6 @@ def diff(
 
     Exit status: 0 as before, 1 worse, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost.
     """
-    from inspector import assets
     from inspector.library import load_library
     from inspector.reference.difference import Gate, difference
     from inspector.report.difference import FORMATS
@@ -108,7 +107,7 @@ def diff(
     files = files_of(write or [], list(Format), overwrite=overwrite)
     if report:
         _prepare(report, overwrite=overwrite)
-    library = load_library(assets.model_files(model))
+    library = load_library(model)
     found = difference(
         reference,
         candidate,

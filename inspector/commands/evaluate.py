@@ -42,7 +42,7 @@ def evaluate(
     overwrite: Overwrite = False,
 ) -> None:
     """Evaluate a model on annotated runs that it was not trained on."""
-    from inspector import assets
+    from inspector.library import model_files
     from inspector.training import train
     from noiseclassifier.assessment import table
     from noisemodel.files import refuse_existing, replacing
@@ -51,7 +51,7 @@ def evaluate(
         refuse_existing(path, overwrite=overwrite)
     if picture:
         train.require()
-    (file,) = assets.model_files([model])
+    (file,) = model_files([model])
     report = train.evaluate(file, inputs, part=part, seen_too=seen_too)
     text = train.as_json(report, file)
     if output:

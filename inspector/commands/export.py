@@ -63,7 +63,6 @@ def export(
     Foxglove and PlotJuggler read MCAP, which holds the joints' motion as well; data frames read
     CSV and Parquet; annotation tools and spreadsheets read label files.
     """
-    from inspector import assets
     from inspector.export.tables import LAYOUTS
     from inspector.export.tables import export as write
     from inspector.library import load_library
@@ -76,7 +75,7 @@ def export(
     if annotate:
         _annotated(opened(run, reading).run, annotate, output, overwrite=overwrite)
         return
-    library = load_library(assets.model_files(model))
+    library = load_library(model)
     recorded = opened(run, reading).run
     if labels:
         from inspector.analysis import analyse

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from inspector.commands.options import Overwrite
-from inspector.status import EXIT, Status
+from inspector.errors import EXIT, Status
 
 
 def history(

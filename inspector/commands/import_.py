@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inspector.commands.options import Overwrite
-from inspector.status import EXIT, OUTPUT_LOST, Status, worst
+from inspector.errors import EXIT, OUTPUT_LOST, Status, worst
 
 if TYPE_CHECKING:
     from inspector.logs.read import Reading
@@ -76,6 +76,6 @@ def import_(
 
 
 def _progress(items: Iterable[Any], total: int) -> Iterator[Any]:
-    from inspector.progress import progress
+    from inspector.text import progress
 
     return progress(items, "import", total=total)

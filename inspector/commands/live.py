@@ -82,7 +82,6 @@ def live(
     import sys
     from functools import partial
 
-    from inspector import assets
     from inspector.library import load_library
     from inspector.live import LiveError, LiveSession
     from inspector.live.gate import Gate
@@ -94,7 +93,7 @@ def live(
         raise LiveError(
             "samples are read from standard input; pipe them in: robot | inspector live"
         )
-    library = load_library(assets.model_files(model))
+    library = load_library(model)
     known = None if reference is None else Reference.load(reference)
     gate = Gate(_tell, as_json=format is Format.JSON, reference=known)
     session = partial(

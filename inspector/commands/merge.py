@@ -8,7 +8,7 @@ import typer
 from inspector.commands.classify import Format, OutputFormat, say_lost
 from inspector.commands.options import Overwrite, Write
 from inspector.commands.outputs import files_of, tried, written
-from inspector.status import OUTPUT_LOST, worst
+from inspector.errors import OUTPUT_LOST, worst
 
 
 def merge(

@@ -77,7 +77,7 @@ def noise(
         return
     import noisemodel as nm
     from inspector.compare.models import Outputs
-    from inspector.progress import progress
+    from inspector.text import progress
 
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
     sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))

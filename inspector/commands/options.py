@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from inspector.status import Unknown
+from inspector.errors import Unknown
 
 if TYPE_CHECKING:
     from inspector.logs.read import Opened, Reading

@@ -177,7 +177,7 @@ def logs(
 
 
 def _make(folder: "Folder", tasks: list[Any], jobs: Any) -> None:
-    from inspector.progress import progress
+    from inspector.text import progress
     from noiseclassifier.scenarios.dataset import make
 
     for _ in progress(make(folder, tasks, jobs=jobs), "simulate", total=len(tasks)):

@@ -59,17 +59,16 @@ def smoothness(
 
     The exit status is 3 if a log cannot be read; the others are ranked.
     """
-    from inspector import assets
     from inspector import smoothness as ranking
     from inspector.library import load_library
-    from inspector.progress import progress
     from inspector.report.picture import require
+    from inspector.text import progress
     from noisemodel.files import refuse_existing
 
     if picture:
         refuse_existing(picture, overwrite=overwrite)
         require()
-    library = load_library(assets.model_files(model)) if labels else None
+    library = load_library(model) if labels else None
     episodes, failed = ranking.episodes_of(logs, ctx.obj)
     scored = ranking.scored_episodes(episodes, ctx.obj, library)
     found = progress(scored, "score", total=len(episodes))

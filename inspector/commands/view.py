@@ -17,7 +17,7 @@ from inspector.commands.options import (
     one_at_a_time,
     opened,
 )
-from inspector.status import EXIT, Status
+from inspector.errors import EXIT, Status
 
 if TYPE_CHECKING:
     from inspector.analysis import Analysis
@@ -120,19 +120,18 @@ def view(
 
     Runs that cannot be read are named, and the others shown (exit status 3).
     """
-    from inspector import assets
-    from inspector.library import load_library
+    from inspector.library import demo_run, load_library
     from inspector.recording import viewer
     from noisemodel.files import refuse_existing
 
-    paths, output = runs or [assets.demo_run()], output or save
+    paths, output = runs or [demo_run()], output or save
     one_at_a_time(ctx.obj, len(paths))
     if web and output:
         raise typer.BadParameter("name one of --web and -o")
     if port:
         viewer.free_port(port)
     target = output or viewer.scratch_path(_together(paths))
-    library = load_library(assets.model_files(model))
+    library = load_library(model)
     links, overwrite = "" if no_robot else kind, overwrite or output is None
     request = Request(ctx.obj, library, links, floor, terms, at, size, align, reference, overwrite)
     _check(paths, target, request)

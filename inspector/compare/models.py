@@ -17,14 +17,13 @@ from rerun.blueprint import Blueprint
 
 from inspector import colors
 from inspector.errors import InspectorError
-from inspector.levels import Scale
+from inspector.levels import Scale, spectrogram
 from inspector.recording import axes, unstable
 from inspector.recording.axes import Label, Panel
 from inspector.recording.panels import HEIGHT, log_panel
 from inspector.recording.run import writing
 from inspector.recording.unstable import Part
 from inspector.report.picture import require
-from inspector.spectrogram import spectrogram
 from inspector.text import cell
 from noisemodel import Comparison, Comparisons
 from noisemodel.compare import TERMS, medians

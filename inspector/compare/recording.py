@@ -28,7 +28,7 @@ from inspector.compare.changes import (
 from inspector.compare.pair import Pair
 from inspector.errors import InspectorError
 from inspector.export.sound import SMALL_RATE, common_gain, sound_of
-from inspector.levels import LINKS, SPECTRUM, link_levels
+from inspector.levels import LINKS, SPECTRUM, extremes, link_levels
 from inspector.recording import axes, robot, unstable
 from inspector.recording.axes import Label, Panel, Timed
 from inspector.recording.camera import log_cameras
@@ -57,7 +57,6 @@ from inspector.recording.panels import (
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.markdown import classes_of, spoken
-from inspector.thinning import extremes
 from noisemodel.run import part
 
 SIDE_COLORS = {"before": BEFORE, "after": AFTER}

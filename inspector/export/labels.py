@@ -17,8 +17,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import NamedTuple
 
-from inspector.errors import InspectorError, OptionError
-from inspector.status import Status
+from inspector.errors import InspectorError, OptionError, Status
 from inspector.text import cell, uncell
 from inspector.verdict import Verdict
 from noiseclassifier import Event

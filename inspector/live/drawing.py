@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rerun.blueprint import Blueprint
 
 from inspector import colors
-from inspector.levels import SPECTRUM
+from inspector.levels import SPECTRUM, amplitudes, extremes, in_bands, window_length
 from inspector.live.robot import KEY
 from inspector.recording import axes, unstable
 from inspector.recording.axes import Label, Panel, log_events, scalars, style_lines
@@ -27,8 +27,6 @@ from inspector.recording.panels import (
 )
 from inspector.recording.unstable import TIMELINE, Camera, Part
 from inspector.report.markdown import spoken
-from inspector.spectrogram import amplitudes, in_bands, window_length
-from inspector.thinning import extremes
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
 from noisemodel.noise import decibel

@@ -7,14 +7,14 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from inspector.errors import EXIT, Status
 from inspector.live.session import Summary
 from inspector.reference.judging import GAP
 from inspector.reference.levels import Levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, judge
-from inspector.status import EXIT, Status
+from inspector.text import program_version
 from inspector.verdict import Evidence, Verdict, counts
-from inspector.version import program_version
 from noiseclassifier import Event
 from noiseclassifier.labels import interval
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 import noisemodel as nm
 from inspector.analysis import headline, status_of
+from inspector.errors import Status
 from inspector.library import Library, for_robot, load_library
 from inspector.live.drawing import SHOWN, Drawing, Lane, SpectrogramStream
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
@@ -31,7 +32,6 @@ from inspector.live.sink import LATE, Sink
 from inspector.logs.wrongrobot import LONG, LimitWatch, check_joints
 from inspector.recording.unstable import Camera
 from inspector.reference.levels import LONGEST, Levels, LevelStream
-from inspector.status import Status
 from noiseclassifier import Event, merged
 from noisemodel.files import beyond, limit
 from noisemodel.robot import joint_limits

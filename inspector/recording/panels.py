@@ -16,16 +16,14 @@ from rerun.components import MarkerShapeLike
 from rerun.urdf import UrdfTree
 
 from inspector import colors, levels
-from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps
-from inspector.levels import Scale
+from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps, orders
+from inspector.levels import RANGE_DB, WINDOW, Scale, Spectrogram, extremes, in_bands
 from inspector.recording import axes, robot, unstable
 from inspector.recording.axes import Label, Panel, Timed, at
 from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
 from inspector.report.markdown import brief, classes_of, finding_of, spoken
-from inspector.spectrogram import RANGE_DB, WINDOW, Spectrogram, in_bands, orders
-from inspector.thinning import extremes
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
 from noisemodel.extended import LinkNoise, vibrating

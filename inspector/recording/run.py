@@ -13,11 +13,11 @@ from rerun.urdf import UrdfTree
 
 from inspector import levels
 from inspector.analysis import Analysis, worst, worst_joint, worst_signal
+from inspector.levels import spectrogram
 from inspector.recording import axes, camera, panels, robot, unstable
 from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
 from inspector.report.markdown import report, spoken
-from inspector.spectrogram import spectrogram
 from noisemodel import Run
 from noisemodel.files import replacing
 

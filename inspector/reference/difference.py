@@ -13,15 +13,14 @@ from statistics import median
 
 import numpy as np
 
-from inspector.errors import InspectorError, without_path
+from inspector.errors import EXIT, InspectorError, Status, Unknown, without_path
+from inspector.errors import worst as worst_code
 from inspector.library import Library
 from inspector.logs.read import Source, sources
 from inspector.reference.judging import Comparison, Kind, compare, same_motion
 from inspector.reference.levels import HOP, Levels
 from inspector.reference.store import Reference, levels_of, of_runs
 from inspector.reference.verdicts import References
-from inspector.status import EXIT, Status, Unknown
-from inspector.status import worst as worst_code
 from inspector.verdict import EXPECTED, Evidence, Verdict, classify_files
 from noiseclassifier import Event
 from noiseclassifier.matching import match

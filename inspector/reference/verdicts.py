@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from inspector.analysis import NOTHING, Analysis
+from inspector.errors import Status
 from inspector.library import Library
 from inspector.logs.read import Reading
 from inspector.reference.judging import (
@@ -26,7 +27,6 @@ from inspector.reference.judging import (
 )
 from inspector.reference.levels import HOP, Levels, levels
 from inspector.reference.store import NAME, Reference, find, line_of, scenario_of
-from inspector.status import Status
 from inspector.verdict import END, LOG, Beside, Evidence, Missing, Ruled, Ruling, Verdict
 from noiseclassifier import UNKNOWN, Event, Labels
 

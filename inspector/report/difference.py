@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from inspector.errors import EXIT, Status
 from inspector.reference.difference import (
     BROKEN,
     LOUDER,
@@ -20,9 +21,7 @@ from inspector.reference.difference import (
 from inspector.report.findings import TOGETHER, folded, table
 from inspector.report.formats import Case, Job, github, junit, markdown
 from inspector.report.formats import Outcome as OfTest
-from inspector.status import EXIT, Status
-from inspector.text import counted
-from inspector.version import program_version
+from inspector.text import counted, program_version
 
 DIFF_MARKER = "<!-- noise-inspector diff -->"
 """First line of its Markdown: a job may have a comment of verdicts, too."""

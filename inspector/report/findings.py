@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from inspector.errors import Status
 from inspector.localisation.stage import Localisation
-from inspector.status import Status
 from inspector.text import counted
 from inspector.verdict import Verdict
 from noiseclassifier import Event

@@ -18,6 +18,7 @@ from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 from inspector.analysis import NOTHING
+from inspector.errors import IGNORED, Status, Unknown
 from inspector.report.findings import (
     COUNTED,
     WORDS,
@@ -31,10 +32,8 @@ from inspector.report.findings import (
     table,
     timeline,
 )
-from inspector.status import IGNORED, Status, Unknown
-from inspector.text import counted
+from inspector.text import counted, program_version
 from inspector.verdict import Verdict, counts, exit_status
-from inspector.version import program_version
 
 ANNOTATIONS = 10
 """GitHub silently drops what goes beyond ten of a kind per step."""

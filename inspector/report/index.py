@@ -10,13 +10,12 @@ from xml.etree import ElementTree as ET
 
 from inspector.analysis import Analysis
 from inspector.colors import of_classes
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, Status
 from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
 from inspector.report.findings import COUNTED, excused, failing
 from inspector.report.formats import summary
 from inspector.report.html import STYLE, add_text, document, written
-from inspector.status import Status
 from inspector.verdict import Verdict
 from noisemodel.files import replacing
 

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inspector import colors, levels
-from inspector.analysis import SHOWN, Analysis, chosen, gaps, worst_joint, worst_signal
+from inspector.analysis import SHOWN, Analysis, chosen, gaps, orders, worst_joint, worst_signal
 from inspector.errors import InspectorError
-from inspector.levels import Scale
+from inspector.levels import Scale, Spectrogram, extremes, spectrogram
 from inspector.reference.judging import Comparison
 from inspector.report.markdown import classes_of, spoken
-from inspector.spectrogram import Spectrogram, orders, spectrogram
-from inspector.thinning import extremes
 from noisemodel.noise import decibel
 from noisemodel.types import Array
 

@@ -17,9 +17,8 @@ from inspector.colors import SERIES, Color, of_classes
 from inspector.errors import InspectorError, OptionError
 from inspector.logs.hold import without_hold
 from inspector.logs.wrongrobot import check_joints
-from inspector.progress import progress
 from inspector.report.picture import require as require
-from inspector.text import counted
+from inspector.text import counted, progress
 from noiseclassifier import Assessment
 from noiseclassifier.profile import HIGHEST, LOWEST, NOMINAL
 from noisemodel.files import also_reading, refuse_existing, replacing

@@ -22,8 +22,8 @@ from typing import IO, Any, NoReturn
 
 import noiseclassifier as nc
 from inspector.errors import InspectorError
-from inspector.progress import progress
 from inspector.report.picture import require
+from inspector.text import progress
 from inspector.training.train import LeftOut, Simulators, classified, profile_at
 from noiseclassifier.jsontext import from_json
 from noiseclassifier.modelfile import versions
