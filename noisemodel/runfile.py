@@ -308,7 +308,7 @@ def read_npz(
     """Read the arrays of an .npz file with these names, all unless given.
 
     Arrays of more than ``on_demand`` bytes stay in the file, unless they have one axis or are
-    packed column by column. They raise ArchiveError or OSError where they are read.
+    stored column by column. They raise ArchiveError or OSError where they are read.
     """
     found: dict[str, Any] = {}
     with _opened(path) as archive:

@@ -83,6 +83,14 @@ def test_a_model_that_was_saved_decides_as_before(tmp_path, changes):
     assert set(loaded.versions) == {"noise-inspector", "numpy", "scikit-learn"}
 
 
+def test_a_baseline_of_an_earlier_version_is_refused_with_what_replaces_it(path):
+    profile = CLASSIFIER.profile.as_dict() | {"estimator": "baseline"}
+    rewrite_manifest(path, profile=profile)
+    good, limit = CLASSIFIER.estimator.vectors, np.ones(1)
+    rewrite(path, vectors=None, coefficients=None, intercept=None, good=good, limit=limit)
+    refused(path, "is a baseline of good runs: that is replaced; accept these runs")
+
+
 def test_numpy_alone_reads_it_too(path):
     with np.load(path, allow_pickle=False) as members:
         manifest = json.loads(str(members["manifest"]))

@@ -40,10 +40,11 @@ LARGEST = 512 * 1024**2
 ACCEPT = "that is replaced; accept these runs (`inspector accept`), and classify without this model"
 """What becomes of models that earlier versions trained on good runs alone."""
 _ADAPTED = {"location": 1, "spread": 1}
+_BASELINE = {"good": 2, "limit": 1}
 
 _KINDS = [
-    {"manifest": 0, "mean": 1, "scale": 1, **estimator.DIMENSIONS}
-    for estimator in ESTIMATORS.values()
+    {"manifest": 0, "mean": 1, "scale": 1, **own}
+    for own in (*(each.DIMENSIONS for each in ESTIMATORS.values()), _BASELINE)
 ]
 _KINDS += [{**kind, **_ADAPTED} for kind in _KINDS] + [
     {name: count for name, count in kind.items() if name != "missing"}
