@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from generalmodel import trained
 from predicted_runs import (
     CLASSES,
     GOOD,
@@ -134,6 +135,14 @@ def test_names_that_repeat_and_runs_without_blocks_are_refused(classifier):
         nc.assess(classifier, [replace(run, blocks=())])
     with pytest.raises(nc.DatasetError, match="no annotated frame in 0 recordings"):
         nc.assess(classifier, [])
+
+
+@pytest.mark.parametrize("model", ["of one rate", "general"])
+def test_a_label_that_is_no_class_is_refused(classifier, model):
+    run = replace(fresh()[0], blocks=(nc.Block(0.0, 1.0, "ok"), nc.Block(1.0, 2.0, "rattle")))
+    measured = trained() if model == "general" else classifier
+    with pytest.raises(nc.RecordingError, match="swing-010: label 'rattle' is no class; there are"):
+        nc.assess(measured, [run])
 
 
 def test_a_run_without_a_verdict_is_listed_and_not_left_out_in_silence(classifier):

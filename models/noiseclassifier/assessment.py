@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from noiseclassifier.classifier import Classifier
-from noiseclassifier.dataset import Dataset, Examples
+from noiseclassifier.dataset import Dataset, Examples, check
 from noiseclassifier.errors import DatasetError, SignalError
 from noiseclassifier.general import Model
 from noiseclassifier.labels import Event, Labels, interval
@@ -204,6 +204,7 @@ def predict(
     Args:
         localise: Estimates onset and end of the findings; else they last as their frames do.
     """
+    check(recording, classifier.profile)
     truth = predicted = np.array([], dtype=str)
     if not classifier.profile.reference:
         with suppress(DatasetError):  # no frame without a gap

@@ -1,6 +1,6 @@
 """Data sets: labelled frames of many recordings, and their features to train an estimator with."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import inf
@@ -58,7 +58,7 @@ class Dataset:
         frames, labels, runs = [], [], []
         hashes: dict[str, str] = {}
         for recording in recordings:
-            _check(recording, profile, hashes)
+            check(recording, profile, hashes)
             hashes[recording.name] = recording.sha256
             for block in recording.blocks:
                 signal, valid = cut(recording, block, profile, training=training)
@@ -129,7 +129,7 @@ class Examples:
         found: list[Self] = []
         hashes: dict[str, str] = {}
         for recording in recordings:
-            _check(recording, profile, hashes)
+            check(recording, profile, hashes)
             hashes[recording.name] = recording.sha256
             with suppress(NoFrameError):
                 found.append(cls.of(Dataset.of([recording], profile, training=training), profile))
@@ -163,7 +163,8 @@ def features_in_chunks(frames: Real, profile: Profile) -> Array:
     return np.concatenate([features(frames[first : first + CHUNK], profile) for first in chunks])
 
 
-def _check(recording: Recording, profile: Profile, names: Mapping[str, str]) -> None:
+def check(recording: Recording, profile: Profile, names: Collection[str] = ()) -> None:
+    """Refuse a recording of another rate, with a label that is no class, or whose name is known."""
     name = recording.name
     if abs(recording.rate / profile.rate - 1.0) > NOMINAL:
         advice = f"recording {name!r} does not fit; lower its rate, or take another profile"
