@@ -116,7 +116,8 @@ class Noise:
         from noisemodel import Run
 
         allowed = self._allowed(allow)
-        scenario = self._scenario(name)
+        self._count += 1
+        scenario = name or self._stem
         given = [runs] if isinstance(runs, (Run, str, Path)) else list(runs)
         if not given:
             raise ValueError("no run to check; expected one at least")
@@ -148,7 +149,6 @@ class Noise:
         from datetime import date
 
         from inspector.analysis import analyse, with_links
-        from inspector.reference.judging import compare
         from inspector.reference.levels import levels
         from inspector.reference.verdicts import beside, judge
         from inspector.verdict import Verdict
@@ -157,7 +157,7 @@ class Noise:
         verdict = Verdict.of(Path(scenario), analysis)
         if not reference.scenarios:
             return analysis, judge(verdict, today=date.today()), None
-        comparison = compare(levels(analysis.run, name=scenario), reference.scenarios)
+        comparison = reference.compare(levels(analysis.run, name=scenario))
         verdict = beside(verdict, comparison, reference, analysis.labels)
         return analysis, judge(verdict, reference, today=date.today()), comparison
 
@@ -183,10 +183,9 @@ class Noise:
         from inspector.reference.levels import levels
         from inspector.reference.store import accept_into, digest, wanted_in, who
 
-        files = [f"{self._node.nodeid} {place}" for place in range(1, len(runs) + 1)]
         files = [
-            str(each) if isinstance(each, (str, Path)) else file
-            for each, file in zip(given, files, strict=True)
+            str(each) if isinstance(each, (str, Path)) else f"{self._node.nodeid} {place}"
+            for place, each in enumerate(given, 1)
         ]
         measured = [
             levels(without_placeholder(run)[0], name=scenario, file=file, sha256=digest(run))
@@ -229,22 +228,20 @@ class Noise:
             self._config.stash[_LIBRARY] = load_library(named)
         return self._config.stash[_LIBRARY]
 
-    def _scenario(self, name: str = "") -> str:
-        """Name of the scenario of a check: by default the test's."""
-        self._count += 1
-        if name:
-            return name
+    @property
+    def _stem(self) -> str:
+        """Name of the latest check: the test's, with a number from the second one on."""
         which = "" if self._count == 1 else f"-{self._count}"
         return f"{name_of(self._node.nodeid)}{which}"
 
-    def _artefacts(self, stem: str) -> tuple[Path, Path | None]:
+    def _artefacts(self) -> tuple[Path, Path | None]:
         """Paths of recording and picture, earlier ones removed; no picture without matplotlib."""
         from importlib.util import find_spec
 
         named = self._config.getoption("--noise-artefacts") or "noise-artefacts"
         folder = self._config.rootpath / named
         folder.mkdir(parents=True, exist_ok=True)
-        paths = folder / f"{stem}.rrd", folder / f"{stem}.png"
+        paths = folder / f"{self._stem}.rrd", folder / f"{self._stem}.png"
         for path in paths:
             path.unlink(missing_ok=True)
         return paths[0], paths[1] if find_spec("matplotlib") else None
@@ -262,8 +259,7 @@ class Noise:
         from inspector.recording.run import write
         from inspector.report.findings import brief, sentence
 
-        stem = name_of(self._node.nodeid)
-        recording, picture = self._artefacts(stem if self._count < 2 else f"{stem}-{self._count}")
+        recording, picture = self._artefacts()
         write(analysis, recording, overwrite=True)
         if picture and comparison is not None and not comparison.empty:
             from inspector.report.picture import over_reference
@@ -320,18 +316,8 @@ def name_of(test: str) -> str:
         test: The node id. Where another test could have its name, a hash of it is added.
     """
     shown = test.replace(".py::", "::").replace("/", ".")
-    return _file_name(test, shown, plain=PLAIN.fullmatch(test) is not None)
-
-
-def _file_name(whole: str, shown: str = "", *, plain: bool) -> str:
-    """A name of a file, with a hash of the whole name unless that is plain and short."""
-    name = _slug(shown or whole)
-    if plain and len(name) <= LONGEST:
+    words = re.split(r"[^\w.]+", shown, flags=re.ASCII)
+    name = "-".join(word for word in words if word).lstrip(".") or "run"
+    if PLAIN.fullmatch(test) and len(name) <= LONGEST:
         return name
-    return f"{name[:LONGEST]}~{hashlib.sha256(whole.encode()).hexdigest()[:12]}"
-
-
-def _slug(name: str) -> str:
-    """Letters, digits, ``.``, ``-`` and ``_`` of a name; others are ``-``."""
-    words = re.split(r"[^\w.]+", name, flags=re.ASCII)
-    return "-".join(word for word in words if word).lstrip(".") or "run"
+    return f"{name[:LONGEST]}~{hashlib.sha256(test.encode()).hexdigest()[:12]}"
