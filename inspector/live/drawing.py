@@ -85,7 +85,6 @@ class SpectrogramStream:
 
     Attributes:
         edges: Of the bands, shape (bands + 1,), in [Hz].
-        centres: Of the bands, shape (bands,), in [Hz].
     """
 
     def __init__(self, rate: float) -> None:
@@ -94,7 +93,6 @@ class SpectrogramStream:
         self._hop = max(1, self._length // 4)
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
         self.edges = np.geomspace(self._frequency[0], self._frequency[-1], BANDS + 1)
-        self.centres = np.sqrt(self.edges[:-1] * self.edges[1:])
         self._samples = np.empty((0, 0))
         self._valid = np.empty(0, dtype=bool)
         self._gap = False

@@ -157,15 +157,14 @@ class Labeller:
             without a model.
         """
         self._samples += len(motion)
-        if self._stream is None:
+        return self._take(motion, valid)
+
+    def _take(self, motion: Array, valid: Mask) -> nc.Labels | None:
+        """Take samples that the clock has counted."""
+        if self._stream is None or self._lasting is None:
             return None
         if self._decimator is not None:
             motion, valid = self._decimator.push(motion, valid)
-        return self._take(motion, valid)
-
-    def _take(self, motion: Array, valid: Mask) -> nc.Labels:
-        assert self._stream is not None
-        assert self._lasting is not None
         self._lasting.push(self._signals(motion, self._followed), valid)
         return self._stream.push(self._signals(motion, self._names), valid)
 
@@ -190,22 +189,17 @@ class Labeller:
     def skip(self, samples: int) -> None:
         """Pass over samples that were lost."""
         self._samples += samples
-        if self._stream is None:
+        if self._stream is None or self._lasting is None:
             return
-        assert self._lasting is not None
-        if self._decimator is None:
-            self._stream.skip(samples)
-            self._lasting.skip(samples)
-            return
-        # Samples in a gap are all alike: enough of them to fill the filter are processed.
-        whole = max(samples - 4 * self._ratio * EDGE, 0) // self._ratio
+        whole = samples
+        if self._decimator is not None:
+            # Samples in a gap are all alike: enough of them to fill the filter are processed.
+            whole = max(samples - 4 * self._ratio * EDGE, 0) // self._ratio
         self._stream.skip(whole)
         self._lasting.skip(whole)
-        rest = samples - whole * self._ratio
-        lower, valid = self._decimator.push(
-            np.zeros((rest, self._decimator.columns)), np.zeros(rest, dtype=bool)
-        )
-        self._take(lower, valid)
+        if self._decimator is not None:
+            rest = samples - whole * self._ratio
+            self._take(np.zeros((rest, self._decimator.columns)), np.zeros(rest, dtype=bool))
 
 
 SETTLED = 3
