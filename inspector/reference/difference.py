@@ -55,11 +55,8 @@ class Finding:
 
     Attributes:
         kind: "new", "louder" or "resolved".
-        run: The run that has it.
-        event: The finding.
         over: Its loudest exceedance over the other side, in [dB]; None by the general model.
         level: Level of that cell, in [dB re 1 rad/s].
-        evidence: Its joint and octave.
     """
 
     kind: str
@@ -75,7 +72,6 @@ class Change:
     """How much louder a joint is in an octave after the change.
 
     Attributes:
-        joint: The joint.
         signal: "velocity" or "tracking error".
         band: The octave, in [Hz].
         change: Median over the runs of its loudest exceedance over all runs before, in [dB].
@@ -101,11 +97,7 @@ class Row:
     """A scenario before and after.
 
     Attributes:
-        name: Its name.
-        outcome: What became of it.
-        reason: Why, in a line.
-        before: Its runs before the change.
-        after: Its runs after it.
+        reason: Of the outcome, in a line.
         margin: From how many decibels over the runs before on it is louder.
         score: Median over the runs after of their largest score, in [dB]; None without.
         changes: By joint, signal and octave, the largest first.
@@ -165,10 +157,8 @@ class Difference:
 
     Attributes:
         rows: The scenarios, the worst first.
-        failed: Files that cannot be compared.
-        gate: What fails.
         margin: Least margin, in [dB].
-        picture: Picture of the worst scenario, if one is drawn.
+        picture: Of the worst scenario, if one is drawn.
         picture_url: Where that will be published.
     """
 

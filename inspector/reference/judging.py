@@ -107,18 +107,13 @@ class Scenario:
     """A motion with its accepted repetitions.
 
     Attributes:
-        name: Its name.
         repetitions: Levels of the repetitions, the newest last; one at least.
         scores: Leave-one-out scores, in [dB].
         elsewhere: Scores by other moments, in [dB]: how well other motions predict.
         required: Whether a log must exist.
         at_least: How many logs must exist.
         renamed_from: Names that it had.
-        wanted: Findings that are wanted.
-        waived: Findings that are waived.
-        accepted: When it was accepted.
-        by: Who accepted it.
-        reason: Why.
+        reason: Why it was accepted.
     """
 
     name: str
@@ -208,10 +203,8 @@ class Exceedance:
         peak: Time of its loudest exceedance, in [s].
         db: That, over the reference, in [dB].
         level: Level of that cell, in [dB re 1 rad/s].
-        joint: Its joint.
         signal: "velocity" or "tracking error".
-        octave: Its octave, in [Hz].
-        kind: The evidence.
+        octave: In [Hz].
     """
 
     start: float
@@ -237,7 +230,6 @@ class Comparison:
     """A run beside its reference.
 
     Attributes:
-        run: Levels of the run.
         joints: Joints that are compared.
         octaves: Octaves that are compared, in [Hz].
         scenarios: Names of the scenarios whose motion it is.
@@ -307,8 +299,7 @@ class Comparison:
     @property
     def worst(self) -> float:
         """The largest score, in [dB]; NaN without any reference."""
-        known = self.score[np.isfinite(self.score)]
-        return float(known.max()) if len(known) else float("nan")
+        return _top(self.score)
 
     def share(self, kind: Kind) -> float:
         """Share of the frames that have an evidence."""
@@ -395,7 +386,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
 
 
 def leave_one_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
-    """Score of each repetition by the others, in [dB]; none of fewer than two."""
+    """Score of each repetition by the others, in [dB], if they cover it."""
     found = []
     for place, run in enumerate(repetitions):
         others = [each for other, each in enumerate(repetitions) if other != place]
@@ -406,7 +397,7 @@ def leave_one_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
             aligned = _aligned(run, shared, joints)
             over, _ = _over_repetitions(run, shared, aligned, joints, octaves)
             found.append(_top(scores_of(over)))
-    return tuple(found)
+    return tuple(score for score in found if np.isfinite(score))
 
 
 def leave_one_moment_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
@@ -494,9 +485,7 @@ def _view(
     run: Levels, joints: Sequence[str], octaves: Sequence[tuple[float, float]]
 ) -> NDArray[np.float32]:
     """Levels by some joints and octaves; NaN of those that the run lacks."""
-    found = np.full(
-        (len(run.level), len(joints), len(SIGNALS), len(octaves)), np.nan, dtype=np.float32
-    )
+    found = _unknown(len(run.level), joints, octaves)
     places = [(to, run.joints.index(j)) for to, j in enumerate(joints) if j in run.joints]
     bands = [(to, run.octaves.index(o)) for to, o in enumerate(octaves) if o in run.octaves]
     if places and bands:

@@ -201,14 +201,12 @@ def _natural(run: Levels) -> list[tuple[int, str]]:
 
 def calibrated(scenario: Scenario) -> Scenario:
     """Add the scores from which margins follow."""
+    scores = leave_one_out(scenario.repetitions)
+    elsewhere = leave_one_moment_out(scenario.repetitions[-CALIBRATED:])
     return replace(
         scenario,
-        scores=tuple(
-            round(score, 2) for score in leave_one_out(scenario.repetitions) if isfinite(score)
-        ),
-        elsewhere=tuple(
-            round(score, 2) for score in leave_one_moment_out(scenario.repetitions[-CALIBRATED:])
-        ),
+        scores=tuple(round(score, 2) for score in scores),
+        elsewhere=tuple(round(score, 2) for score in elsewhere),
     )
 
 
