@@ -18,7 +18,7 @@ from inspector.errors import EXIT, OUTPUT_LOST, OptionError, Status
 from inspector.text import printable
 
 if TYPE_CHECKING:
-    from inspector.config import Config
+    from inspector.commands.config import Config
 
 
 class Entry(NamedTuple):
@@ -291,7 +291,7 @@ class _Group(TyperGroup):
         """Find a command, and the settings of the project for it."""
         name, command, rest = super().resolve_command(ctx, args)
         if name and name not in ("config", "help", "robots") and not {"-h", "--help"} & set(rest):
-            from inspector.config import find
+            from inspector.commands.config import find
 
             if (found := find()) is not None:
                 ctx.default_map = {name: self.settings(name, found)}

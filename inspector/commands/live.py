@@ -69,15 +69,7 @@ def live(
     JSON lines have one object each: {"time": 0.1, "velocity": [0.2]}
     Ctrl-C ends the recording.
 
-    Exit status:
-
-      0  ok: no finding that counts
-      1  findings: there was one
-      2  wrong usage
-      3  bad input: the samples cannot be understood
-      4  cannot tell: say, the rate is too low for every model
-      5  output lost: an output could not be written
-     70  internal error: a bug, with its traceback on standard error
+    Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost, 70 bug.
     """
     import sys
     from functools import partial
@@ -93,14 +85,13 @@ def live(
         raise LiveError(
             "samples are read from standard input; pipe them in: robot | inspector live"
         )
-    library = load_library(model)
     known = None if reference is None else Reference.load(reference)
     gate = Gate(_tell, as_json=format is Format.JSON, reference=known)
     session = partial(
         LiveSession,
         rate,
         robot=robot,
-        library=library,
+        library=load_library(model),
         save=save,
         connect=connect,
         overwrite=overwrite,
@@ -109,10 +100,9 @@ def live(
         on_finding=gate.take,
         on_levels=None if known is None else gate.compare,
     )
-    given = tuple(name.strip() for name in names.split(",") if name.strip())
     summary = follow(
         sys.stdin.buffer,
-        given,
+        tuple(name.strip() for name in names.split(",") if name.strip()),
         lambda found: session(joint_names=found),
         enough=lambda: fail_fast and gate.failed,
     )
