@@ -1,5 +1,6 @@
 """Runs beside accepted repetitions: what is found, and what the store keeps."""
 
+import hashlib
 import io
 import json
 import os
@@ -428,6 +429,20 @@ def test_a_read_only_folder_is_one_line_and_loses_nothing(own, monkeypatch):
     assert status == 5
     assert "cannot be written (Permission denied)" in err
     assert (own / "reference" / "reference.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize("guide", [np.float32(1.0), np.full((1, 4), np.nan, dtype=np.float32)])
+def test_levels_that_are_none_are_refused_even_if_their_hash_is_right(own, guide):
+    toml, path = own / "reference" / "reference.toml", own / "reference" / "pick.npz"
+    with np.load(path) as content:
+        arrays = dict(content)
+    before = hashlib.sha256(path.read_bytes()).hexdigest()
+    np.savez(path, **(arrays | {"guide_0": guide}))
+    after = hashlib.sha256(path.read_bytes()).hexdigest()
+    toml.write_text(toml.read_text().replace(before, after))
+    status, out, err = call("classify", own / "runs" / "pick-1.npz")
+    assert status == 3
+    assert "its arrays do not belong to reference.toml; accept the runs again" in out + err
 
 
 def test_a_store_inside_the_runs_is_no_log(own):

@@ -650,16 +650,14 @@ class _Row:
         nothing = np.empty(0)
         named = ("level", "guide", "pace")
         found = [np.asarray(arrays.get(f"{name}_{number}", nothing)) for name in named]
-        frames = len(found[1])
-        shapes = (
-            (frames, len(joints), len(SIGNALS), len(bands)),
-            (frames, len(joints)),
-            (frames,),
+        frames = found[2].size
+        shapes = ((frames, len(joints), len(SIGNALS), len(bands)), (frames, len(joints)), (frames,))
+        fit = all(
+            each.shape == shape and each.dtype.kind == kind
+            for each, shape, kind in zip(found, shapes, "uff", strict=True)
         )
-        for each, shape, kind in zip(found, shapes, "uff", strict=True):
-            if each.shape != shape or each.dtype.kind != kind:
-                raise StoreError(path, f"its arrays do not belong to {NAME}; accept the runs again")
-        if len(set(joints)) < len(joints) or not all(np.isfinite(each).all() for each in found[1:]):
+        finite = fit and all(np.isfinite(each).all() for each in found[1:])
+        if not finite or len(set(joints)) < len(joints):
             raise StoreError(path, f"its arrays do not belong to {NAME}; accept the runs again")
         return Levels(
             of.get("name", str),
