@@ -2,12 +2,13 @@
 
 The runs: 10 s at 10 kHz of TALOS, 32 joints; 150 s at 1 kHz of 60 joints without a robot; both
 float32, with positions, velocities measured and desired. The log: 10 s of a noise in NoisyTest's
-two columns. With an older checkout (`--before`), both have the same input, caches and bytecode of
-their own, and take turns after a warm-up.
+two columns. The batch: 28 runs of 7 s at 1 kHz of 18 joints. With an older checkout (`--before`),
+both have the same input, caches and bytecode of their own, and take turns after a warm-up.
 """
 
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -15,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.checkouts import Checkout
-from benchmarks.table import ROOT, Given, Row, in_turns, of_process
+from benchmarks.table import ROOT, Row, in_turns, of_process
 from noisemodel import Robot, Run, simplified
 
-REPEATS = 3
+REPEATS, BATCH = 3, 28
 RECORDINGS = {"view of 10 s, 10 kHz, 32 joints": 20.0}  # most that a recording may have, in [MB]
 
 
@@ -38,18 +39,18 @@ def cases(folder: Path) -> dict[str, tuple[list[str], float, float | None]]:
     }
 
 
-def rows(given: Given) -> Iterator[Row]:
-    """CPU time of each command, and the size of a recording."""
+def rows(before: Path | None) -> Iterator[Row]:
+    """CPU time of each command, the size of a recording, and what a second process gains."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write(folder)
         ours = Checkout.of(ROOT, Path(sys.executable), folder / "ours")
         sides = {"ours": ours}
-        if given.before:
-            sides["before"] = Checkout.of(given.before, None, folder / "before")
+        if before:
+            sides["before"] = Checkout.of(before, None, folder / "before")
         for title, (arguments, seconds, most) in cases(folder).items():
             work = {side: partial(measure, each, arguments) for side, each in sides.items()}
-            if title == "`inspector --help`" and not given.before:
+            if title == "`inspector --help`" and not before:
                 work["empty Python"] = partial(of_process, [sys.executable, "-c", "pass"])
             times = in_turns(work, REPEATS, warm=1)
             against, other = "real time", seconds or None
@@ -59,6 +60,10 @@ def rows(given: Given) -> Iterator[Row]:
             if title in RECORDINGS:
                 size = (folder / "out.rrd").stat().st_size / 1e6
                 yield Row(f"{title}: recording", size, most=RECORDINGS[title], unit="MB")
+        work = {jobs: partial(elapsed, ours, folder / "batch", jobs) for jobs in ("1", "2")}
+        times = in_turns(work, REPEATS, warm=1)
+        title = f"classify {BATCH} runs of 7 s, 1 kHz, 18 joints: wall time of `-j 2`"
+        yield Row(title, times["2"], "`-j 1`", times["1"], wanted=1.8)
 
 
 def measure(checkout: Checkout, arguments: Sequence[str]) -> float:
@@ -67,12 +72,23 @@ def measure(checkout: Checkout, arguments: Sequence[str]) -> float:
     return of_process(command, folder=checkout.folder, environment=checkout.environment)
 
 
+def elapsed(checkout: Checkout, folder: Path, jobs: str) -> float:
+    """Wall time of `classify` of a folder, in [s]."""
+    start = time.perf_counter()
+    measure(checkout, ["classify", str(folder), "-j", jobs])
+    return time.perf_counter() - start
+
+
 def write(folder: Path) -> None:
     """Write the runs and the log."""
     run = moving(10_000, 10.0, Robot.load("talos").joint_names, "talos")
     run.save(folder / "short.npz")
     many = tuple(f"joint_{number}" for number in range(60))
     moving(1000, 150.0, many, None).save(folder / "long.npz")
+    (folder / "batch").mkdir()
+    moving(1000, 7.0, many[:18], None).save(folder / "batch" / "0.npz")
+    for number in range(1, BATCH):
+        (folder / "batch" / f"{number}.npz").symlink_to("0.npz")
     noise = simplified(run.motion, run.velocity_desired)
     np.savetxt(folder / "noise.log", np.column_stack((run.time, noise)), fmt="%.12f %.15e")
 

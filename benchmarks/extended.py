@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.table import Given, Row, in_turns, used
+from benchmarks.table import Row, in_turns, used
 from benchmarks.twists import LOOP, states
 from noisemodel import Robot, Surface, extended
 from noisemodel.types import Array
@@ -19,7 +19,7 @@ MEMORY = 300.0  # most memory above the inputs of 100,000 states, in [MB]
 IMPEDANCE = 1.204 * 343.2
 
 
-def rows(_: Given) -> Iterator[Row]:
+def rows(_: object) -> Iterator[Row]:
     """Each kind of noise; ten times the samples, which shows whether time is linear; memory."""
     robot = Robot.load("talos")
     surface = Surface.of(robot)

@@ -23,7 +23,7 @@ from typing import BinaryIO
 import numpy as np
 
 import noisemodel as nm
-from benchmarks.table import Given, Row, of_process, used
+from benchmarks.table import Row, of_process, used
 from inspector import LiveSession
 
 ROBOT, RATE, SECONDS = "talos", 10_000.0, 6.0
@@ -31,7 +31,7 @@ CHUNK = round(0.02 * RATE)
 WANTED = {"LiveSession": 4.0, "CSV": 2.5}  # times real time: 25 % of a core, and 40 %
 
 
-def rows(_: Given) -> Iterator[Row]:
+def rows(_: object) -> Iterator[Row]:
     """Each way in, into a recording and to a server."""
     names = nm.Robot.load(ROBOT).joint_names
     signals = motion(SECONDS, RATE, len(names))

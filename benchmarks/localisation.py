@@ -1,6 +1,6 @@
 """Accuracy of the fault localisation: stage, limb, joints and band.
 
-    python benchmarks/localisation.py build/localisation [--robots talos,go2,panda] [--seeds 3,4]
+    python -m benchmarks.localisation build/localisation [--robots talos,go2,panda] [--seeds 3,4]
 
 Simulates runs whose defects are known, into a folder; existing runs are not simulated
 again. For each event that became a label, the localised stage is compared with the one in which the
@@ -11,13 +11,10 @@ commanded oscillations: correct if they overlap.
 """
 
 import argparse
-import os
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-
-os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import noisemodel as nm
 from inspector.localisation.localise import Localisation, fault_links, localise

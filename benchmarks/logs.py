@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.table import ROOT, Given, Row, in_turns
+from benchmarks.table import ROOT, Row, in_turns
 
 JOINTS = tuple(f"left_joint_number_{number}" for number in range(60))
 STORAGES = ("MCAP", "SQLITE3")
@@ -24,7 +24,7 @@ SPEED, MEMORY = 20.0, 1000.0  # least speed, in [MB/s], and most memory, in [MB]
 REPEATS = 3
 
 
-def rows(_: Given) -> Iterator[Row]:
+def rows(_: object) -> Iterator[Row]:
     """Time and memory by storage."""
     for storage in STORAGES:
         with tempfile.TemporaryDirectory() as folder:

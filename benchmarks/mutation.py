@@ -2,7 +2,8 @@
 
     python -m benchmarks.mutation FOLDER [--seed 27] [--from 0] [--number 500] [--only FILE ...]
 
-The mutants are cosmic-ray's (extra `mutation`), in `noisemodel`, `models` and `inspector.analysis`.
+The mutants are cosmic-ray's (extra `mutation`), in `noisemodel`, `noiseclassifier` without its
+scenarios, and `inspector.analysis`.
 All places that it can change stand in one random order; at each, one of its changes is drawn, too.
 So any first N are a fair sample. Left out is what any test would see (arithmetic that becomes
 shifts or bitwise operations, order that becomes identity, what does not compile), and what no
@@ -48,7 +49,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 SEED = 27
-MEASURED = ("noisemodel", "models", "inspector/analysis.py")
+MEASURED = ("noisemodel", "models/noiseclassifier", "inspector/analysis.py")
 ARITHMETIC = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}
 IDENTITY = {"Is", "IsNot"}
 MEMORY = 12 << 30  # address space of a child, in [byte]
@@ -113,8 +114,10 @@ def places() -> list[list[Mutant]]:
 
 
 def modules(place: Path) -> list[Path]:
-    """A module, or those of a folder."""
-    return [place] if place.suffix else [*place.rglob("*.py")]
+    """A module, or those of a folder, without scenarios, whose tests are left out."""
+    return (
+        [place] if place.suffix else [p for p in place.rglob("*.py") if "scenarios" not in p.parts]
+    )
 
 
 def wanted(operator: str) -> bool:
@@ -637,6 +640,7 @@ def main() -> None:
         shutil.copytree(ROOT, tree, ignore=ignored)
     stages = ["measure"] if not (folder / "lines.json").exists() else []
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    environment["PYTHONPATH"] = f"{tree}:{tree / 'models'}"  # the copy, not what is installed
     for stage in [*stages, "try"]:
         # Code of a mutant is never kept: its file may have the size and second of the next one's.
         environment["PYTHONDONTWRITEBYTECODE"] = "" if stage == "measure" else "1"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import noiseclassifier as nc
-from benchmarks.table import ROOT, Given, Row, used
+from benchmarks.table import ROOT, Row, used
 from noiseclassifier.signals import JOINTS, MOTION, NOISE, by_joint
 
 RATES = (125.0, 1000.0, 10_000.0)  # rates of the signals, in [Hz]
@@ -20,7 +20,7 @@ WANTED = 100.0  # times real time, in chunks and whole
 MEDIAN, SLOW = 3e-4, 2e-3  # most time of a chunk that completes a frame, median and 99 %, in [s]
 
 
-def rows(_: Given) -> Iterator[Row]:
+def rows(_: object) -> Iterator[Row]:
     """Each input and rate in chunks; of 12 joints at 1 kHz sample by sample, too, and whole."""
     general = nc.load(ROOT / "models" / "general.npz")
     assert isinstance(general, nc.General)

@@ -8,25 +8,12 @@ import os
 import resource
 import subprocess
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
 ROOT = Path(__file__).resolve().parents[1]
-
-
-@dataclass(frozen=True)
-class Given:
-    """What a user gives the benchmarks."""
-
-    noisytest: Path | None = None
-    original: str = ""
-    before: Path | None = None
-
-
-class LeftOutError(Exception):
-    """A benchmark lacks what it needs; the text says what."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +109,3 @@ def of_process(
             f"{called} failed in {folder} (exit {done.returncode}):\n{done.stderr[-2000:]}"
         )
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
-def table(rows: Iterable[Row]) -> str:
-    """The rows as a table in Markdown."""
-    return "\n".join([HEAD, *map(str, rows)])

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.table import Given, Row, in_turns, used
+from benchmarks.table import Row, in_turns, used
 from noisemodel import Robot, link_twists
 from noisemodel.types import Array
 
@@ -15,7 +15,7 @@ REPEATS = 5
 LOOP = "loop over Pinocchio"
 
 
-def rows(_: Given) -> Iterator[Row]:
+def rows(_: object) -> Iterator[Row]:
     """Twists of all links, beside a loop that reads them one by one, or sample by sample."""
     robot = Robot.load("talos")
     motion = states(robot, SAMPLES)

@@ -2,11 +2,11 @@
 
 import subprocess
 import sys
-from argparse import Namespace
+import zipfile
 
+import numpy as np
 import pytest
-
-from benchmarks.memory import MEASURE, commands, write
+from numpy.lib import format as npy
 
 SHORT, LONG = 160.0, 480.0
 """Durations in [s] of runs of 60 joints at 1 kHz: signals of 77 MB and of 230 MB each."""
@@ -14,12 +14,55 @@ GROWTH = 80e6
 """Most growth of the peak in [B]; the three signals grow by 460 MB."""
 
 
+JOINTS, PIECE = 60, 20_000  # samples that are made at once
+MEASURE = """
+import resource, subprocess, sys
+done = subprocess.run([sys.executable, "-m", "inspector", *sys.argv[1:]], capture_output=True)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(used.ru_maxrss * 1024, done.returncode, *done.stderr.decode().strip().splitlines()[-1:])
+"""
+
+
+def motion(name, samples):
+    """Some samples of a sinusoidal motion with noise, and a vibration once a minute."""
+    time, places = samples[:, None] / 1000.0, np.arange(JOINTS)
+    turn = 2.0 * np.pi * (0.3 + 0.02 * (places % 10))
+    if name == "position":
+        return 0.2 * np.sin(turn * time + places)
+    found = 0.2 * turn * np.cos(turn * time + places)
+    if name == "velocity":
+        found += 1e-3 * np.random.default_rng(int(samples[0])).standard_normal(found.shape)
+        since = (time[:, 0] - 30.0) % 60.0
+        found[:, 3] += 3.0 * np.exp(-since / 0.05) * np.sin(2.0 * np.pi * 120.0 * since)
+    return found
+
+
+def write(path, seconds, packed):
+    """Write a run file at 1 kHz in little memory."""
+    count = round(1000 * seconds)
+    names = np.array([f"j{number}" for number in range(JOINTS)])
+    plain = {"format": "noise-run/1", "joint_names": names, "time": np.arange(count) / 1000}
+    method = zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED
+    with zipfile.ZipFile(path, "w", method, compresslevel=1) as archive:
+        for name, array in plain.items():
+            with archive.open(f"{name}.npy", "w") as member:
+                npy.write_array(member, np.asanyarray(array))
+        for name in ("velocity", "velocity_desired", "position"):
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                header = {"descr": "<f8", "fortran_order": False, "shape": (count, JOINTS)}
+                npy.write_array_header_1_0(member, header)
+                for first in range(0, count, PIECE):
+                    member.write(
+                        motion(name, np.arange(first, min(count, first + PIECE))).tobytes()
+                    )
+
+
 def peak(command):
     """Peak of the resident set of a command that gives a verdict, in [B]."""
     done = subprocess.run(
         [sys.executable, "-c", MEASURE, *command], stdout=subprocess.PIPE, check=True, text=True
     )
-    found, _, status, *_ = done.stdout.split()
+    found, status, *_ = done.stdout.split()
     assert status in "014", done.stdout
     return float(found)
 
@@ -27,15 +70,17 @@ def peak(command):
 @pytest.mark.slow
 @pytest.mark.parametrize("packed", [False, True], ids=["stored", "deflated"])
 def test_peaks_of_commands_do_not_grow_with_a_run(tmp_path, packed):
-    peaks = {}
+    run, page = tmp_path / "run.npz", tmp_path / "run.html"
+    commands = [["audit", run]]
+    if not packed:
+        commands += [["view", run, "-o", page, "--overwrite"], ["diff", run, run]]
+    peaks = []
     for seconds in (SHORT, LONG):
-        run = tmp_path / "run.npz"
-        settings = Namespace(rate=1000.0, joints=60, type="f8", robot="", packed=packed)
-        write(run, seconds, settings)
-        names = ("audit",) if packed else ("audit", "report", "diff")
-        for name in names:
-            peaks.setdefault(name, []).append(peak(commands(run)[name]))
-    growth = {name: long - short for name, (short, long) in peaks.items()}
+        write(run, seconds, packed)
+        peaks.append([peak(command) for command in commands])
+    growth = {
+        one: after - before for (one, *_), before, after in zip(commands, *peaks, strict=True)
+    }
     assert max(growth.values()) < GROWTH, growth
 
 
