@@ -325,15 +325,10 @@ def test_a_mesh_that_is_missing_is_named():
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("geometry", "options", "message"),
-    [
-        ("visuals", {}, "geometry 'visuals' is not known, expected one of visual, collision, hull"),
-    ],
-)
-def test_unknown_settings_are_named(tmp_path, geometry, options, message):
+def test_an_unknown_geometry_is_named(tmp_path):
+    message = "geometry 'visuals' is not known, expected one of visual, collision, hull"
     with pytest.raises(GeometryError, match=message):
-        triangles(robot(tmp_path), geometry, **options)
+        triangles(robot(tmp_path), "visuals")
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,6 @@ from noiseclassifier.scenarios.dataset import (
 from noiseclassifier.scenarios.simulation import RECIPE
 from noisemodel import Block, Run, parallel
 
-JOINTS = scenarios.ROBOTS["panda"].drives.joints
 ALL = scenario_tasks(choose(["panda", "ur5"], ["1", "2", "7"]), seeds=2)
 
 
