@@ -123,7 +123,6 @@ def log_of(
     options = options.for_columns(path, [*arrays])
     mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
     roles = _roles(arrays, mapped)
-    copies = [name for name in arrays if meaning(name) == COPY]
     motion = [name for name, what in roles.items() if what in MOTION or name in mapped]
     if not motion:
         raise LogError(path, _nothing(episode, arrays))
@@ -157,12 +156,12 @@ def log_of(
         for name, each in arrays.items()
         if name in roles and len(each) == samples and each.ndim <= 2 and name != time
     )
-    read = {time, *copies, *(each.name for each in fields)}
+    read = {time, *(each.name for each in fields)}
     return Log(
         path,
         fields,
         episode,
-        not_read=(*(name for name in arrays if name not in read), *not_read),
+        not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
         remarks=(*_taken(fields, suggested, options), *remarks),
         suggested=tuple(suggested),
         time=time,
