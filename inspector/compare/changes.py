@@ -28,13 +28,7 @@ LOWEST_BAND = 16.0
 
 @dataclass(frozen=True)
 class Level:
-    """How loud something is before and after.
-
-    Attributes:
-        name: What it is.
-        before: In [dB].
-        after: In [dB].
-    """
+    """How loud something is before and after, in [dB]."""
 
     name: str
     before: float
@@ -320,25 +314,25 @@ def report(pair: Pair) -> str:
 
 def verdict(pair: Pair) -> tuple[str, str]:
     """A key of ``colors.VERDICTS``, and whether the run after is worse, in a line."""
-    count = Counter(change.kind for change in changes(pair))
-    told = ", ".join(f"{count[kind]} {kind}" for kind in KINDS if count[kind])
-    if count[NEW] or count[LOUDER]:
-        return "findings", f"WORSE   {told}"
-    return "ok", f"BETTER   {told}" if count[RESOLVED] or count[
-        QUIETER
-    ] else f"SAME   {told}".strip()
+    found = changes(pair)
+    kinds = {change.kind for change in found}
+    worse, better = kinds & {NEW, LOUDER}, kinds & {RESOLVED, QUIETER}
+    word = "WORSE" if worse else "BETTER" if better else "SAME"
+    return "findings" if worse else "ok", f"{word}   {_counts(found)}".strip()
 
 
 def summary(pair: Pair) -> str:
     """The status of both runs and what changed, in a line."""
     found = changes(pair)
-    count = {kind: sum(each.kind == kind for each in found) for kind in KINDS}
-    events = "nothing found in either"
-    if found:
-        events = ", ".join(f"{number} {kind}" for kind, number in count.items() if number)
-        events = f"{'findings' if labelled(pair) else 'annotated failures'}: {events}"
+    what = "findings" if labelled(pair) else "annotated failures"
+    events = f"{what}: {_counts(found)}" if found else "nothing found in either"
     statuses = f"{pair.before.status} → {pair.after.status}"
     return f"{statuses}; {events}; vibration {whole(pair).change:+.1f} dB"
+
+
+def _counts(found: Sequence[Change]) -> str:
+    count = Counter(change.kind for change in found)
+    return ", ".join(f"{count[kind]} {kind}" for kind in KINDS if count[kind])
 
 
 def _parts(pair: Pair) -> Iterator[str]:

@@ -23,6 +23,7 @@ from inspector.recording.panels import HIGH_DB, LOW_DB
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.markdown import spoken
+from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array
 
@@ -68,6 +69,12 @@ class Several:
     def found(self, index: int) -> float:
         """How long a run has findings, in [s]."""
         return sum(event.stop - event.start for event in self.sides[index].findings)
+
+    @property
+    def longest(self) -> Event | None:
+        """The longest finding of the worst run."""
+        found = () if self.worst is None else self.sides[self.worst].findings
+        return max(found, key=lambda event: event.stop - event.start, default=None)
 
     @property
     def worst(self) -> int | None:
@@ -141,7 +148,9 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         title = f"{several.names[0]} and {len(several.names) - 1} more"
         log_report(recording, title, report(several), properties)
         whole = layout(len(several.names), [found, loud], curves)
-        recording.send_blueprint(unstable.blueprint(whole, _loop(several)))
+        event = several.longest
+        loop = None if event is None else (event.start, event.stop)
+        recording.send_blueprint(unstable.blueprint(whole, loop))
 
 
 def layout(runs: int, rows: Sequence[Timed], curves: Timed) -> Part:
@@ -163,11 +172,10 @@ def report(several: Several) -> str:
     """Write the table of several runs in Markdown, in the order given, the worst marked."""
     failing = sum(bool(side.findings) for side in several.sides)
     lines = [f"### {len(several.names)} runs, {failing} with findings"]
-    if several.worst is not None:
-        lines += [
-            "",
-            f"Worst: **{several.names[several.worst]}**, {_first(several, several.worst)}",
-        ]
+    if several.worst is not None and (event := several.longest) is not None:
+        when = f"{event.start:.2f} s to {event.stop:.2f} s"
+        name = several.names[several.worst]
+        lines += ["", f"Worst: **{name}**, {spoken(event.label)} from {when}"]
     lines += ["", "| run | findings | peak [dB] |", "|---|---|---|"]
     for index, (name, side) in enumerate(zip(several.names, several.sides, strict=True)):
         shown = f"**{name}** (worst)" if index == several.worst else name
@@ -188,19 +196,6 @@ def report(several: Several) -> str:
 def _of(several: Several, remark: str) -> str:
     sides = zip(several.names, several.sides, strict=True)
     return next(name for name, side in sides if remark in map(spoken, side.remarks))
-
-
-def _first(several: Several, index: int) -> str:
-    event = max(several.sides[index].findings, key=lambda event: event.stop - event.start)
-    return f"{spoken(event.label)} from {event.start:.2f} s to {event.stop:.2f} s"
-
-
-def _loop(several: Several) -> tuple[float, float] | None:
-    if several.worst is None:
-        return None
-    found = several.sides[several.worst].findings
-    event = max(found, key=lambda event: event.stop - event.start)
-    return event.start, event.stop
 
 
 def _height(count: int) -> float:

@@ -236,18 +236,14 @@ def _at_rate(run: Run, rate: float) -> Run:
 
 
 def _cut(run: Run, first: int, stop: int, time: Array) -> Run:
-    """A part of a run, with other times."""
-    blocks = _moved(run, float(time[0] - run.time[first]), float(time[0]), float(time[-1]))
-    return part(run, first, stop, time=time, blocks=blocks)
-
-
-def _moved(run: Run, shift: float, start: float, stop: float) -> tuple[Block, ...]:
-    """Shift blocks, and cut them to a stretch of time."""
-    shifted = [
-        Block(max(block.start + shift, start), min(block.stop + shift, stop), block.label)
+    """A part of a run, with other times; blocks are moved and cut with it."""
+    shift, begin, end = float(time[0] - run.time[first]), float(time[0]), float(time[-1])
+    moved = [
+        Block(max(block.start + shift, begin), min(block.stop + shift, end), block.label)
         for block in run.blocks
     ]
-    return tuple(block for block in shifted if block.start < block.stop)
+    blocks = tuple(block for block in moved if block.start < block.stop)
+    return part(run, first, stop, time=time, blocks=blocks)
 
 
 class PairError(InspectorError):

@@ -374,7 +374,7 @@ def _log_robots(
     trees = {side: robot.of_run(each.run, folder, side=side) for side, each in pair.sides}
     pairs = [(trees[side], each.run) for side, each in pair.sides]
     for tree, own in pairs:
-        robot.log(recording, tree, own, coloured=True)
+        robot.log(recording, tree, own)
     urdf = robot.drawn_file(pair.after.run.robot, folder)
     cameras = log_cameras(recording, pairs, urdf, aspect=ASPECT)
     views = [

@@ -135,7 +135,7 @@ class LiveRobot:
         with TemporaryDirectory() as folder:
             tree = scene.load(robot, Path(folder), joint_names)
             self._outermost = cameras.outermost(scene.drawn_file(robot, Path(folder)))
-            scene.log_shapes(recording, tree, coloured=True)
+            scene.log_shapes(recording, tree)
             self._kinds = scene.shapes(tree)
         self._tree = tree
         self._shades: dict[str, bytes] = {}

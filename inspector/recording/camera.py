@@ -137,7 +137,7 @@ def reached(
 
 def standing(camera: Camera, tree: UrdfTree, *, moves: bool) -> Camera:
     """A camera in the frame of transforms that it stands in."""
-    frame = robot.frame(tree, VIEW) if moves else robot.root(tree, floating=False)
+    frame = robot.frame(tree, VIEW if moves else tree.root_link().name)
     return replace(camera, frame=frame, moves=moves)
 
 

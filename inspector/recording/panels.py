@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, takewhile
-from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -111,8 +110,6 @@ def _limb_title(joints: Sequence[str]) -> str:
     return shared if len(shared) > 1 else f"{joints[0]} … {joints[-1]}"
 
 
-Lane: TypeAlias = Sequence[tuple[float, float, str]]
-"""Start and stop in [s] and class of stretches in order of time."""
 ROW = 20.0
 """Height of a class, in points."""
 FOUND, ANNOTATED = (0.10, 0.62), (0.68, 0.88)
@@ -169,14 +166,10 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
 def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
     """The colours of all classes of runs, found or annotated, the models' classes first."""
     known = dict.fromkeys(name for side in sides if side.labels for name in side.labels.classes)
-    others = {name for side in sides for *_, name in (*side.lane, *annotated(side.run))}
+    others = {name for side in sides for *_, name in side.lane}
+    others |= {block.label for side in sides for block in side.run.blocks}
     others |= {event.label for side in sides for event in side.findings}
     return colors.of_classes((*known, *sorted(others - set(known))))
-
-
-def annotated(run: Run) -> Lane:
-    """The annotated blocks of a run."""
-    return [(block.start, block.stop, block.label) for block in run.blocks]
 
 
 def readable(color: colors.Color) -> colors.Color:

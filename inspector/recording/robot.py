@@ -84,11 +84,6 @@ def frame(tree: UrdfTree, link: str) -> str:
     return f"{tree.frame_prefix or ''}{link}"
 
 
-def root(tree: UrdfTree, *, floating: bool) -> str:
-    """The frame that the robot is drawn in: its base, or the world if the base floats."""
-    return frame(tree, WORLD if floating else tree.root_link().name)
-
-
 def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
     """For each link that moves, the URDF's links that are fixed to it, itself first.
 
@@ -134,13 +129,9 @@ def shapes(tree: UrdfTree) -> dict[str, str]:
     return found
 
 
-def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bool) -> None:
-    """Log a robot and its motion.
-
-    Args:
-        coloured: Whether colours over time will follow, see `log_shapes`.
-    """
-    log_shapes(recording, tree, coloured=coloured)
+def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run) -> None:
+    """Log a robot and its motion; its colours have to follow."""
+    log_shapes(recording, tree)
     frames = shown(run)
     moved = angles(tree, run, frames)
     for joint in tree.joints():
@@ -150,8 +141,19 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bo
                 indexes=[axes.at(run.time[frames])],
                 columns=joint.compute_transform_columns(moved[joint.name].tolist(), clamp=False),
             )
-    if run.base_pose is not None:
-        _log_base(recording, tree, run, frames)
+    if run.base_pose is None:
+        return
+    pose = run.base_pose[frames]
+    recording.send_columns(
+        f"{origin(tree)}/motion/base",
+        indexes=[axes.at(run.time[frames])],
+        columns=rr.Transform3D.columns(
+            translation=pose[:, :3],
+            quaternion=pose[:, 3:],
+            parent_frame=[frame(tree, WORLD)] * len(pose),
+            child_frame=[frame(tree, tree.root_link().name)] * len(pose),
+        ),
+    )
 
 
 def shown(run: Run) -> NDArray[np.intp]:
@@ -179,13 +181,11 @@ def angles(tree: UrdfTree, run: Run, frames: NDArray[np.intp]) -> dict[str, Arra
     return found
 
 
-def log_shapes(recording: rr.RecordingStream, tree: UrdfTree, *, coloured: bool) -> None:
-    """Log a robot at rest."""
+def log_shapes(recording: rr.RecordingStream, tree: UrdfTree) -> None:
+    """Log a robot at rest, without its colours."""
     unstable.log_up(recording)
-    drawn = tree.stream()
-    if coloured:
-        drawn = drawn.drop(components=[":".join(pair) for pair in COLOURED.items()])
-    recording.send_chunks(drawn)
+    colours = [":".join(pair) for pair in COLOURED.items()]
+    recording.send_chunks(tree.stream().drop(components=colours))
 
 
 def log_colours(
@@ -216,23 +216,6 @@ def log_colours(
         for path in paths:
             columns = getattr(rr, kinds[path]).columns(**{COLOURED[kinds[path]]: own[changed]})
             recording.send_columns(path, indexes=[axes.at(time[changed])], columns=columns)
-
-
-def _log_base(
-    recording: rr.RecordingStream, tree: UrdfTree, run: Run, shown: NDArray[np.intp]
-) -> None:
-    assert run.base_pose is not None
-    pose = run.base_pose[shown]
-    recording.send_columns(
-        f"{origin(tree)}/motion/base",
-        indexes=[axes.at(run.time[shown])],
-        columns=rr.Transform3D.columns(
-            translation=pose[:, :3],
-            quaternion=pose[:, 3:],
-            parent_frame=[frame(tree, WORLD)] * len(pose),
-            child_frame=[frame(tree, tree.root_link().name)] * len(pose),
-        ),
-    )
 
 
 STICK = 0.1

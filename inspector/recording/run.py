@@ -147,7 +147,7 @@ def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tup
 def _log_robot(recording: rr.RecordingStream, tree: UrdfTree, run: Run, folder: Path) -> Part:
     """Log a robot and its motion; it, with the scale of its colours."""
     assert run.robot is not None
-    robot.log(recording, tree, run, coloured=True)
+    robot.log(recording, tree, run)
     urdf = robot.drawn_file(run.robot, folder)
     (seen,) = camera.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
     shown = unstable.robot("Robot, links coloured by level above 10 Hz", "/robot", seen)
