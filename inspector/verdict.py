@@ -22,7 +22,7 @@ from functools import cache, partial
 from itertools import zip_longest
 from pathlib import Path
 from time import monotonic, perf_counter, sleep
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import noiseclassifier as nc
 import noisemodel as nm
@@ -50,11 +50,14 @@ PATIENCE = 2.0
 SETTINGS = ("how logs are read", "--unknown", "--report", "--reference")
 """The first settings of a header; what follows are files that options name."""
 MAX_BYTES = 256 * 2**20
-"""Most bytes of a state file that is read: enough for some hundred thousand runs."""
+"""Most bytes of a file that is resumed: enough for some hundred thousand runs."""
 DRAWING = 0.4
 """About how long a picture takes, in [s]."""
 LONGEST_LINE = 2**16
 """Characters of a line that are looked at."""
+
+
+Kept = TypeVar("Kept")
 
 
 class StateError(FileError):
@@ -691,15 +694,13 @@ def read_results(path: Path) -> list[Verdict]:
 class State:
     """The verdicts so far, by run and SHA-256 of its content."""
 
-    path: Path
     verdicts: dict[tuple[Path, str], Verdict]
-    _file: IO[bytes]
+    _append: Callable[[Mapping[str, Any]], None]
 
     def add(self, verdict: Verdict, sha256: str) -> None:
         """Append a verdict, flushed to the disk."""
         if verdict.status is not Status.INTERNAL_ERROR:
-            row = {"sha256": sha256, **verdict.as_dict(), "lost": list(verdict.lost)}
-            _append(self.path, self._file, row)
+            self._append({"sha256": sha256, **verdict.as_dict(), "lost": list(verdict.lost)})
 
 
 @contextmanager
@@ -709,8 +710,53 @@ def kept(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
     Args:
         settings: Models and settings, by name, as JSON can hold them.
     """
+    header = {"format": FORMAT, **settings}
+
+    def read(first: bytes, rows: list[bytes]) -> dict[tuple[Path, str], Verdict]:
+        _check_header(path, first, header)
+        verdicts = {}
+        for number, row in enumerate(rows, start=2):
+            try:
+                content = from_json(row)
+                verdict = Verdict.from_dict(content)
+                lost = tuple(map(" ".join, ([each] for each in content["lost"])))
+                verdict = replace(verdict, lost=lost)
+                verdicts[verdict.path, content["sha256"]] = verdict
+            except (ValueError, KeyError, TypeError, AttributeError) as error:
+                raise StateError(path, f"is damaged in line {number}") from error
+        return verdicts
+
+    with resumed(path, header, read, partial(StateError, path), "holds no state of classify") as (
+        verdicts,
+        append,
+    ):
+        yield State(verdicts or {}, append)
+
+
+@contextmanager
+def resumed(
+    path: Path,
+    header: Mapping[str, Any],
+    read: Callable[[bytes, list[bytes]], Kept],
+    refused: Callable[[str], InspectorError],
+    nothing: str,
+    *,
+    afresh: bool = False,
+) -> Iterator[tuple[Kept | None, Callable[[Mapping[str, Any]], None]]]:
+    """Open a file of JSON lines to resume, or create it.
+
+    Args:
+        header: Its first line.
+        read: Reads the first line and the others, or raises.
+        refused: Makes an error of a problem of the file.
+        nothing: The problem of a file that does not begin as this one.
+        afresh: Whether to discard what it holds.
+
+    Returns:
+        What was read, None of a new file, and a function that appends a line.
+    """
     if path.exists() and not path.is_file():
-        raise StateError(path, "is no regular file")
+        raise refused("is no regular file")
     try:
         file = path.open("a+b")
     except OSError as error:
@@ -723,29 +769,20 @@ def kept(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
                 f"{path}: is being written by another process; wait for it, or name another file"
             ) from error
         if os.fstat(file.fileno()).st_size > MAX_BYTES:
-            raise StateError(path, f"is larger than {MAX_BYTES} bytes")
+            raise refused(f"is larger than {MAX_BYTES} bytes")
         file.seek(0)
-        whole, end, torn = file.read().rpartition(b"\n")
-        header = {"format": FORMAT, **settings}
-        verdicts = {}
+        whole, end, torn = (b"" if afresh else file.read()).rpartition(b"\n")
+        found, append = None, partial(_append, path, file)
         if end:
             first, *rows = whole.split(b"\n")
-            _check_header(path, first, header)
-            for number, row in enumerate(rows, start=2):
-                try:
-                    content = from_json(row)
-                    verdict = Verdict.from_dict(content)
-                    lost = tuple(map(" ".join, ([each] for each in content["lost"])))
-                    verdict = replace(verdict, lost=lost)
-                    verdicts[verdict.path, content["sha256"]] = verdict
-                except (ValueError, KeyError, TypeError, AttributeError) as error:
-                    raise StateError(path, f"is damaged in line {number}") from error
+            found = read(first, rows)
         elif not json.dumps(header).encode().startswith(torn):
-            raise StateError(path, "holds no state of classify")
+            raise refused(nothing)
+        # A line without its end was being written when the process was killed.
         file.truncate(len(whole) + len(end))
         if not end:
-            _append(path, file, header)
-        yield State(path, verdicts, file)
+            append(header)
+        yield found, append
 
 
 def _lock(file: IO[bytes]) -> None:

@@ -321,8 +321,8 @@ def test_recordings_of_the_training_set_do_not_validate(data, tmp_path):
 
 def test_an_output_that_cannot_be_written_is_named(data, tmp_path):
     reason = f"{tmp_path / 'none' / 'tuned.jsonl'}: cannot be written (No such file or directory)"
-    assert reason in refused(data, tmp_path / "none" / "tuned.jsonl")
-    assert f"{tmp_path}: cannot be written (Is a directory)" in refused(data, tmp_path)
+    assert reason in refused(data, tmp_path / "none" / "tuned.jsonl", code=5)
+    assert f"{tmp_path}: is no regular file; name another file, or" in refused(data, tmp_path)
 
 
 def test_a_model_that_exists_is_refused_before_the_work(data, tmp_path, counted):

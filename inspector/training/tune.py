@@ -6,25 +6,23 @@ the grid, so that any number of complete lines is a valid beginning. A killed se
 a complete one is only read.
 """
 
-import fcntl
 import hashlib
 import json
-import os
-import stat
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import partial
 from itertools import groupby
 from math import isnan, nan
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import Any, NoReturn
 
 import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.report.picture import require
 from inspector.text import progress
 from inspector.training.train import LeftOut, Simulators, classified, profile_at
+from inspector.verdict import resumed
 from noiseclassifier.jsontext import from_json
 from noiseclassifier.modelfile import versions
 from noiseclassifier.recording import check_apart, folds, group_of
@@ -44,8 +42,6 @@ from noisemodel.files import refuse_existing, replacing
 from noisemodel.parallel import DIED, Jobs, in_order
 
 FORMAT = "noise-tuning/1"
-MAX_BYTES = 256 * 2**20
-"""Most bytes of a results file that is read: enough for some hundred thousand points."""
 BATCHES, WORKERS = 4, 16
 """Least number of batches per job, since a stopped job loses one and all should end at nearly the
 same time; and for how many workers of a cluster there should be enough."""
@@ -354,19 +350,17 @@ def _cells(point: Point, measures: Measures) -> list[str]:
 
 @dataclass(eq=False)
 class Results:
-    """The measures of the first points of a grid, in their order, and the file that has them."""
+    """The measures of the first points of a grid, in their order."""
 
-    path: Path
     points: Sequence[Point]
     measures: list[Measures]
-    file: IO[bytes]
+    _append: Callable[[Mapping[str, Any]], None]
 
     def add(self, measures: Sequence[Measures]) -> None:
-        """Append the measures of the next points, flushed to the disk."""
+        """Append the measures of the next points, each flushed to the disk."""
         points = self.points[len(self.measures) :][: len(measures)]
-        rows = zip(points, measures, strict=True)
-        lines = [_line({**point, **each.as_dict()}) for point, each in rows]
-        _append(self.path, self.file, b"".join(lines))
+        for point, each in zip(points, measures, strict=True):
+            self._append({**point, **each.as_dict()})
         self.measures += measures
 
 
@@ -379,52 +373,19 @@ def opened(
     Args:
         settings: The settings of the search, by name, as JSON can hold them.
     """
-    with _locked(path) as file:
-        about = os.fstat(file.fileno())
-        if not stat.S_ISREG(about.st_mode) or about.st_size > MAX_BYTES:
-            raise _refused(path, f"is no regular file of {MAX_BYTES} bytes or less")
-        file.seek(0)
-        whole, _, torn = (b"" if overwrite else file.read()).rpartition(b"\n")
-        header = _line({"format": FORMAT, **settings})
-        measures: list[Measures] = []
-        if whole:
-            first, *rows = whole.split(b"\n")
-            _check_header(path, first, json.loads(header))
-            measures = _measures(path, rows, points)
-        elif not header.startswith(torn):
-            raise _refused(path, "holds no results of tuning")
-        # A line without its end was being written when the process was killed.
-        file.truncate(len(whole) + bool(whole))
-        if not whole:
-            _append(path, file, header)
-        yield Results(path, points, measures, file)
+    header = {"format": FORMAT, **settings}
+
+    def read(first: bytes, rows: list[bytes]) -> list[Measures]:
+        _check_header(path, first, json.loads(json.dumps(header)))
+        return _measures(path, rows, points)
+
+    refused, nothing = partial(_refused, path), "holds no results of tuning"
+    with resumed(path, header, read, refused, nothing, afresh=overwrite) as (measures, append):
+        yield Results(points, measures or [], append)
 
 
 def _refused(path: Path, problem: str) -> InspectorError:
     return InspectorError(f"{path}: {problem}; name another file, or overwrite it (--overwrite)")
-
-
-def _locked(path: Path) -> IO[bytes]:
-    try:
-        file = path.open("a+b")
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        file.close()
-        raise InspectorError(
-            f"{path}: is being written by another process; wait for it, or name another file"
-        ) from error
-    except OSError as error:
-        raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
-    return file
-
-
-def _append(path: Path, file: IO[bytes], content: bytes) -> None:
-    try:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    except OSError as error:
-        raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def _check_header(path: Path, line: bytes, settings: Mapping[str, Any]) -> None:
@@ -464,7 +425,3 @@ def _measures(path: Path, rows: Sequence[bytes], points: Sequence[Point]) -> lis
             raise _refused(path, f"is damaged in line {number}")
         measures.append(Measures(*values))
     return measures
-
-
-def _line(content: Mapping[str, Any]) -> bytes:
-    return json.dumps(content, allow_nan=False).encode() + b"\n"
