@@ -9,7 +9,7 @@ from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.ros.damaged import mcap_messages
+from inspector.logs.damaged import mcap_messages
 
 TALK, OLD = Talk(), Talk(ros1=True)
 LONG = TIMES[0] + 10_000_000 * np.arange(4000)

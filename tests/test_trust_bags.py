@@ -14,7 +14,7 @@ from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.ros import damaged
+from inspector.logs import damaged
 
 TALK, OLD = Talk(), Talk(ros1=True)
 WAYS = {

@@ -33,6 +33,7 @@ from inspector.live.samples import Clock, Warnings
 from inspector.logs.clocks import ordered, stamps_of
 from inspector.logs.log import Track
 from inspector.logs.mapping import ReadOptions, parse_mapping
+from inspector.logs.messages import STATE, STATES, Topic, decoder
 from inspector.logs.names import (
     Naming,
     array_signal,
@@ -42,7 +43,6 @@ from inspector.logs.names import (
     time_column,
 )
 from inspector.logs.read import listing, read_logs
-from inspector.logs.ros.messages import STATE, STATES, Topic, decoder
 from inspector.reference.judging import Expected
 from inspector.reference.levels import levels
 from inspector.reference.store import Reference, of_runs, save

@@ -31,9 +31,9 @@ from noisemodel.robot import joint_limits
 from noisemodel.run import NotUniformError
 
 MAGIC = {
-    b"\x89MCAP0\r\n": "ros.bags",
-    b"SQLite format 3\x00": "ros.bags",
-    b"#ROSBAG V": "ros.bags",
+    b"\x89MCAP0\r\n": "bags",
+    b"SQLite format 3\x00": "bags",
+    b"#ROSBAG V": "bags",
     b"PAR1": "parquet",
     b"\x89HDF\r\n\x1a\n": "hdf5",
     b"PK\x03\x04": "npz",
@@ -44,7 +44,7 @@ MAGIC = {
 }
 """The first bytes of a file, and the module here that reads it; other files are CSV."""
 
-NEEDS = {"ros.bags": (("rosbags", "mcap"), "ros"), "hdf5": (("h5py",), "hdf5")}
+NEEDS = {"bags": (("rosbags", "mcap"), "ros"), "hdf5": (("h5py",), "hdf5")}
 """The libraries that a reader needs, and the extra that installs them."""
 
 SUFFIXES = frozenset(
@@ -108,7 +108,7 @@ def _of_folder(path: Path) -> str:
         return "lerobot"
     bags = (path / "metadata.yaml", *path.glob("*.mcap"), *path.glob("*.db3"))
     if any(each.is_file() for each in bags):
-        return "ros.bags"
+        return "bags"
     raise LogError(
         path,
         "a folder that is neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"

@@ -23,7 +23,7 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
 from inspector.errors import LogError
-from inspector.logs.ros.messages import Topic
+from inspector.logs.messages import Topic
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 
 STORAGES = {b"\x89MCAP0\r\n": "MCAP", b"SQLite format 3\x00": "SQLite", b"#ROSBAG V2.0": "ROS 1"}

@@ -8,11 +8,10 @@ from types import SimpleNamespace
 from typing import Any
 
 from inspector.errors import LogError
+from inspector.logs.damaged import Bag, Message, Unpacking, begin, open_bag, storage_of, unpack
 from inspector.logs.log import Log, LogReader, Progress
 from inspector.logs.mapping import ReadOptions
-from inspector.logs.names import listed
-from inspector.logs.ros.damaged import Bag, Message, Unpacking, begin, open_bag, storage_of, unpack
-from inspector.logs.ros.messages import (
+from inspector.logs.messages import (
     DESCRIPTION,
     TOPIC_READERS,
     Descriptions,
@@ -20,6 +19,7 @@ from inspector.logs.ros.messages import (
     TopicReader,
     topic_reader,
 )
+from inspector.logs.names import listed
 from inspector.text import counted
 from noisemodel.runfile import ArchiveError, one_line
 

@@ -1,1 +1,0 @@
-"""ROS 1 and ROS 2 bags of all storages, read without a ROS installation."""
