@@ -14,7 +14,7 @@ from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs import damaged
+from inspector.logs import bags
 
 TALK, OLD = Talk(), Talk(ros1=True)
 WAYS = {
@@ -71,9 +71,9 @@ def test_frames_of_zstandard_without_a_size_are_counted_too(limit, tmp_path):
 
     compressor = zstandard.ZstdCompressor(write_content_size=False).compressobj()
     data = compressor.compress(bytes(2**25)) + compressor.flush()
-    damaged.begin(tmp_path)
+    bags.begin(tmp_path)
     with pytest.raises(ValueError, match="unpacks to"):
-        damaged.unpack("zstd", data)
+        bags.unpack("zstd", data)
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,30 @@
-"""Log of a ROS bag: the topics that hold a robot's motion, read by rosbags where it is intact."""
+"""Log of a ROS bag: read by rosbags where it is intact, and else record by record.
 
-from collections.abc import Collection, Iterator
-from contextlib import closing
+An MCAP file that was cut off has lost the index at its end; rosbags refuses one with other messages
+than ROS has, as Foxglove writes it. https://mcap.dev/spec
+A record of ROS 1 is a header of ``name=value`` fields and data, each with its length before it;
+chunks hold records in turn, perhaps compressed. http://wiki.ros.org/Bags/Format/2.0
+"""
+
+import bz2
+import sqlite3
+import struct
+from collections import deque
+from collections.abc import Callable, Collection, Iterator
+from contextlib import closing, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, BinaryIO, Self, TypeAlias
+
+from mcap.records import Channel, Chunk, McapRecord, Schema
+from mcap.records import Message as McapMessage
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
 from inspector.errors import LogError
-from inspector.logs.damaged import Bag, Message, Unpacking, begin, open_bag, storage_of, unpack
 from inspector.logs.log import Log, LogReader, Progress
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.messages import (
@@ -21,18 +37,40 @@ from inspector.logs.messages import (
 )
 from inspector.logs.names import listed
 from inspector.text import counted
-from noisemodel.runfile import ArchiveError, one_line
+from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 
 LATEST = 2**62
 """Stamps lie before, in [ns]; differences of later ones are no 64-bit integers."""
 METADATA = 4 * 2**20
 """Most bytes of a metadata.yaml: it has some hundred for each topic."""
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+"""The bytes with which an MCAP file begins and ends."""
+MESSAGE, CHUNK, CONNECTION = b"\x02", b"\x05", b"\x07"
+"""Kinds of records of ROS 1."""
 
 Bytes = bytes | bytearray | memoryview
+Message: TypeAlias = tuple[str, int, bytes]
+"""Topic, time of reception in [ns], and the serialised message."""
 
 
 class DamagedError(Exception):
     """A bag that rosbags cannot read; parts of it may be readable."""
+
+
+@dataclass(frozen=True)
+class Bag:
+    """A bag that is open for reading, independent of its storage."""
+
+    ros1: bool  # whether messages are serialised in the format of ROS 1
+    topics: dict[str, Topic]
+    messages: Callable[[Collection[str]], Iterator[Message]]  # of some topics
+    close: Callable[[], None] = lambda: None
+    seconds: float = 0.0  # from the first message to the last, 0 if unknown
+    lost: list[str] = field(default_factory=list)  # sentences, complete after the last message
+
+    def __str__(self) -> str:
+        topics = [f"{topic.name} ({topic.type})" for topic in self.topics.values()]
+        return f"the bag has {listed(topics) or 'no topics'}"
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
@@ -42,85 +80,25 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     )
 
 
-def _bag(path: Path) -> Bag:
-    try:
-        return _intact(path)
-    except DamagedError as error:
-        return open_bag(path, str(error))
-
-
 def _read(path: Path, options: ReadOptions, progress: Progress) -> Log:
     try:
         try:
-            with closing(_bag(path)) as bag:
+            with closing(_intact(path)) as bag:
                 return _log_of(path, bag, options, progress)
-        except DamagedError as error:  # rosbags could open it
-            return _log_of(path, open_bag(path, str(error)), options, progress)
+        except DamagedError as error:  # perhaps after some messages
+            return _log_of(path, _damaged(path, str(error)), options, progress)
     except ArchiveError as error:
         raise LogError(path, str(error)) from error
-
-
-def _log_of(path: Path, bag: Bag, options: ReadOptions, progress: Progress) -> Log:
-    chosen = dict(_chosen(path, bag, options))
-    odd = 0
-    total = sum(max(bag.topics[name].count, 0) for name in chosen)
-    for name, received, data in progress(bag.messages(chosen), total):
-        if isinstance(received, int) and abs(received) < LATEST and isinstance(data, Bytes):
-            chosen[name].add(received, bytes(data))
-        else:
-            odd += 1
-    if odd:
-        bag.lost.append(f"{odd} messages without data, or with stamps after 2116, are left out")
-    fields = [field for reader in chosen.values() for field in reader.fields()]
-    if not any(field.signal.startswith(("position", "velocity")) for field in fields):
-        raise LogError(path, f"no message holds joints; {_contents(bag)}")
-    urdfs = [each.urdf for each in chosen.values() if isinstance(each, Descriptions) and each.urdf]
-    not_read = (
-        f"{topic.name} ({topic.type if topic.count else 'no messages'})"
-        for topic in bag.topics.values()
-        if topic.name not in chosen or topic.count == 0
-    )
-    return Log(
-        path,
-        tuple(field for field in fields if field.signal),
-        not_read=tuple(not_read),
-        remarks=tuple(bag.lost),
-        urdf=urdfs[-1] if urdfs else "",
-        meta={"topics": sorted({field.source for field in fields})},
-    )
-
-
-def _chosen(path: Path, bag: Bag, options: ReadOptions) -> Iterator[tuple[str, TopicReader]]:
-    for name in options.topics:
-        if name not in bag.topics:
-            raise LogError(path, f"there is no topic {name!r}; {_contents(bag)}")
-        if bag.topics[name].type not in TOPIC_READERS:
-            raise LogError(
-                path,
-                f"{name} is a {bag.topics[name].type}; types that are read are"
-                f" {', '.join(TOPIC_READERS)}",
-            )
-    found = False
-    for topic in bag.topics.values():
-        described = topic.name.endswith(DESCRIPTION)
-        if not options.topics or topic.name in options.topics or described:
-            reader = topic_reader(path, topic, ros1=bag.ros1)
-            if reader and topic.count:
-                found = True
-                yield topic.name, reader
-    if not found:
-        raise LogError(path, f"no topic holds joints; {_contents(bag)}")
-
-
-def _contents(bag: Bag) -> str:
-    topics = [f"{topic.name} ({topic.type})" for topic in bag.topics.values()]
-    return f"the bag has {listed(topics) or 'no topics'}"
 
 
 def _listing(path: Path) -> tuple[str, ...]:
     """Topics with type, count and rate, and whether they are read, a line each."""
     try:
-        with closing(_bag(path)) as bag:
+        try:
+            bag = _intact(path)
+        except DamagedError as error:
+            bag = _damaged(path, str(error))
+        with closing(bag):
             rows = []
             for topic in sorted(bag.topics.values(), key=lambda each: each.name):
                 count = counted(topic.count, "message") if topic.count >= 0 else "not counted"
@@ -134,6 +112,59 @@ def _listing(path: Path) -> tuple[str, ...]:
         raise LogError(path, str(error)) from error
 
 
+def _log_of(path: Path, bag: Bag, options: ReadOptions, progress: Progress) -> Log:
+    chosen = _chosen(path, bag, options)
+    odd = 0
+    total = sum(max(bag.topics[name].count, 0) for name in chosen)
+    for name, received, data in progress(bag.messages(chosen), total):
+        if isinstance(received, int) and abs(received) < LATEST and isinstance(data, Bytes):
+            chosen[name].add(received, bytes(data))
+        else:
+            odd += 1
+    if odd:
+        bag.lost.append(f"{odd} messages without data, or with stamps after 2116, are left out")
+    fields = [each for reader in chosen.values() for each in reader.fields()]
+    if not any(each.signal.startswith(("position", "velocity")) for each in fields):
+        raise LogError(path, f"no message holds joints; {bag}")
+    urdfs = [each.urdf for each in chosen.values() if isinstance(each, Descriptions) and each.urdf]
+    return Log(
+        path,
+        tuple(each for each in fields if each.signal),
+        not_read=tuple(
+            f"{topic.name} ({topic.type if topic.count else 'no messages'})"
+            for topic in bag.topics.values()
+            if topic.name not in chosen or topic.count == 0
+        ),
+        remarks=tuple(bag.lost),
+        urdf=urdfs[-1] if urdfs else "",
+        meta={"topics": sorted({each.source for each in fields})},
+    )
+
+
+def _chosen(path: Path, bag: Bag, options: ReadOptions) -> dict[str, TopicReader]:
+    """Readers of the topics that are read, by their names."""
+    for name in options.topics:
+        if name not in bag.topics:
+            raise LogError(path, f"there is no topic {name!r}; {bag}")
+        if bag.topics[name].type not in TOPIC_READERS:
+            raise LogError(
+                path,
+                f"{name} is a {bag.topics[name].type}; types that are read are"
+                f" {', '.join(TOPIC_READERS)}",
+            )
+    found = {}
+    for name, topic in bag.topics.items():
+        wanted = not options.topics or name in options.topics or name.endswith(DESCRIPTION)
+        if wanted and topic.count and (reader := topic_reader(path, topic, ros1=bag.ros1)):
+            found[name] = reader
+    if not found:
+        raise LogError(path, f"no topic holds joints; {bag}")
+    return found
+
+
+# By rosbags
+
+
 def _intact(path: Path) -> Bag:
     """Bag that is open for reading by rosbags."""
     from rosbags.rosbag1 import Reader as Reader1
@@ -144,7 +175,7 @@ def _intact(path: Path) -> Bag:
     about = (path if path.is_dir() else path.parent) / "metadata.yaml"
     if about.is_file() and about.stat().st_size > METADATA:
         raise DamagedError(f"metadata.yaml has more than {METADATA} bytes")
-    ros1 = path.is_file() and storage_of(path) == "ROS 1"
+    ros1 = path.is_file() and _records_of(path) is _ros1
     try:
         reader: Any = (Reader1 if ros1 else Reader2)(path)
         reader.open()
@@ -156,12 +187,10 @@ def _intact(path: Path) -> Bag:
         reader.close()
         raise DamagedError(problem)
     topics: dict[str, Topic] = {}
-    for connection in reader.connections:
-        before = topics.get(connection.topic)
-        count = connection.msgcount + (before.count if before else 0)
-        topics[connection.topic] = Topic(
-            connection.topic, connection.msgtype, connection.msgdef.data, count
-        )
+    for each in reader.connections:
+        before = topics.get(each.topic)
+        count = each.msgcount + (before.count if before else 0)
+        topics[each.topic] = Topic(each.topic, each.msgtype, each.msgdef.data, count)
     seconds = reader.duration * 1e-9 if any(topic.count for topic in topics.values()) else 0.0
     return Bag(ros1, topics, partial(_messages, path, reader), reader.close, seconds)
 
@@ -211,11 +240,273 @@ def _bound_rosbags() -> None:
 
     own: Any = (reader1.decompressors, storage_mcap.DECOMPRESSORS)
     for method in ("bz2", "lz4"):
-        own[0][method] = lambda data, method=method: unpack(method, data)
+        own[0][method] = partial(unpack, method)
     for method in ("lz4", "zstd"):
         own[1][method] = lambda data, _, method=method: unpack(method, data)
     zstd = SimpleNamespace(
-        open=lambda stream, _: Unpacking("zstd", stream),
-        decompress=lambda data: unpack("zstd", data),
+        open=lambda stream, _: Unpacking("zstd", stream), decompress=partial(unpack, "zstd")
     )
     vars(reader2)["zstd"] = zstd
+
+
+# Chunks, unpacked piece by piece
+
+_budget: ContextVar[list[int]] = ContextVar("budget")
+"""Bytes of the bag, and bytes that were unpacked of it."""
+
+
+def begin(path: Path) -> None:
+    """Begin to read a bag, a file or a folder: what has been unpacked is counted from here."""
+    files = [each for each in path.iterdir() if each.is_file()] if path.is_dir() else [path]
+    _budget.set([sum(each.stat().st_size for each in files), 0])
+
+
+def unpack(method: str, data: bytes) -> bytes:
+    """Unpack a chunk, within the limit on all of the bag."""
+    if method not in METHODS:
+        return data
+    with Unpacking(method, BytesIO(data)) as stream:
+        return b"".join(iter(lambda: stream.read(PIECE), b""))
+
+
+class Unpacking:
+    """A stream that is unpacked, by one of ``METHODS``, while it is read."""
+
+    def __init__(self, method: str, stream: BinaryIO) -> None:
+        self._stream = METHODS[method](stream)
+
+    def read(self, size: int) -> bytes:
+        """Read up to so many bytes, within the limit of `unpack`."""
+        piece: bytes = self._stream.read(min(size, PIECE))
+        budget = _budget.get()
+        budget[1] += len(piece)
+        check_unpacked(budget[1], budget[0])
+        return piece
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stream.close()
+
+
+def _lz4(stream: BinaryIO) -> Any:
+    import lz4.frame
+
+    return lz4.frame.open(stream)
+
+
+def _zstd(stream: BinaryIO) -> Any:
+    import zstandard
+
+    return zstandard.ZstdDecompressor().stream_reader(stream, read_across_frames=True)
+
+
+METHODS: dict[str, Callable[[BinaryIO], Any]] = {"bz2": bz2.open, "lz4": _lz4, "zstd": _zstd}
+"""What opens a compressed stream, by the name that bags have for it."""
+
+
+# Record by record
+
+
+def _damaged(path: Path, problem: str) -> Bag:
+    """Bag with the intact records of one that rosbags cannot open, or not read to its end."""
+    files = (
+        sorted(each for each in path.iterdir() if _records_of(each)) if path.is_dir() else [path]
+    )
+    storages = {_records_of(file) for file in files}
+    records = storages.pop() if len(storages) == 1 else None
+    if records is None:
+        raise LogError(path, f"not a bag that can be read: {problem}")
+    whole = records is mcap_records and all(map(_ends_as_mcap, files))
+    lost = [] if whole else [f"the bag is damaged or cut off ({problem})"]
+    every = (each for file in files for each in records(file, [], True))
+    topics = {each.name: each for each in every if isinstance(each, Topic)}
+    if not topics:
+        raise LogError(path, f"no topic of the bag can be read: {problem}")
+
+    def messages(names: Collection[str]) -> Iterator[Message]:
+        count = 0
+        for each in (each for file in files for each in records(file, lost, False)):
+            if not isinstance(each, Topic) and each[0] in names:
+                yield each
+                count += 1
+        if not whole:
+            lost.append(f"{count} messages were recovered")
+
+    return Bag(records is _ros1, topics, messages, lost=lost)
+
+
+def _records_of(path: Path) -> "Records | None":
+    """What reads the records of a file, by its first bytes; None if it is not a bag."""
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(16)
+    except OSError:
+        return None
+    return next((records for magic, records in RECORDS.items() if head.startswith(magic)), None)
+
+
+def _ends_as_mcap(path: Path) -> bool:
+    """Whether an MCAP file was written to its end."""
+    with path.open("rb") as stream:
+        stream.seek(max(0, path.stat().st_size - len(MCAP_MAGIC)))
+        return stream.read() == MCAP_MAGIC
+
+
+def mcap_records(path: Path, lost: list[str], _alone: bool = False) -> Iterator[Topic | Message]:
+    """Topics and messages of intact records, to where the file ends or is damaged."""
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, str] = {}
+    begin(path)
+    size, place = path.stat().st_size, 0  # no record is longer than its file
+    with path.open("rb") as stream:
+        reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=size)
+        try:
+            for record in reader.records:
+                for each in _unchunked(record, lost):
+                    if isinstance(each, Schema):
+                        schemas[each.id] = each
+                    elif isinstance(each, Channel):
+                        channels[each.id] = each.topic
+                        schema = schemas.get(each.schema_id)
+                        text = schema.data.decode(errors="replace") if schema else ""
+                        yield Topic(each.topic, schema.name if schema else "", text)
+                    elif isinstance(each, McapMessage) and each.channel_id in channels:
+                        yield channels[each.channel_id], each.log_time, each.data
+                place = stream.tell()
+        except ArchiveError:
+            raise
+        except CRCValidationError as error:  # all messages have been read by then
+            lost.append(f"some of what was read is damaged ({error})")
+        except Exception as error:  # the library lets errors of struct and of text through
+            lost.append(f"from byte {place} on the file is damaged or cut off ({one_line(error)})")
+
+
+def _unchunked(record: McapRecord, lost: list[str]) -> list[McapRecord]:
+    """The records of a chunk, or the record itself."""
+    if not isinstance(record, Chunk):
+        return [record]
+    try:
+        raw = unpack(record.compression, record.data)
+        return breakup_chunk(replace(record, compression="", data=raw), validate_crc=True)
+    except ArchiveError:
+        raise
+    except Exception:  # each compressor has errors of its own
+        lost.append(f"a chunk of {len(record.data)} bytes is damaged and left out")
+        return []
+
+
+def _sqlite(path: Path, lost: list[str], topics_alone: bool) -> Iterator[Topic | Message]:
+    """Topics, then messages in the order of their rows, to where a page is missing.
+
+    The last page may be cut off, and SQLite reads zeros for the rest of it: messages are held
+    back until a page of data follows them.
+    """
+    database = sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)
+    with closing(database):
+        database.execute("PRAGMA writable_schema = ON")  # else SQLite refuses a file cut short
+        try:
+            tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
+            definitions = {}
+            if "message_definitions" in tables:
+                rows = "SELECT topic_type, encoded_message_definition FROM message_definitions"
+                definitions = dict(database.execute(rows))
+            for name, kind in database.execute("SELECT name, type FROM topics"):
+                if isinstance(name, str) and isinstance(kind, str):
+                    definition = definitions.get(kind)
+                    yield Topic(name, kind, definition if isinstance(definition, str) else "")
+        except sqlite3.DatabaseError as error:
+            problem = " ".join(str(error).split())[:100]
+            raise LogError(path, f"no topic of the bag can be read: {problem}") from error
+        if topics_alone:
+            return
+        held: deque[Message] = deque()
+        try:
+            (page,) = database.execute("PRAGMA page_size").fetchone()
+            names = dict(database.execute("SELECT id, name FROM topics"))
+            size = 0
+            for topic, received, data in database.execute(
+                "SELECT topic_id, timestamp, data FROM messages"
+            ):
+                if not (isinstance(received, int) and isinstance(data, bytes)):
+                    continue  # a row that is damaged itself
+                held.append((names.get(topic, ""), received, data))
+                size += len(data)
+                while size - len(held[0][2]) > page:
+                    size -= len(held[0][2])
+                    yield held.popleft()
+        except sqlite3.DatabaseError as error:
+            lost.append(f"{path.name} ends here, {len(held)} messages may be cut ({error})")
+            held.clear()
+        yield from held
+
+
+def _ros1(path: Path, lost: list[str], _alone: bool) -> Iterator[Topic | Message]:
+    """Topics and messages, including those in chunks, to where the file ends or is damaged."""
+    names: dict[bytes, str] = {}
+    begin(path)
+    with path.open("rb") as stream:
+        for header, data in _ros1_records(stream, lost):
+            number, time = header.get("conn", b""), header.get("time", b"")
+            if header.get("op") == CONNECTION and "topic" in header:
+                name = header["topic"].decode(errors="replace")
+                name = "/" * name.startswith("/") + "/".join(filter(None, name.split("/")))
+                names[number] = name
+                with suppress(struct.error, KeyError):  # a record that is damaged itself
+                    fields = _fields(data)
+                    package, _, kind = fields["type"].decode(errors="replace").partition("/")
+                    definition = fields["message_definition"].decode(errors="replace")
+                    yield Topic(name, f"{package}/msg/{kind}", definition)
+            elif header.get("op") == MESSAGE and number in names and len(time) == 8:
+                seconds, fraction = struct.unpack("<II", time)
+                yield names[number], seconds * 10**9 + fraction, data
+
+
+def _ros1_records(stream: BinaryIO, lost: list[str]) -> Iterator[tuple[dict[str, bytes], bytes]]:
+    size = stream.seek(0, 2)
+    stream.seek(0)
+    stream.readline()
+    while (place := stream.tell()) < size:
+        try:
+            header, data = _fields(_sized(stream)), _sized(stream)
+            records = [(header, data)]
+            if header["op"] == CHUNK:
+                chunk = unpack(header["compression"].decode(), data)
+                inner, records = BytesIO(chunk), []
+                while inner.tell() < len(chunk):
+                    records.append((_fields(_sized(inner)), _sized(inner)))
+        except ArchiveError:
+            raise
+        except Exception as error:  # each compressor has errors of its own
+            lost.append(f"from byte {place} on the file is damaged or cut off ({one_line(error)})")
+            return
+        yield from records
+
+
+def _sized(stream: BinaryIO) -> bytes:
+    (length,) = struct.unpack("<I", stream.read(4))
+    data = stream.read(length)
+    if len(data) < length:
+        raise EOFError(f"{len(data)} of {length} bytes are there")
+    return data
+
+
+def _fields(header: bytes) -> dict[str, bytes]:
+    fields, place = {}, 0
+    while place < len(header):
+        (length,) = struct.unpack_from("<I", header, place)
+        name, _, value = header[place + 4 : place + 4 + length].partition(b"=")
+        fields[name.decode(errors="replace")] = value
+        place += 4 + length
+    return fields
+
+
+Records: TypeAlias = Callable[[Path, list[str], bool], Iterator[Topic | Message]]
+"""Reads topics and messages, or topics alone; appends what was lost, a sentence each."""
+RECORDS: dict[bytes, Records] = {
+    MCAP_MAGIC: mcap_records,
+    b"SQLite format 3\x00": _sqlite,
+    b"#ROSBAG V2.0": _ros1,
+}
+"""What reads the records of a file, by its first bytes."""

@@ -1,4 +1,4 @@
-"""Motion of joints and base, from the messages of each type.
+"""Motion of joints and base, from the messages of each type of ROS.
 
 Messages are deserialised by the definitions that are known here, never by the one in a bag: that is
 code for a decoder, and may state anything.
@@ -25,43 +25,46 @@ DAMAGE = (
 )
 """Errors that rosbags lets through on messages that are damaged."""
 
+JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+DESCRIPTION = "robot_description"
+"""The last part of the name of the topic with a robot's URDF."""
 
 COMMANDED = ("command", "desired", "target", "reference", "setpoint")
 """A JointState topic with one of these in its name holds desired motion."""
-ARRAYS = {"position": "position", "velocity": "velocity", "effort": "effort"}
+ARRAYS = ("position", "velocity", "effort")
 POINT = {"positions": "position", "velocities": "velocity", "effort": "effort"}
-STAGES: Mapping[str, bool] = {
-    "reference": True,
-    "desired": True,
-    "feedback": False,
-    "actual": False,
-}
+STAGES = {"reference": True, "desired": True, "feedback": False, "actual": False}
 """Names of the stages of a controller's state, and whether each is desired motion."""
+CONTROLLED = {
+    f"{stage}/{name}": (f"{signal}_desired" if desired else signal, 0 if desired else 1)
+    for stage, desired in STAGES.items()
+    for name, signal in POINT.items()
+    if not (desired and signal == "effort")
+}
 
-FIXED_FRAMES = ("odom", "world", "map", "earth")
-"""Frames that do not move with the robot, the smoothest first."""
-BASE_FRAMES = ("base_link", "base_footprint", "base", "pelvis", "torso", "trunk", "root")
-"""Frames of a robot's base."""
+FRAMES = [
+    f"{world}/{base}"
+    for world in ("odom", "world", "map", "earth")
+    for base in ("base_link", "base_footprint", "base", "pelvis", "torso", "trunk", "root")
+]
+"""Frames that do not move with the robot, the smoothest first, and frames of a robot's base."""
+BASE_WIDTHS = {"pose": 7, "twist": 6, **dict.fromkeys(FRAMES, 7)}
 RECORDER = "the messages have no stamps, those of the recorder are used"
 
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a bag.
-
-    Attributes:
-        name: Its name.
-        type: Type of its messages, as ROS 2 writes it: ``sensor_msgs/msg/JointState``.
-        definition: Text of the type's definition, empty if the bag has none.
-        count: Number of messages, -1 if unknown.
-    """
+    """A topic of a bag; its type is written as in ROS 2: ``sensor_msgs/msg/JointState``."""
 
     name: str
     type: str
-    definition: str = ""
-    count: int = -1
+    definition: str = ""  # text of the type's definition, if the bag has it
+    count: int = -1  # messages, -1 if unknown
+
+
+# Messages of bytes
 
 
 def _state(joints: tuple[str, ...], others: tuple[str, ...] = (), last: str = "") -> str:
@@ -137,29 +140,22 @@ def _stores(path: Path, topic: Topic, *, ros1: bool) -> list[Any]:
     return [_store(topic.type, definition, ros1) for definition in definitions]
 
 
-@cache
+@cache  # a store takes 20 ms to make
 def _store(kind: str, definition: str, ros1: bool) -> Any:
-    """What deserialises messages of a type; it takes 20 ms to make."""
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     if definition and kind not in store.types:
         store.register(get_types_from_msg(definition, kind))
     return store
 
 
-def stamp_of(message: Any) -> int:
-    """Stamp in a message's header, in [ns]."""
-    return nanoseconds(message.header.stamp)
-
-
-def nanoseconds(time: Any) -> int:
+def _nanoseconds(time: Any) -> int:
     """Time or duration of ROS, in [ns]."""
     return int(time.sec) * 10**9 + int(time.nanosec)
 
 
 LITTLE = b"\x00\x01"
 """CDR, little-endian; other encodings are deserialised by rosbags."""
-STAMP = struct.Struct("<iI")
-COUNT = struct.Struct("<I")
+STAMP, COUNT = struct.Struct("<iI"), struct.Struct("<I")
 BODY = 12
 """Offset of the bytes after the stamp."""
 
@@ -171,18 +167,12 @@ class Layout:
     CDR aligns a number to a multiple of its size, counted from the end of the four bytes of the
     encapsulation header. Messages of one publisher have one layout: the bytes between their
     numbers are equal.
-
-    Attributes:
-        names: The joints.
-        size: Length of the message in bytes.
-        arrays: Start and stop of the positions, velocities and efforts.
-        between: Bytes that all messages of this layout share, with start and stop.
     """
 
     names: tuple[str, ...]
-    size: int
-    arrays: tuple[tuple[int, int], ...]
-    between: tuple[tuple[int, int, bytes], ...]
+    size: int  # of the message, in bytes
+    arrays: tuple[tuple[int, int], ...]  # start and stop of positions, velocities and efforts
+    between: tuple[tuple[int, int, bytes], ...]  # start, stop, and bytes that messages share
 
     @classmethod
     def of(cls, data: bytes) -> Self | None:
@@ -191,18 +181,15 @@ class Layout:
             return None
         try:
             _, place = _text(data, BODY)
-            place = _aligned(place, 4)
-            (count,) = COUNT.unpack_from(data, place)
-            place += 4
+            count, place = _count(data, place)
             names = []
             for _ in range(count):
-                name, place = _text(data, _aligned(place, 4))
+                name, place = _text(data, place)
                 names.append(name)
             arrays, between, start = [], [], BODY
             for _ in range(3):
-                place = _aligned(place, 4)
-                (count,) = COUNT.unpack_from(data, place)
-                place = _aligned(place + 4, 8) if count else place + 4
+                count, place = _count(data, place)
+                place = _aligned(place, 8) if count else place
                 between.append((start, place, data[start:place]))
                 start = place + 8 * count
                 arrays.append((place, start))
@@ -228,137 +215,33 @@ def stamp(data: bytes) -> int:
     return int(seconds) * 10**9 + int(fraction)
 
 
+def _count(data: bytes, place: int) -> tuple[int, int]:
+    """A number of items, and the place after it."""
+    place = _aligned(place, 4)
+    return int(COUNT.unpack_from(data, place)[0]), place + 4
+
+
 def _text(data: bytes, place: int) -> tuple[str, int]:
-    (length,) = COUNT.unpack_from(data, place)
-    stop = place + 4 + length
-    if stop > len(data):
+    length, place = _count(data, place)
+    if place + length > len(data):
         raise struct.error("text runs beyond the message")
-    return data[place + 4 : stop].rstrip(b"\x00").decode(), stop
+    return data[place : place + length].rstrip(b"\x00").decode(), place + length
 
 
 def _aligned(place: int, size: int) -> int:
     return place + -(place - 4) % size
 
 
-Numbers: TypeAlias = Sequence[float] | bytes
-"""Numbers of a message, or the bytes of its float64 numbers."""
-Row: TypeAlias = tuple[tuple[str, ...], int, dict[str, Numbers]]
+# Rows of messages
+
+Row: TypeAlias = tuple[tuple[str, ...], int, Mapping[str, Any]]
 """What a message tells at one time: joints, stamp in [ns], and numbers by the array's name."""
-
-
-@dataclass
-class Group:
-    """Messages about one set of joints, as rows of float64 numbers.
-
-    Attributes:
-        joints: The joints, in the order of the first message; none of a base.
-        logged: Stamps in the messages' headers, in [ns].
-        received: When the recorder received them, in [ns].
-        arrays: Numbers by the name of the array, row after row.
-    """
-
-    joints: tuple[str, ...]
-    arrays: dict[str, "array[float]"]
-    logged: "array[int]" = field(default_factory=lambda: array("q"))
-    received: "array[int]" = field(default_factory=lambda: array("q"))
-
-    @property
-    def stamps(self) -> Stamps:
-        """Stamps of the messages, or if they have none, of the recorder."""
-        chosen = self.logged if any(self.logged) else self.received
-        remark = "" if any(self.logged) else RECORDER
-        return Stamps.of_nanoseconds(np.frombuffer(chosen, dtype=np.int64), remark=remark)
-
-
-class MotionReader:
-    """Collects the messages of a topic with the motion of joints or of a base.
-
-    Publishers that share a topic, such as an arm's and a gripper's, have a group each.
-    """
-
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self._decode = decoder(path, topic, ros1=ros1)
-        self._topic, self._ros1 = topic, ros1
-        self._rows, self._signals = MOTION[topic.type]
-        self._is_state = topic.type == JOINT_STATE
-        if self._is_state and any(word in topic.name.lower() for word in COMMANDED):
-            self._signals = {
-                "position": ("position_desired", 1),
-                "velocity": ("velocity_desired", 1),
-            }
-        self._layout: Layout | None = None
-        self._groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
-
-    def add(self, received: int, data: bytes) -> None:
-        """Add a message that was received at a time in [ns]."""
-        if self._is_state and not self._ros1:
-            if self._layout is None or not self._layout.fits(data):
-                self._layout = Layout.of(data)
-            if self._layout is not None:
-                numbers = (data[start:stop] for start, stop in self._layout.arrays)
-                parts: dict[str, Numbers] = dict(zip(ARRAYS, numbers, strict=True))
-                self._add(self._layout.names, stamp(data), received, parts)
-                return
-        for joints, logged, parts in self._rows(self._decode(data)):
-            self._add(joints, logged, received, parts)
-
-    def _add(
-        self, joints: tuple[str, ...], logged: int, received: int, parts: Mapping[str, Numbers]
-    ) -> None:
-        """Append a row; arrays with another length than the joints are ignored."""
-        present = tuple(
-            name
-            for name, numbers in parts.items()
-            if _count(numbers) == BASE_WIDTHS.get(name, len(joints)) > 0
-        )
-        group = self._groups.get((frozenset(joints), present))
-        if group is None:
-            group = Group(joints, {name: array("d") for name in present})
-            self._groups[frozenset(joints), present] = group
-        group.logged.append(logged)
-        group.received.append(received)
-        for name in present:
-            numbers = parts[name]
-            if joints != group.joints:
-                values = (
-                    np.frombuffer(numbers)
-                    if isinstance(numbers, bytes)
-                    else np.asarray(numbers, dtype=np.float64)
-                )
-                numbers = values[[joints.index(joint) for joint in group.joints]].tobytes()
-            if isinstance(numbers, bytes):
-                group.arrays[name].frombytes(numbers)
-            else:
-                group.arrays[name].extend(numbers)
-
-    def fields(self) -> Iterator[Field]:
-        """Fields of the messages; of several transforms, the one with the smoothest fixed frame."""
-        groups = [group for group in self._groups.values() if group.arrays]
-        if self._topic.type in TRANSFORMS:
-            groups = sorted(groups, key=lambda group: FRAMES.index(next(iter(group.arrays))))[:1]
-        for group in groups:
-            stamps = group.stamps
-            for name, numbers in group.arrays.items():
-                signal, rank = self._signals.get(name, ("", 0))
-                yield Field(
-                    f"{self._topic.name}/{name}",
-                    np.frombuffer(numbers).reshape(len(stamps.time), -1),
-                    stamps,
-                    joints=group.joints,
-                    signal=signal,
-                    source=self._topic.name,
-                    rank=rank,
-                )
-
-
-def _count(numbers: Numbers) -> int:
-    return len(numbers) // 8 if isinstance(numbers, bytes) else len(numbers)
 
 
 def _of_state(message: Any) -> Iterator[Row]:
     """Row of a ``sensor_msgs/JointState``."""
     parts = {name: getattr(message, name) for name in ARRAYS}
-    yield tuple(message.name), stamp_of(message), parts
+    yield tuple(message.name), _nanoseconds(message.header.stamp), parts
 
 
 def _of_controller(message: Any) -> Iterator[Row]:
@@ -372,18 +255,15 @@ def _of_controller(message: Any) -> Iterator[Row]:
                     if f"{stage}/{name}" in CONTROLLED:
                         parts[f"{stage}/{name}"] = getattr(point, name, ())
                 break
-    yield tuple(message.joint_names), stamp_of(message), parts
+    yield tuple(message.joint_names), _nanoseconds(message.header.stamp), parts
 
 
 def _of_odometry(message: Any) -> Iterator[Row]:
     """Row of a ``nav_msgs/Odometry``: pose of the base in the world, velocity in body axes."""
     pose, twist = message.pose.pose, message.twist.twist
     velocity = [getattr(part, axis) for part in (twist.linear, twist.angular) for axis in "xyz"]
-    yield (
-        (),
-        stamp_of(message),
-        {"pose": _pose(pose.position, pose.orientation), "twist": velocity},
-    )
+    parts = {"pose": _pose(pose.position, pose.orientation), "twist": velocity}
+    yield (), _nanoseconds(message.header.stamp), parts
 
 
 def _of_transforms(message: Any) -> Iterator[Row]:
@@ -392,24 +272,15 @@ def _of_transforms(message: Any) -> Iterator[Row]:
         pair = f"{each.header.frame_id.lstrip('/')}/{each.child_frame_id.lstrip('/')}"
         if pair in FRAMES:
             pose = _pose(each.transform.translation, each.transform.rotation)
-            yield (), stamp_of(each), {pair: pose}
+            yield (), _nanoseconds(each.header.stamp), {pair: pose}
 
 
 def _pose(position: Any, turn: Any) -> list[float]:
     return [position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w]
 
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
-FRAMES = [f"{world}/{base}" for world in FIXED_FRAMES for base in BASE_FRAMES]
-BASE_WIDTHS = {"pose": 7, "twist": 6, **dict.fromkeys(FRAMES, 7)}
-CONTROLLED = {
-    f"{stage}/{name}": (f"{signal}_desired" if desired else signal, 0 if desired else 1)
-    for stage, desired in STAGES.items()
-    for name, signal in POINT.items()
-    if not (desired and signal == "effort")
-}
 MOTION: Mapping[str, tuple[Callable[[Any], Iterator[Row]], Mapping[str, tuple[str, int]]]] = {
-    JOINT_STATE: (_of_state, {name: (signal, 0) for name, signal in ARRAYS.items()}),
+    JOINT_STATE: (_of_state, {name: (name, 0) for name in ARRAYS}),
     STATE: (_of_controller, CONTROLLED),
     "nav_msgs/msg/Odometry": (
         _of_odometry,
@@ -420,65 +291,147 @@ MOTION: Mapping[str, tuple[Callable[[Any], Iterator[Row]], Mapping[str, tuple[st
 """By the type of messages, the rows of a message, and signal and rank of each of its arrays."""
 
 
+# Topics
+
+
+@dataclass
+class Group:
+    """Messages about one set of joints, as rows of float64 numbers."""
+
+    joints: tuple[str, ...]  # in the order of the first message; none of a base
+    arrays: dict[str, "array[float]"]  # row after row
+    logged: "array[int]" = field(default_factory=lambda: array("q"))  # in the headers, in [ns]
+    received: "array[int]" = field(default_factory=lambda: array("q"))  # by the recorder
+
+
+class MotionReader:
+    """Collects the messages of a topic with the motion of joints or of a base.
+
+    Publishers that share a topic, such as an arm's and a gripper's, have a group each.
+    """
+
+    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
+        self._decode = decoder(path, topic, ros1=ros1)
+        self._topic = topic
+        self._rows, self._signals = MOTION[topic.type]
+        self._has_layout = topic.type == JOINT_STATE and not ros1
+        if topic.type == JOINT_STATE and any(word in topic.name.lower() for word in COMMANDED):
+            self._signals = {name: (f"{name}_desired", 1) for name in ("position", "velocity")}
+        self._layout: Layout | None = None
+        self._groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
+
+    def add(self, received: int, data: bytes) -> None:
+        """Add a message that was received at a time in [ns]."""
+        if self._has_layout and not (self._layout and self._layout.fits(data)):
+            self._layout = Layout.of(data)
+        if self._layout:
+            numbers = (data[start:stop] for start, stop in self._layout.arrays)
+            parts = dict(zip(ARRAYS, numbers, strict=True))
+            self._add(self._layout.names, stamp(data), received, parts)
+            return
+        for joints, logged, found in self._rows(self._decode(data)):
+            parts = {n: np.asarray(each, dtype=np.float64).tobytes() for n, each in found.items()}
+            self._add(joints, logged, received, parts)
+
+    def _add(
+        self, joints: tuple[str, ...], logged: int, received: int, parts: Mapping[str, bytes]
+    ) -> None:
+        """Append a row; arrays with another length than the joints are ignored."""
+        present = tuple(
+            name
+            for name, numbers in parts.items()
+            if len(numbers) // 8 == BASE_WIDTHS.get(name, len(joints)) > 0
+        )
+        group = self._groups.get((frozenset(joints), present))
+        if group is None:
+            group = Group(joints, {name: array("d") for name in present})
+            self._groups[frozenset(joints), present] = group
+        group.logged.append(logged)
+        group.received.append(received)
+        for name in present:
+            numbers = parts[name]
+            if joints != group.joints:
+                order = [joints.index(joint) for joint in group.joints]
+                numbers = np.frombuffer(numbers)[order].tobytes()
+            group.arrays[name].frombytes(numbers)
+
+    def fields(self) -> Iterator[Field]:
+        """Fields of the messages; of several transforms, the one with the smoothest fixed frame."""
+        groups = [group for group in self._groups.values() if group.arrays]
+        if self._topic.type in TRANSFORMS:
+            groups = sorted(groups, key=lambda group: FRAMES.index(next(iter(group.arrays))))[:1]
+        for group in groups:
+            chosen = group.logged if any(group.logged) else group.received
+            remark = RECORDER if chosen is group.received else ""
+            stamps = Stamps.of_nanoseconds(np.frombuffer(chosen, dtype=np.int64), remark=remark)
+            for name, numbers in group.arrays.items():
+                signal, rank = self._signals.get(name, ("", 0))
+                yield Field(
+                    f"{self._topic.name}/{name}",
+                    np.frombuffer(numbers).reshape(len(stamps.time), -1),
+                    stamps,
+                    joints=group.joints,
+                    signal=signal,
+                    source=self._topic.name,
+                    rank=rank,
+                )
+
+
 class Trajectories:
     """``trajectory_msgs/JointTrajectory``: planned desired motion."""
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.decode = decoder(path, topic, ros1=ros1)
-        self.topic = topic.name
-        self.joints: dict[frozenset[str], list[tuple[int, tuple[str, ...], Any]]] = {}
+        self._decode = decoder(path, topic, ros1=ros1)
+        self._topic = topic.name
+        self._plans: dict[frozenset[str], list[tuple[int, tuple[str, ...], Any]]] = {}
 
     def add(self, received: int, data: bytes) -> None:
         """Add a trajectory."""
-        message = self.decode(data)
+        message = self._decode(data)
         joints = tuple(message.joint_names)
         if joints and message.points:
-            start = stamp_of(message) or received
-            plans = self.joints.setdefault(frozenset(joints), [])
-            plans.append((start, joints, message.points))
+            start = _nanoseconds(message.header.stamp) or received
+            self._plans.setdefault(frozenset(joints), []).append((start, joints, message.points))
 
     def fields(self) -> Iterator[Field]:
         """Fields of the points; a new trajectory replaces the rest of the previous one."""
-        for plans in self.joints.values():
+        for plans in self._plans.values():
             joints, rows = plans[0][1], []
-            starts = [start for start, _, _ in plans[1:]]
-            for (start, names, points), stop in zip(plans, [*starts, 2**63], strict=True):
+            stops = [*(start for start, _, _ in plans[1:]), 2**63]
+            for (start, names, points), stop in zip(plans, stops, strict=True):
                 order = [names.index(joint) for joint in joints]
-                for point in points:
-                    at = start + nanoseconds(point.time_from_start)
-                    if at < stop:
-                        rows.append((at, order, point))
+                times = [start + _nanoseconds(point.time_from_start) for point in points]
+                rows += [(t, order, p) for t, p in zip(times, points, strict=True) if t < stop]
             stamps = Stamps.of_nanoseconds(np.array([at for at, _, _ in rows]), held=True)
             for name, signal in (("positions", "position"), ("velocities", "velocity")):
                 if all(len(getattr(point, name)) == len(joints) for _, _, point in rows):
-                    values = np.array([getattr(point, name)[order] for _, order, point in rows])
                     yield Field(
-                        f"{self.topic}/{name}",
-                        values,
+                        f"{self._topic}/{name}",
+                        np.array([getattr(point, name)[order] for _, order, point in rows]),
                         stamps,
                         joints=joints,
                         signal=f"{signal}_desired",
-                        source=self.topic,
+                        source=self._topic,
                         rank=2,
                     )
 
 
 class Descriptions:
-    """``std_msgs/String``: the robot's URDF."""
+    """``std_msgs/String``: the robot's URDF, the last that holds one."""
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self.decode = decoder(path, topic, ros1=ros1)
+        self._decode = decoder(path, topic, ros1=ros1)
         self.urdf = ""
 
     def add(self, received: int, data: bytes) -> None:
-        """Add a message; the last one that holds a URDF is used."""
-        text = str(self.decode(data).data)
+        """Add a message."""
+        text = str(self._decode(data).data)
         if "<robot" in text:
             self.urdf = text
 
-    def fields(self) -> Iterator[Field]:
+    def fields(self) -> Sequence[Field]:
         """No fields: a URDF has no motion."""
-        return iter(())
+        return ()
 
 
 TopicReader: TypeAlias = MotionReader | Trajectories | Descriptions
@@ -489,9 +442,6 @@ TOPIC_READERS: Mapping[str, type[MotionReader] | type[Trajectories]] = {
     **dict.fromkeys(("nav_msgs/msg/Odometry", *TRANSFORMS), MotionReader),
 }
 """Readers by the type of messages."""
-
-DESCRIPTION = "robot_description"
-"""The last part of the name of the topic with a robot's URDF."""
 
 
 def topic_reader(path: Path, topic: Topic, *, ros1: bool) -> TopicReader | None:
