@@ -28,7 +28,7 @@ from inspector.library import (
     load_library,
 )
 from inspector.localisation.extent import extent
-from inspector.logs.hold import without_hold
+from inspector.logs.clocks import without_hold
 from inspector.logs.read import Opened, open_run
 from noiseclassifier import Event
 from noiseclassifier.lasting import HOP as LASTING_HOP

@@ -9,7 +9,7 @@ import numpy as np
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.errors import InspectorError
-from inspector.logs.hold import without_hold
+from inspector.logs.clocks import without_hold
 from noiseclassifier.profile import NOMINAL
 from noisemodel.files import also_reading
 from noisemodel.run import pieces_of

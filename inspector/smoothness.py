@@ -29,7 +29,7 @@ from inspector.analysis import analyse
 from inspector.audit.signals import without_placeholder
 from inspector.errors import InspectorError, Status, without_path
 from inspector.library import Library
-from inspector.logs.hold import hold_length, without_hold
+from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.report.picture import require
 from inspector.text import cell, counted
@@ -299,7 +299,7 @@ def _action(run: Run, part: slice) -> tuple[Array, str] | None:
         quantity = "velocities"
     else:
         return None
-    held = round(hold_length(action, np.ones(len(action), dtype=bool)))
+    held = round(hold_length(action))
     if held < 2:
         return action, quantity
     changes = np.flatnonzero((action[1:] != action[:-1]).any(axis=1)) + 1

@@ -11,7 +11,7 @@ from inspector.audit.signals import (
     spectrum,
     step_of,
 )
-from inspector.logs.hold import hold_length
+from inspector.logs.clocks import hold_length
 from noisemodel import Run
 
 RATES = [200.0, 1000.0, 10_000.0]

@@ -15,7 +15,7 @@ from inspector.analysis import analyse
 from inspector.audit.audit import Observability, audit
 from inspector.errors import Status
 from inspector.library import CannotTellError, label_run, signals_of
-from inspector.logs.hold import without_hold
+from inspector.logs.clocks import without_hold
 from inspector.report.markdown import report
 from inspector.training.train import classified
 

@@ -5,7 +5,7 @@ import pytest
 from samplelogs import motion
 
 from inspector import read_log
-from inspector.logs.hold import updates
+from inspector.logs.clocks import updates
 
 RATE, SAMPLES = 500, 4000
 TIME = np.arange(SAMPLES) / RATE

@@ -15,7 +15,7 @@ from numpy.lib import format as npy
 import noiseclassifier as nc
 from inspector.analysis import analyse
 from inspector.library import load_library, signal_names, signals_of
-from inspector.logs.hold import hold_length, without_hold
+from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.read import open_run
 from inspector.verdict import Verdict
 from noisemodel import Run, RunError, RunFileError, decimated, runfile

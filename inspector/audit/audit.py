@@ -30,7 +30,7 @@ import noiseclassifier as nc
 from inspector.audit.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library, for_robot, nearest, signals_of
-from inspector.logs.hold import hold_length, without_hold
+from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.read import Reading, left_out, open_source, sources
 from inspector.logs.wrongrobot import check_joints, limit_warnings
 from inspector.text import counted, plain

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector.logs.hold import hold_length
+from inspector.logs.clocks import hold_length
 from inspector.logs.motion import contradictions
 from noiseclassifier import LogBands
 from noisemodel import Run

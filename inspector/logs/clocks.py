@@ -3,10 +3,11 @@
 Stamps of separate clocks are aligned by cross-correlation of the desired and the measured
 velocities of the same joints, which gives the offset; residual offsets of short segments give the
 drift. An offset below ``LAG`` is attributed to the controller, not to the clocks.
+A zero-order hold is a slow signal that was sampled faster by holding its values.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from itertools import pairwise
 from math import log
@@ -20,7 +21,9 @@ from inspector.errors import LogError
 from inspector.logs.log import SAMPLES, UNIFORM, Stamps, Track
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import TIME_UNITS, time_column, without_unit
-from noisemodel.run import continuous_quaternions, resample
+from noisemodel import Run
+from noisemodel.run import SAMPLED, continuous_quaternions, resample
+from noisemodel.runfile import OnDemand, pieces
 from noisemodel.types import Array, Indices, Mask, Real
 
 UNITS = {"seconds": "1", "milliseconds": "1e-3", "microseconds": "1e-6", "nanoseconds": "1e-9"}
@@ -33,8 +36,6 @@ NEARLY = 4.0
 """Two units are ambiguous if a rate is within this factor of the ends of ``RATES``."""
 EPOCH = (9e8, 5e9)
 """Time since 1970, from 1998 to 2128, by which absolute stamps tell their unit, in [s]."""
-LATEST = 2**62
-"""Stamps lie before, in [ns]; differences of later ones are no 64-bit integers."""
 
 COMMON_RATES = (
     *(10, 15, 20, 24, 25, 30, 40, 50, 60, 80, 90, 100, 120, 125, 150, 200, 240, 250, 300, 333),
@@ -55,9 +56,7 @@ BLOCK = 500_000
 """Values that are interpolated at once, which takes about ten times their memory."""
 
 
-def unit_of(
-    path: Path, steps: NDArray[Any], rate: float | None, *, name: str = "", first: float = 0.0
-) -> str:
+def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | None) -> str:
     """Unit of stamps: by their column's name, the epoch, the log's rate, or their median step."""
     known = TIME_UNITS.get(without_unit(name)[1], "")
     start = {unit: first * float(UNITS[unit]) for unit in UNITS}
@@ -137,17 +136,11 @@ def stamps_since(
     rows: Sequence[int] | None = None,
 ) -> Stamps:
     """Stamps from the first one, exact, and the differences to it, shape (samples,)."""
-    unit = unit_of(path, np.diff(since), rate, name=name, first=float(first))
+    unit = _unit_of(path, name, float(first), np.diff(since), rate)
     if unit == SAMPLES:
         return Stamps(Decimal(0), since, rows, unit, name=name)
-    size = UNITS[unit]
-    return Stamps(
-        start=first * Decimal(size),
-        time=since if unit == "seconds" else since * float(size),
-        rows=rows,
-        unit=unit,
-        name=name,
-    )
+    time = since if unit == "seconds" else since * float(UNITS[unit])
+    return Stamps(first * Decimal(UNITS[unit]), time, rows, unit, name=name)
 
 
 def counted_stamps(
@@ -230,7 +223,7 @@ def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], dic
     """
     kept: dict[int, tuple[Stamps, Mask]] = {}
     counts = {"duplicates": 0, "backward": 0}
-    first = 0.0
+    first: float | None = None
     for track in {id(track.stamps): track for track in tracks}.values():
         stamps, time = track.stamps, track.stamps.time
         latest = np.maximum.accumulate(time)
@@ -245,27 +238,24 @@ def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], dic
                 how = "stands still" if after == before else "runs backwards"
                 raise track.fault(path, f"time {how}: {after} comes after {before}", int(wrong[0]))
             duplicates = int(np.sum(time[wrong] == latest[wrong - 1]))
-            first = first if any(counts.values()) else float(latest[wrong[0] - 1])
             counts["duplicates"] += duplicates
             counts["backward"] += len(wrong) - duplicates
+            first = float(latest[wrong[0] - 1]) if first is None else first
             rows = None if stamps.rows is None else np.asarray(stamps.rows)[keep].tolist()
             stamps = replace(stamps, time=time[keep], rows=rows)
         kept[id(track.stamps)] = stamps, keep
-    if not any(counts.values()):
+    if first is None:
         return tuple(tracks), {}, ""
     found = []
     for track in tracks:
         stamps, keep = kept[id(track.stamps)]
         missing = None if track.missing is None else track.missing[keep]
         found.append(replace(track, stamps=stamps, values=track.values[keep], missing=missing))
-    return (
-        tuple(found),
-        counts,
-        (
-            f"{counts['duplicates']} duplicate and {counts['backward']} backward stamps left out,"
-            f" the first {first:.6g} s into the log"
-        ),
+    remark = (
+        f"{counts['duplicates']} duplicate and {counts['backward']} backward stamps left out,"
+        f" the first {first:.6g} s into the log"
     )
+    return tuple(found), counts, remark
 
 
 # Signals on one uniform time base
@@ -320,7 +310,7 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
     if track.signal == "base_pose":
         pose = np.asarray(track.values, dtype=np.float64)
         pose = np.hstack((pose[:, :3], continuous_quaternions(pose[:, 3:])))
-        found = _pchip(instants, track.stamps, pose, slack)
+        found = _between(instants, track.stamps, pose, slack)
         length = np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
         found[:, 3:] /= np.where(length > 0, length, 1.0)
     else:
@@ -332,7 +322,7 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
             angles = track.angles[part]
             if any(angles):
                 values = np.where(angles, np.unwrap(values, axis=0), values)
-            found[:, part] = _pchip(instants, track.stamps, values, slack)
+            found[:, part] = _between(instants, track.stamps, values, slack)
     found[~valid] = 0.0
     return found
 
@@ -352,9 +342,9 @@ def _beside(instants: Array, stamps: Stamps, missing: Mask, slack: float) -> Mas
     return np.asarray(missing[after] | (between & missing[np.maximum(after - 1, 0)]))
 
 
-def _pchip(instants: Array, stamps: Stamps, values: Real, slack: float) -> Array:
-    between = stamps.clock.stretches
-    return resample(stamps.time, values, instants, between=between, slack=slack)[0]
+def _between(instants: Array, stamps: Stamps, values: Real, slack: float) -> Array:
+    gaps = stamps.clock.stretches
+    return resample(stamps.time, values, instants, between=gaps, slack=slack)[0]
 
 
 # Two clocks
@@ -378,46 +368,9 @@ SIGNIFICANT = 5.0
 LEAST_DRIFT = 20e-6
 """Least drift that is distinguished from none, as of quartz clocks, in [s/s]."""
 
-CONFIDENCE = f"{CORRELATION:g} or more, the next best at most {NEXT_BEST:.0%} of it"
+EXPECTED = f"expected {CORRELATION:g} or more, the next best at most {NEXT_BEST:.0%} of it"
 """Condition on the correlation for an estimated offset to be used."""
 HOW = "specify --offset SECONDS, which is added to the desired stamps"
-
-
-@dataclass(frozen=True)
-class Offset:
-    """Offset of the desired clock to the measured one: t_measured = t + seconds + drift t.
-
-    Attributes:
-        seconds: Offset at the first desired stamp, in [s].
-        drift: Change of the offset per second, in [s/s].
-        correlation: Normalised correlation at this offset, at most 1.
-        next_best: Normalised correlation at the next best offset.
-        span: Duration of the desired log, in [s].
-    """
-
-    seconds: float
-    drift: float = 0.0
-    correlation: float = 1.0
-    next_best: float = 0.0
-    span: float = 0.0
-
-    @property
-    def is_unambiguous(self) -> bool:
-        """Whether the correlation is high, and at no other offset nearly as high."""
-        return self.correlation >= CORRELATION and self.next_best <= NEXT_BEST * self.correlation
-
-    @property
-    def exceeds_lag(self) -> bool:
-        """Whether it is larger than a controller's lag."""
-        ends = (self.seconds, self.seconds + self.drift * self.span)
-        return bool(self.drift) or max(map(abs, ends)) > LAG
-
-    def __str__(self) -> str:
-        drift = f", drift {self.drift * 1e6:+.0f} ppm" if self.drift else ""
-        return (
-            f"offset {self.seconds:+.4f} s{drift} (correlation {self.correlation:.2f}, next best"
-            f" {self.next_best:.2f})"
-        )
 
 
 def synchronise(
@@ -427,9 +380,12 @@ def synchronise(
     *,
     rate: float | None = None,
     offset: float | None = None,
-) -> tuple[tuple[Track, ...], str, Offset | None]:
-    """Tracks on the clock of the measured motion, whose time starts at 0."""
-    measured = {id(track.stamps) for track in tracks if not track.is_desired}
+) -> tuple[tuple[Track, ...], str, dict[str, float]]:
+    """Tracks on the clock of the measured motion, whose time starts at 0.
+
+    The result has a remark, and by how much the desired clock was shifted, if it was:
+    t_measured = t + seconds + drift t.
+    """
     start = main.stamps.start
     clocks = {
         id(track.stamps): replace(
@@ -440,35 +396,48 @@ def synchronise(
         )
         for track in tracks
     }
-    others = [track for track in tracks if id(track.stamps) not in measured]
-    main_time = clocks[id(main.stamps)].time
     clocked = tuple(replace(track, stamps=clocks[id(track.stamps)]) for track in tracks)
-    own = [clocks[key] for key in dict.fromkeys(id(track.stamps) for track in others)]
+    measured = {id(track.stamps) for track in tracks if not track.is_desired}
+    others = [track.stamps for track in tracks if id(track.stamps) not in measured]
+    own = [clocks[key] for key in dict.fromkeys(map(id, others))]
+    main_time = clocks[id(main.stamps)].time
     if all(np.array_equal(stamps.time, main_time) for stamps in own):
-        return clocked, "", None
+        return clocked, "", {}
+    drift, said = 0.0, ""
     if offset is not None:
-        given = Offset(offset)
-        return _shifted(clocked, own, given), f"offset {offset:+g} s, as given", given
-    desired = {each.quantity: each for each in reversed(clocked) if each.stamps in own}
-    found = estimate({t.signal: t for t in reversed(clocked) if not t.is_desired}, desired)
-    overlap = own[0].time[0] <= main_time[-1] and main_time[0] <= own[0].time[-1]
-    if found is None or not found.is_unambiguous:
-        if not overlap:
-            why = "no joint moves in both"
-            if found is not None:
-                why = f"the offset cannot be estimated ({found}; expected {CONFIDENCE})"
-            problem = no_overlap(others[0].stamps, main.stamps)
-            raise LogError(path, f"{problem}, and {why}; {HOW}")
-        if found is None:
-            return clocked, "", None
-        remark = (
-            f"its clock is assumed to be the measured one's, since the offset cannot be estimated"
-            f" ({found}; expected {CONFIDENCE}); {HOW}"
+        seconds, said = offset, f"offset {offset:+g} s, as given"
+    else:
+        found = _estimate(
+            {track.signal: track for track in reversed(clocked) if not track.is_desired},
+            {track.quantity: track for track in reversed(clocked) if track.stamps in own},
         )
-        return clocked, remark, None
-    if not found.exceeds_lag:
-        return clocked, f"{found}: a controller's lag, the stamps are not changed", None
-    return _shifted(clocked, own, found), f"{found}: its stamps are shifted by that", found
+        overlap = own[0].time[0] <= main_time[-1] and main_time[0] <= own[0].time[-1]
+        problem = f"{no_overlap(others[0], main.stamps)}, and "
+        if found is None and not overlap:
+            raise LogError(path, f"{problem}no joint moves in both; {HOW}")
+        if found is None:
+            return clocked, "", {}
+        seconds, drift, correlation, next_best = found
+        said = (
+            f"offset {seconds:+.4f} s{f', drift {drift * 1e6:+.0f} ppm' if drift else ''}"
+            f" (correlation {correlation:.2f}, next best {next_best:.2f})"
+        )
+        if correlation < CORRELATION or next_best > NEXT_BEST * correlation:
+            unknown = f"the offset cannot be estimated ({said}; {EXPECTED})"
+            if not overlap:
+                raise LogError(path, f"{problem}{unknown}; {HOW}")
+            assumed = "its clock is assumed to be the measured one's, since"
+            return clocked, f"{assumed} {unknown}; {HOW}", {}
+        if not drift and abs(seconds) <= LAG:
+            return clocked, f"{said}: a controller's lag, the stamps are not changed", {}
+        said += ": its stamps are shifted by that"
+    first = min(float(stamps.time[0]) for stamps in own)
+    moved = {
+        id(each): replace(each, time=each.time + seconds + drift * (each.time - first))
+        for each in own
+    }
+    shifted = (replace(t, stamps=moved.get(id(t.stamps), t.stamps)) for t in clocked)
+    return tuple(shifted), said, {"seconds": seconds, "drift": drift}
 
 
 def no_overlap(desired: Stamps, measured: Stamps) -> str:
@@ -481,21 +450,13 @@ def no_overlap(desired: Stamps, measured: Stamps) -> str:
     return f"{span(desired)} do not overlap with {span(measured)}"
 
 
-def _shifted(
-    tracks: Sequence[Track], clocks: Sequence[Stamps], offset: Offset
-) -> tuple[Track, ...]:
-    first = min(float(stamps.time[0]) for stamps in clocks)
-    moved = {
-        id(each): replace(
-            each, time=each.time + offset.seconds + offset.drift * (each.time - first)
-        )
-        for each in clocks
-    }
-    return tuple(replace(t, stamps=moved.get(id(t.stamps), t.stamps)) for t in tracks)
+def _estimate(
+    measured: Mapping[str, Track], desired: Mapping[str, Track]
+) -> tuple[float, float, float, float] | None:
+    """Offset in [s] and drift in [s/s] of the desired clock, and two normalised correlations.
 
-
-def estimate(measured: Mapping[str, Track], desired: Mapping[str, Track]) -> Offset | None:
-    """Offset of the desired clock to the measured one; None if no joint moves in both."""
+    These are the one at this offset, and the one at the next best. None if no joint moves in both.
+    """
     pair = _common_tracks(measured, desired)
     if pair is None:
         return None
@@ -503,13 +464,28 @@ def estimate(measured: Mapping[str, Track], desired: Mapping[str, Track]) -> Off
     joints = [joint for joint in pair[0].joints if joint in pair[1].joints]
     one, other = (_velocities(track, joints) for track in pair)
     seconds, correlation, next_best = _search(one, other, min(rate, COARSE_RATE))
-    drift, times = 0.0, pair[1].stamps.time
+    drift = 0.0
     for _ in range(3):
         residuals = _residuals(one, other, seconds, drift, rate)
         if not len(residuals):
             break
         seconds, drift = _fitted(residuals, seconds, drift)
-    return Offset(seconds, drift, correlation, next_best, span=float(times[-1] - times[0]))
+    return seconds, drift, correlation, next_best
+
+
+def _common_tracks(
+    measured: Mapping[str, Track], desired: Mapping[str, Track]
+) -> tuple[Track, Track] | None:
+    """A measured and a desired track with a joint that moves in both, preferably velocities."""
+    for one in ("velocity", "position"):
+        for other in (one, "velocity", "position"):
+            first, second = measured.get(one), desired.get(other)
+            if first is None or second is None:
+                continue
+            for joint in set(first.joints) & set(second.joints):
+                if all(np.ptp(track.of([joint])) > 0 for track in (first, second)):
+                    return first, second
+    return None
 
 
 def _velocities(track: Track, joints: Sequence[str]) -> Track:
@@ -529,21 +505,6 @@ def _at(motion: Track, instants: Array) -> Array:
         for joint, values in enumerate(motion.values[stretch].T):
             found[part, joint] = np.interp(instants[part], known, values)
     return found
-
-
-def _common_tracks(
-    measured: Mapping[str, Track], desired: Mapping[str, Track]
-) -> tuple[Track, Track] | None:
-    """A measured and a desired track with a joint that moves in both, preferably velocities."""
-    for one in ("velocity", "position"):
-        for other in (one, "velocity", "position"):
-            first, second = measured.get(one), desired.get(other)
-            if first is None or second is None:
-                continue
-            for joint in set(first.joints) & set(second.joints):
-                if all(np.ptp(track.of([joint])) > 0 for track in (first, second)):
-                    return first, second
-    return None
 
 
 def _search(measured: Track, desired: Track, rate: float) -> tuple[float, float, float]:
@@ -646,3 +607,96 @@ def _fitted(residuals: Array, seconds: float, drift: float) -> tuple[float, floa
         if abs(slope) > max(SIGNIFICANT * error, LEAST_DRIFT):
             return seconds + float(constant), float(slope)
     return seconds + float(np.average(total, weights=weight)), 0.0
+
+
+# A hold: slow signals that were sampled faster
+
+FEWEST = 10
+"""Fewest jumps that show a hold."""
+REGULAR = 0.8
+"""Least share of the jumps that come at the median distance."""
+ALIGNED = 0.99
+"""Least share of the jumps that come a multiple of the hold after each other."""
+EXAMINED = 100_000
+"""Jumps whose size is examined, evenly spread, or a few more."""
+LARGER = 1.5
+"""Least ratio of median to smallest jump: jumps of one size are quantisation."""
+
+
+def hold_length(signal: Real, valid: Mask | None = None) -> float:
+    """Length of the zero-order hold of a signal, in samples; ``valid`` is False in gaps."""
+    return _hold(signal, valid)[0]
+
+
+def updates(signal: Real, valid: Mask | None = None) -> Indices | None:
+    """Samples at which the values of a signal with a zero-order hold were set; None without one.
+
+    They come at the distance of the hold also where a value was set to what it was before; the
+    first may be negative, as the first value was set before the first sample.
+    """
+    hold, changed = _hold(signal, valid)
+    if hold <= 1:
+        return None
+    jumps = np.flatnonzero(changed)
+    first = jumps[0] + 1
+    changes = [first - hold * np.ceil(first / hold), *(jumps + 1), len(signal)]
+    found = [
+        start + hold * np.arange(max(1, round((stop - start) / hold)))
+        for start, stop in pairwise(changes)
+    ]
+    return np.round(np.concatenate(found)).astype(np.int64)
+
+
+def without_hold(run: Run) -> Run:
+    """The run at the rate of its values: one of each n samples, if each value is there n times."""
+    hold, changed = _hold(run.velocity, run.mask)
+    count = round(hold)
+    if count < 2 or abs(hold - count) > 1e-3:
+        return run
+    jumps = np.flatnonzero(changed)
+    phases = np.bincount((jumps + 1) % count, minlength=count)
+    first = int(phases.argmax())
+    if phases[first] < ALIGNED * len(jumps) or len(run.time) <= first + count:
+        return run
+
+    def every(signal: Any) -> Any:
+        if signal is None:
+            return None
+        if not isinstance(signal, OnDemand):
+            return np.ascontiguousarray(signal[first::count])
+        rows = range(first, len(signal), count)
+        kept = OnDemand(
+            (len(rows), *signal.shape[1:]),
+            signal.dtype,
+            lambda start, stop: signal[first + count * start : first + count * stop : count],
+        )
+        kept.checked = signal.checked
+        return kept
+
+    fields: dict[str, Any] = {name: every(getattr(run, name)) for name in SAMPLED}
+    return replace(run, **fields, stages={name: every(each) for name, each in run.stages.items()})
+
+
+def _hold(signal: Real, valid: Mask | None) -> tuple[float, Mask]:
+    """Length of a hold, 1 without, and whether the next sample is another one, outside of gaps."""
+    changed = np.ones(len(signal) - 1, dtype=bool) if valid is None else valid[1:] & valid[:-1]
+    for rows in pieces(signal):
+        part = signal[rows.start : rows.stop + 1]
+        changed[rows.start : rows.stop] &= (part[1:] != part[:-1]).any(axis=1)
+    count = np.count_nonzero(changed)
+    # With more pairs of jumps than that, their median distance is less than 2.
+    if count < FEWEST or 2 * np.count_nonzero(changed[1:] & changed[:-1]) >= count - 1:
+        return 1.0, changed
+    jumps = np.flatnonzero(changed)
+    distances = np.diff(jumps)
+    middle = np.median(distances)
+    regular = np.abs(distances - middle) <= max(1.0, 0.1 * middle)
+    if regular.mean() < REGULAR:
+        return 1.0, changed
+    jumps = jumps[:: max(1, len(jumps) // EXAMINED)]
+    sizes = np.abs(signal[jumps + 1].astype(np.float64) - signal[jumps])
+    sizes = np.where(sizes > 0, sizes, np.nan)
+    sizes = sizes[:, ~np.isnan(sizes).all(axis=0)]
+    if (np.nanmedian(sizes, axis=0) < LARGER * np.nanmin(sizes, axis=0)).all():
+        return 1.0, changed  # each joint jumps by one quantisation step
+    return float(distances[regular].mean()), changed

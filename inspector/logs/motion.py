@@ -15,15 +15,15 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs.clocks import (
-    Offset,
     common_time,
     counted_stamps,
+    hold_length,
     no_overlap,
     ordered,
     resampled,
     synchronise,
+    updates,
 )
-from inspector.logs.hold import hold_length, updates
 from inspector.logs.log import SAMPLES, UNIFORM, Log, Stamps, Track
 from inspector.logs.mapping import ReadOptions, tracks_of
 from inspector.logs.names import listed
@@ -510,7 +510,7 @@ def _joined(track: Track, measured: float) -> Track | None:
     from scipy.interpolate import Akima1DInterpolator
 
     values = np.asarray(track.values, dtype=np.float64)
-    places = updates(values, np.ones(len(values), dtype=bool))
+    places = updates(values)
     if places is None or _hold(track) < SLOWER * measured:
         return None
     places = places[places < len(values)]
@@ -541,8 +541,7 @@ def _evenly(places: Indices) -> Array:
 
 
 def _hold(track: Track) -> float:
-    values = np.asarray(track.values)
-    return hold_length(values, np.ones(len(values), dtype=bool))
+    return hold_length(np.asarray(track.values))
 
 
 # The run
@@ -649,7 +648,7 @@ def _main(log: Log, options: ReadOptions) -> Track:
 
 
 def _meta(
-    logs: Sequence[Log], own: Stamps, start: Decimal, offset: Offset | None
+    logs: Sequence[Log], own: Stamps, start: Decimal, offset: Mapping[str, float]
 ) -> dict[str, Any]:
     meta: dict[str, Any] = {
         **{key: value for log in logs for key, value in log.meta.items() if key != "stamps"},
@@ -661,7 +660,7 @@ def _meta(
     if unordered:
         meta["stamps"] = {key: sum(each[key] for each in unordered) for key in unordered[0]}
     if offset:
-        meta["offset"] = {"seconds": offset.seconds, "drift": offset.drift}
+        meta["offset"] = dict(offset)
     return meta
 
 

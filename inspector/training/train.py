@@ -15,7 +15,7 @@ from inspector.analysis import extents
 from inspector.audit.signals import without_placeholder
 from inspector.colors import SERIES, Color, of_classes
 from inspector.errors import InspectorError, OptionError
-from inspector.logs.hold import without_hold
+from inspector.logs.clocks import without_hold
 from inspector.logs.wrongrobot import check_joints
 from inspector.report.picture import require as require
 from inspector.text import counted, progress
