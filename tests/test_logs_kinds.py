@@ -18,7 +18,7 @@ from samplelogs import Talk, joint_states, write_bag, write_lerobot
 from inspector import read_log
 from inspector.errors import InspectorError
 from inspector.logs.mapping import read_options
-from inspector.logs.motion import contradictions
+from inspector.logs.plausibility import contradictions
 
 DEG = 180 / np.pi
 

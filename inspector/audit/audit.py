@@ -31,8 +31,8 @@ from inspector.audit.signals import Bandwidth, bandwidth, copies, placeholder, u
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library, for_robot, nearest, signals_of
 from inspector.logs.clocks import hold_length, without_hold
+from inspector.logs.plausibility import check_joints, limit_warnings
 from inspector.logs.read import Reading, left_out, open_source, sources
-from inspector.logs.wrongrobot import check_joints, limit_warnings
 from inspector.text import counted, plain
 from noiseclassifier import Profile
 from noiseclassifier.profile import FEWEST, HIGHEST, LOWEST

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.logs.clocks import hold_length
-from inspector.logs.motion import contradictions
+from inspector.logs.plausibility import contradictions
 from noiseclassifier import LogBands
 from noisemodel import Run
 from noisemodel.run import ORDER, WINDOW, stretches

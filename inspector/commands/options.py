@@ -274,7 +274,7 @@ def one_at_a_time(reading: "Reading", runs: int) -> None:
 
 def say_warnings(run: "Run") -> None:
     """Print what hints at another robot than the run names on standard error."""
-    from inspector.logs.wrongrobot import check_joints, limit_warnings
+    from inspector.logs.plausibility import check_joints, limit_warnings
 
     check_joints(run.joint_names, run.robot)
     for warning in limit_warnings(run):

@@ -29,7 +29,7 @@ from inspector.live.samples import (
     widths_of,
 )
 from inspector.live.sink import LATE, Sink
-from inspector.logs.wrongrobot import LONG, LimitWatch, check_joints
+from inspector.logs.plausibility import LONG, LimitWatch, check_joints
 from inspector.recording.unstable import Camera
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from noiseclassifier import Event, merged

@@ -27,11 +27,10 @@ from inspector.logs.names import (
     other_quantity,
     pattern_for,
 )
-from inspector.logs.wrongrobot import WrongRobotError
+from inspector.logs.plausibility import WrongRobotError, known_limits
 from noiseclassifier.jsontext import from_toml, text_of, toml_shown
-from noisemodel import Robot, RobotError
+from noisemodel import Robot
 from noisemodel.files import replacing
-from noisemodel.robot import joint_limits
 from noisemodel.types import Array, Mask, Real
 
 FORMAT = "noise-mapping/1"
@@ -104,10 +103,7 @@ class ReadOptions:
     @property
     def known_joints(self) -> tuple[str, ...]:
         """Names that a log's joints may have: the robot's."""
-        try:
-            return tuple(joint_limits(self.robot)) if self.robot else ()
-        except RobotError:
-            return ()
+        return tuple(known_limits(self.robot or None)[0])
 
     def for_columns(self, path: Path, names: Sequence[str]) -> "ReadOptions":
         """Options whose patterns are replaced by the columns that they fit."""

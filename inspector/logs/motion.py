@@ -63,22 +63,21 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
     path = log.path
     if log.units and not options.units:
         raise LogError(path, log.units)
-    tracks, not_read, found = tracks_of(log, options, robot)
-    remarks = [*log.remarks, *found]
-    _refuse_quaternion(path, tracks, options)
-    tracks = _at_rate(path, tracks, options)
-    tracks = _with_two_samples(path, tracks, remarks)
-    tracks = tuple(_finite(path, _believable(path, tracks, remarks), remarks))
+    found, not_read, told = tracks_of(log, options, robot)
+    remarks = [*log.remarks, *told]
+    _refuse_quaternion(path, found, options)
+    tracks = _with_two_samples(path, _in_seconds(path, found, options), remarks)
+    tracks = [t for each in tracks if (t := _finite(path, each, remarks)) is not None]
     tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks)
-    tracks, unordered, order = ordered(path, tracks)
-    tracks = _without_frozen(tracks, remarks)
+    increasing, unordered, order = ordered(path, tracks)
+    tracks = _without_frozen(increasing, remarks)
     return replace(
         log,
         fields=(),
-        tracks=tracks,
+        tracks=tuple(tracks),
         names=(*(each.name for each in log.fields), *log.not_read),
         not_read=not_read,
-        remarks=((order,) if order else ()) + tuple(remarks),
+        remarks=(*([order] if order else []), *remarks),
         meta={
             **log.meta,
             **({"units": options.units} if options.units else {}),
@@ -103,7 +102,7 @@ def _refuse_quaternion(path: Path, tracks: Sequence[Track], options: ReadOptions
                 )
 
 
-def _at_rate(path: Path, tracks: Sequence[Track], options: ReadOptions) -> tuple[Track, ...]:
+def _in_seconds(path: Path, tracks: Sequence[Track], options: ReadOptions) -> list[Track]:
     """Tracks whose stamps are in seconds, where they counted samples."""
     by_signal = {track.signal: track for track in reversed(tracks)}
     position, velocity = by_signal.get("position"), by_signal.get("velocity")
@@ -112,19 +111,18 @@ def _at_rate(path: Path, tracks: Sequence[Track], options: ReadOptions) -> tuple
         shared = [joint for joint in position.joints if joint in velocity.joints]
         values = (position.of(shared), velocity.of(shared)) if shared else values
     timed = {
-        id(stamps): counted_stamps(path, stamps, options, values[0], values[1])
+        id(stamps): counted_stamps(path, stamps, options, *values)
         for stamps in {id(track.stamps): track.stamps for track in tracks}.values()
         if stamps.unit == SAMPLES
     }
-    return tuple(replace(t, stamps=timed.get(id(t.stamps), t.stamps)) for t in tracks)
+    return [replace(t, stamps=timed.get(id(t.stamps), t.stamps)) for t in tracks]
 
 
-def _with_two_samples(path: Path, tracks: Sequence[Track], remarks: list[str]) -> tuple[Track, ...]:
-    long_enough = tuple(track for track in tracks if len(track.values) > 1)
+def _with_two_samples(path: Path, tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
+    long_enough = [track for track in tracks if len(track.values) > 1]
     if not any(track.joints for track in long_enough):
         raise LogError(path, "1 sample; a run needs at least 2")
-    once = [label for track in tracks if len(track.values) < 2 for label in track.labels]
-    if once:
+    if once := [label for track in tracks if len(track.values) < 2 for label in track.labels]:
         remarks.append(f"logged once only, left out: {listed(once)}")
     return long_enough
 
@@ -137,70 +135,74 @@ FEW = 0.1
 """Largest share of samples that may hold such values; a desired motion may run away to the end."""
 
 
-def _believable(path: Path, tracks: Sequence[Track], remarks: list[str]) -> Iterator[Track]:
-    """Tracks in which nan takes the place of values that no unit explains."""
-    for track in tracks:
-        # Numbers of 16 bits cannot hold the limits that they are compared with.
-        values = np.abs(track.values).astype(np.result_type(track.values, np.float32), copy=False)
-        if (
-            track.quantity not in LARGEST
-            or not (far := np.isfinite(values) & (values > ABSURD)).any()
-        ):
-            yield track
-            continue
-        sample, column = (int(each) for each in np.argwhere(far)[0])
-        what = (
-            f"column {track.labels[column]!r} holds {track.values[sample, column]:.3g}, no"
-            f" {track.quantity} in any unit"
-        )
-        if not track.is_desired and far.any(axis=1).mean() > FEW:
-            raise track.fault(path, f"{what}; name the columns to read (--map)", sample)
-        runaway = far.any(axis=0) & (values > LARGEST[track.quantity])
-        remarks.append(
-            f"{what}: {counted(int(runaway.any(axis=1).sum()), 'sample')} of"
-            f" {track.signal.replace('_', ' ')} left out"
-        )
-        yield replace(track, values=np.where(runaway, np.nan, track.values))
-
-
-def _finite(path: Path, tracks: Iterator[Track], remarks: list[str]) -> Iterator[Track]:
-    """Tracks without columns that are nan throughout, and with gaps where others are nan."""
-    for track in tracks:
-        if np.isfinite(track.values).all():
-            yield track
-            continue
-        lacking = np.isnan(track.values)
-        infinite = np.argwhere(np.isinf(track.values))
-        if len(infinite):
-            sample, column = map(int, infinite[0])
-            value = track.values[sample, column]
-            raise track.fault(path, f"column {track.labels[column]!r} holds {value}", sample)
-        empty = np.atleast_1d(lacking.all(axis=0))
-        if empty.any():
-            names = [label for label, is_nan in zip(track.labels, empty, strict=True) if is_nan]
-            remarks.append(f"all nan, left out: {listed(names)}")
-            kept = np.flatnonzero(~empty)
-            if not len(kept) or not track.joints:
-                continue
-            track = _columns(track, kept.tolist())
-            lacking = lacking[:, kept]
-        yield _with_gaps(track, lacking, remarks) if lacking.any() else track
-
-
-def _with_gaps(track: Track, lacking: Mask, remarks: list[str]) -> Track:
-    """Track whose samples with nan are missing, and interpolated lest they spoil others."""
-    missing: Mask = np.asarray(lacking.any(axis=1))
-    some = np.atleast_1d(lacking.any(axis=0)).tolist()
-    labels = [label for label, any_ in zip(track.labels, some, strict=True) if any_]
+def _finite(path: Path, track: Track, remarks: list[str]) -> Track | None:
+    """Track with gaps where it holds no number, or one that no unit explains; None without any."""
+    track = _believable(path, track, remarks)
+    if np.isfinite(track.values).all():
+        return track
+    lacking = np.isnan(track.values)
+    infinite = np.argwhere(np.isinf(track.values))
+    if len(infinite):
+        sample, column = map(int, infinite[0])
+        value = track.values[sample, column]
+        raise track.fault(path, f"column {track.labels[column]!r} holds {value}", sample)
+    empty = np.atleast_1d(lacking.all(axis=0))
+    if empty.any():
+        remarks.append(f"all nan, left out: {listed(_chosen(track.labels, empty))}")
+        kept = np.flatnonzero(~empty)
+        if not len(kept) or not track.joints:
+            return None
+        track, lacking = _columns(track, kept.tolist()), lacking[:, kept]
+    if not lacking.any():
+        return track
+    missing = np.atleast_1d(lacking.any(axis=1))
+    labels = dict.fromkeys(_chosen(track.labels, np.atleast_1d(lacking.any(axis=0))))
     first = track.stamps.time[np.argmax(missing)] - track.stamps.time[0]
     remarks.append(
         f"{counted(int(missing.sum()), 'sample')} without a number, marked as"
-        f" not valid: {listed(list(dict.fromkeys(labels)))}, the first at {first:.6g} s"
+        f" not valid: {listed(list(labels))}, the first at {first:.6g} s"
     )
     places, values = np.arange(len(missing)), np.array(track.values)
-    for column, nan in zip(values.T, lacking.T, strict=True):
+    for column, nan in zip(values.T, lacking.T, strict=True):  # lest they spoil others
         column[nan] = np.interp(places[nan], places[~nan], column[~nan])
     return replace(track, values=values, missing=missing)
+
+
+def _believable(path: Path, track: Track, remarks: list[str]) -> Track:
+    """Track in which nan takes the place of values that no unit explains."""
+    if track.quantity not in LARGEST:
+        return track
+    # Numbers of 16 bits cannot hold the limits that they are compared with.
+    values = np.abs(track.values).astype(np.result_type(track.values, np.float32), copy=False)
+    far = np.isfinite(values) & (values > ABSURD)
+    if not far.any():
+        return track
+    sample, column = (int(each) for each in np.argwhere(far)[0])
+    what = (
+        f"column {track.labels[column]!r} holds {track.values[sample, column]:.3g}, no"
+        f" {track.quantity} in any unit"
+    )
+    if not track.is_desired and far.any(axis=1).mean() > FEW:
+        raise track.fault(path, f"{what}; name the columns to read (--map)", sample)
+    runaway = far.any(axis=0) & (values > LARGEST[track.quantity])
+    remarks.append(
+        f"{what}: {counted(int(runaway.any(axis=1).sum()), 'sample')} of"
+        f" {track.signal.replace('_', ' ')} left out"
+    )
+    return replace(track, values=np.where(runaway, np.nan, track.values))
+
+
+def _chosen(names: Sequence[str], chosen: Mask) -> list[str]:
+    return [name for name, is_one in zip(names, chosen, strict=True) if is_one]
+
+
+def _columns(track: Track, kept: Sequence[int]) -> Track:
+    return replace(
+        track,
+        joints=tuple(track.joints[place] for place in kept),
+        labels=tuple(track.labels[place] for place in kept),
+        values=track.values[:, kept],
+    )
 
 
 FROZEN = 0.2
@@ -211,7 +213,7 @@ FROZEN_WAY = 0.05
 """Least way that joints should have gone in that time, in [rad] or [m]."""
 
 
-def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> tuple[Track, ...]:
+def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
     """Tracks whose samples are missing where all rows are one, and joints should move."""
     found = list(tracks)
     for stamps in {id(track.stamps): track.stamps for track in tracks}.values():
@@ -223,7 +225,7 @@ def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> tuple[Track,
         for track in measured:
             same &= (track.values[1:] == track.values[:-1]).all(axis=1)
         frozen = np.zeros(len(stamps.time), dtype=bool)
-        for first, last, speed in _repeats(stamps, same, ours):
+        for first, last, speed in _repeats(stamps.time, same, ours):
             frozen[first + 1 : last + 1] = True
             at = stamps.time[first] - stamps.time[0]
             remarks.append(
@@ -237,21 +239,18 @@ def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> tuple[Track,
                 else t
                 for t in found
             ]
-    return tuple(found)
+    return found
 
 
-def _repeats(
-    stamps: Stamps, same: Mask, tracks: Sequence[Track]
-) -> Iterator[tuple[int, int, float]]:
+def _repeats(time: Array, same: Mask, tracks: Sequence[Track]) -> Iterator[tuple[int, int, float]]:
     """First and last sample of each stretch that repeats a moving row, and its speed."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], same, [False]))))
     if not len(edges):
         return
-    firsts, lasts = edges[::2], edges[1::2]
-    lengths = stamps.time[lasts] - stamps.time[firsts]
-    changes = stamps.time[np.flatnonzero(np.concatenate(([True], ~same)))]
+    changes = time[np.flatnonzero(np.concatenate(([True], ~same)))]
     usual = float(np.median(np.diff(changes))) if len(changes) > 1 else 0.0
-    for first, last, length in zip(firsts, lasts, lengths, strict=True):
+    for first, last in edges.reshape(-1, 2).tolist():
+        length = float(time[last] - time[first])
         if length < max(FROZEN, FROZEN_HOLDS * usual):
             continue
         speed = 0.0
@@ -260,9 +259,9 @@ def _repeats(
                 speed = max(speed, float(np.abs(track.values[first]).max()))
             elif track.signal == "position_desired":
                 way = np.ptp(track.values[first : last + 1], axis=0).max()
-                speed = max(speed, float(way) / float(length))
+                speed = max(speed, float(way) / length)
         if speed * length > FROZEN_WAY:
-            yield int(first), int(last), speed
+            yield first, last, speed
 
 
 # Angles
@@ -293,8 +292,9 @@ HINT = (
 
 def _in_si(
     log: Log, tracks: Sequence[Track], units: str, robot: Robot | None, remarks: list[str]
-) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+) -> tuple[list[Track], tuple[str, ...]]:
     """Tracks in radians that know which columns are angles, and what was found to be in degrees."""
+    kinds = {joint.name: joint.kind for joint in robot.joints} if robot else {}
     grippers = bool(log.units)  # normalised, whatever the unit of the others is
     in_degrees: tuple[str, ...] = ()
     found = list(tracks)
@@ -302,27 +302,34 @@ def _in_si(
         if grippers and units == "degrees" and not robot:
             left_out = dict.fromkeys(j for t in tracks for j in t.joints if _is_gripper(j))
             remarks += [f"{NO_RANGE}: {listed(list(left_out))}"] if left_out else []
-        every = (_converted(log.path, t, robot, units, grippers=grippers) for t in tracks)
+        every = (_converted(log.path, t, robot, kinds, units, grippers=grippers) for t in tracks)
         found = [track for track in every if track is not None]
     else:
-        in_degrees = _in_degrees(tracks, robot)
-        found = [_to_radians(t, robot) if t.quantity in in_degrees else t for t in tracks]
-        for track in found:
-            _refuse_degrees(log.path, track, robot)
+        in_degrees = _in_degrees(tracks, kinds)
+        for place, track in enumerate(found):
+            if track.quantity in in_degrees:
+                found[place] = _to_radians(track, _angular(track, kinds))
+            _refuse_degrees(log.path, found[place], kinds)
     if in_degrees:
         plural = {"position": "positions", "velocity": "velocities"}
         remarks.append(
             f"{' and '.join(plural[each] for each in in_degrees)} look like degrees: converted to"
             " radians (if they are not, --units radians)"
         )
-    angles = [
-        [track.signal.startswith("position") and each for each in is_angular(track, robot)]
-        for track in found
-    ]
-    return tuple(replace(t, angles=own) for t, own in zip(found, angles, strict=True)), in_degrees
+    for place, track in enumerate(found):
+        angles = _angular(track, kinds) & track.signal.startswith("position")
+        found[place] = replace(track, angles=angles.tolist())
+    return found, in_degrees
 
 
-def _in_degrees(tracks: Sequence[Track], robot: Robot | None) -> tuple[str, ...]:
+def _angular(track: Track, kinds: Mapping[str, str]) -> Mask:
+    """Whether each column is an angle or an angular rate; True for joints of unknown type."""
+    moves = track.signal.startswith(("position", "velocity"))
+    turning = [moves and kinds.get(joint, "revolute") in TURNING for joint in track.joints]
+    return np.array(turning, dtype=bool)
+
+
+def _in_degrees(tracks: Sequence[Track], kinds: Mapping[str, str]) -> tuple[str, ...]:
     """What is in degrees, as positions and velocities tell.
 
     Positions are if half of the joints that move reach beyond a turn, to and fro; velocities if
@@ -333,7 +340,7 @@ def _in_degrees(tracks: Sequence[Track], robot: Robot | None) -> tuple[str, ...]
         position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
         if position is None:
             continue
-        reach = _reach_to_and_fro(position, robot)
+        reach = _reach_to_and_fro(position, kinds)
         if velocity is None:
             return ("position", "velocity") if reach > NORMALISED else ()
         ratio = _ratio(position, velocity)
@@ -344,15 +351,13 @@ def _in_degrees(tracks: Sequence[Track], robot: Robot | None) -> tuple[str, ...]
     return ()
 
 
-def _reach_to_and_fro(track: Track, robot: Robot | None) -> float:
+def _reach_to_and_fro(track: Track, kinds: Mapping[str, str]) -> float:
     """Largest position, if half of the joints that move go beyond a turn, and back; else 0."""
-    kinds = _kinds(robot)
-    turns = [kinds.get(joint) == "continuous" for joint in track.joints]
-    angular = np.array(is_angular(track, robot)) & ~np.array(turns)
+    turns = np.array([kinds.get(joint) == "continuous" for joint in track.joints])
     values = np.unwrap(track.values.astype(np.float64), axis=0, period=360.0)  # if in degrees
     reach = np.abs(track.values).max(axis=0)
     way = np.abs(np.diff(values, axis=0)).sum(axis=0)
-    moving = angular & (way > 0)
+    moving = _angular(track, kinds) & ~turns & (way > 0)
     far = moving & (reach > TURN)
     back = np.ptp(values, axis=0) < STRAIGHT * way
     largest = float(reach.max(where=far, initial=0.0))
@@ -379,41 +384,38 @@ def _ratio(position: Track, velocity: Track) -> float:
     return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
 
 
-def is_angular(track: Track, robot: Robot | None) -> list[bool]:
-    """Whether each column is an angle or an angular rate; True for joints of unknown type."""
-    kinds = _kinds(robot)
-    moves = track.signal.startswith(("position", "velocity"))
-    return [moves and kinds.get(joint, "revolute") in TURNING for joint in track.joints]
-
-
-def _to_radians(track: Track, robot: Robot | None, but: Mask | None = None) -> Track:
-    """Track with all angles converted from degrees, except in some columns."""
-    angular = np.array(is_angular(track, robot), dtype=bool)
-    if but is not None:
-        angular &= ~but
+def _to_radians(track: Track, angular: Mask) -> Track:
+    """Track with some columns converted from degrees."""
     if not angular.any():
         return track
     return replace(track, values=np.where(angular, np.deg2rad(track.values), track.values))
 
 
 def _converted(
-    path: Path, track: Track, robot: Robot | None, units: str, *, grippers: bool
+    path: Path,
+    track: Track,
+    robot: Robot | None,
+    kinds: Mapping[str, str],
+    units: str,
+    *,
+    grippers: bool,
 ) -> Track | None:
     """Track in radians of one in units that are given; None if no column is left.
 
     Args:
         grippers: Whether grippers are normalised whatever the others are.
     """
-    shares = np.array(
-        [units == "normalised" or (grippers and _is_gripper(joint)) for joint in track.joints],
-        dtype=bool,
-    )
-    shares &= units != "radians"
-    if robot is None and units == "degrees" and shares.any():  # their range is not known
-        kept = np.flatnonzero(~shares).tolist()
-        return _to_radians(_columns(track, kept), robot) if kept else None
+    if units == "radians":
+        return track
+    of_range = [units == "normalised" or (grippers and _is_gripper(j)) for j in track.joints]
+    shares = np.array(of_range, dtype=bool)
+    if units == "degrees" and robot is None and shares.any():  # their range is not known
+        if shares.all():
+            return None
+        track = _columns(track, np.flatnonzero(~shares).tolist())
+        shares = shares[~shares]
     if units == "degrees":
-        track = _to_radians(track, robot, shares)
+        track = _to_radians(track, _angular(track, kinds) & ~shares)
     if not shares.any() or not track.signal.startswith(("position", "velocity")):
         return track
     if robot is None:
@@ -441,22 +443,11 @@ def _is_gripper(joint: str) -> bool:
     return "gripper" in joint or "finger" in joint
 
 
-def _columns(track: Track, kept: Sequence[int]) -> Track:
-    return replace(
-        track,
-        joints=tuple(track.joints[place] for place in kept),
-        labels=tuple(track.labels[place] for place in kept),
-        values=track.values[:, kept],
-    )
-
-
-def _refuse_degrees(path: Path, track: Track, robot: Robot | None) -> None:
+def _refuse_degrees(path: Path, track: Track, kinds: Mapping[str, str]) -> None:
     if track.quantity not in LARGEST:
         return
-    kinds = _kinds(robot)
-    for place, angular in enumerate(is_angular(track, robot)):
-        endless = kinds.get(track.joints[place]) == "continuous" and track.quantity == "position"
-        if not angular or endless:
+    for place in np.flatnonzero(_angular(track, kinds)).tolist():
+        if kinds.get(track.joints[place]) == "continuous" and track.quantity == "position":
             continue
         beyond = np.abs(track.values[:, place]) > LARGEST[track.quantity]
         if beyond.any():
@@ -469,17 +460,13 @@ def _refuse_degrees(path: Path, track: Track, robot: Robot | None) -> None:
             )
 
 
-def _kinds(robot: Robot | None) -> dict[str, str]:
-    return {joint.name: joint.kind for joint in robot.joints} if robot else {}
-
-
 # Targets that are held
 
 SLOWER = 1.5
 """Least ratio of the targets' hold to the measured values'."""
 
 
-def without_held_targets(tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+def _without_held_targets(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
     """Tracks whose held desired positions are interpolated between the samples that set them.
 
     A policy sets targets 10 to 100 times a second, and a faster log holds each until the next: its
@@ -488,31 +475,29 @@ def without_held_targets(tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tu
     measured values as long. What follows the last target is cut off.
     """
     logged = {joint for t in tracks if t.signal == "velocity_desired" for joint in t.joints}
-    measured = max((_hold(t) for t in tracks if t.signal in ("position", "velocity")), default=1.0)
-    found, remarks = [], []
-    for each in tracks:
-        joined = None
-        if each.signal == "position_desired" and not logged & set(each.joints):
-            joined = _joined(each, measured)
-        if joined:
-            hold = _hold(each)
-            remarks.append(
-                f"position_desired: each target is held for {hold:.3g} samples"
-                f" ({plain(each.stamps.clock.nominal / hold, 4)} Hz); interpolated from target to"
-                f" target{_lost(each.stamps.clock.nominal, each.stamps.clock.nominal / hold)}"
-            )
-        found.append(joined or each)
-    return tuple(found), tuple(remarks)
+    moving = [track for track in tracks if track.signal in ("position", "velocity")]
+    measured = max((hold_length(track.values) for track in moving), default=1.0)
+    found = []
+    for track in tracks:
+        if track.signal == "position_desired" and not logged & set(track.joints):
+            values = np.asarray(track.values, dtype=np.float64)
+            hold, places = hold_length(values), updates(values)
+            if places is not None and hold >= SLOWER * measured:
+                track = _joined(track, values, places)
+                nominal = track.stamps.clock.nominal
+                remarks.append(
+                    f"position_desired: each target is held for {hold:.3g} samples"
+                    f" ({plain(nominal / hold, 4)} Hz); interpolated from target to"
+                    f" target{_lost(nominal, nominal / hold)}"
+                )
+        found.append(track)
+    return found
 
 
-def _joined(track: Track, measured: float) -> Track | None:
-    """The track interpolated from its first target to its last; None without a hold."""
+def _joined(track: Track, values: Array, places: Indices) -> Track:
+    """The track interpolated from its first target to its last."""
     from scipy.interpolate import Akima1DInterpolator
 
-    values = np.asarray(track.values, dtype=np.float64)
-    places = updates(values)
-    if places is None or _hold(track) < SLOWER * measured:
-        return None
     places = places[places < len(values)]
     held = values[places.clip(min=0)]
     held = np.where(track.angles, np.unwrap(held, axis=0), held)
@@ -540,10 +525,6 @@ def _evenly(places: Indices) -> Array:
     return np.concatenate(([min(chosen[0], 0.0)], chosen[1:]))
 
 
-def _hold(track: Track) -> float:
-    return hold_length(np.asarray(track.values))
-
-
 # The run
 
 
@@ -568,25 +549,23 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
     remarks += [f"{logs[-1].path.name}: {said}"] if said else []
     own = next(t.stamps for t in tracks if t.signal == main.signal and t.joints == main.joints)
     remarks += _decimated(tracks, own)
-    kept, interpolated = without_held_targets(tracks)
-    main = next(track for track in kept if track.stamps is own)
-    time, valid = common_time(kept, main)
+    kept = _without_held_targets(tracks, remarks)
+    time, valid = common_time(kept, next(track for track in kept if track.stamps is own))
     if len(time) < 2 or not valid.any():
         others = [each.stamps for each in tracks if each.stamps is not own]
         raise LogError(logs[-1].path, no_overlap(others[-1] if others else own, own))
-    remarks += interpolated
-    meta = _meta(logs, own, own.start + Decimal(str(time[0])), offset)
+    meta = _meta(logs, own, own.start + Decimal(str(time[0])))
+    meta |= {"offset": offset} if offset else {}
     urdf = logs[0].urdf if robot and not options.robot else ""
-    waiting, covered, slack = [*kept], float(own.time[-1]), UNIFORM / own.clock.rate
+    covered, slack = float(own.time[-1]), UNIFORM / own.clock.rate
     logs.clear()
-    del tracks, kept, main  # each signal is freed when it has been resampled
+    del tracks, main  # each signal is freed when it has been resampled
     parts: list[tuple[str, tuple[str, ...], Real]] = []
-    while waiting:
-        track = waiting.pop(0)
+    while kept:
+        track = kept.pop(0)
         parts.append((track.signal, track.joints, resampled(time, valid, track, slack)))
-    signals, differentiated, told = signals_of(parts, time - time[0], valid)
-    if differentiated:
-        meta["differentiated"] = differentiated
+    signals, differentiated, told = _signals_of(parts, time - time[0], valid)
+    meta |= {"differentiated": differentiated} if differentiated else {}
     run = Run(time=time - time[0], valid=valid, robot=options.robot or None, meta=meta, **signals)
     if run.duration < covered:
         extent = "both logs" if len(meta["source"]) > 1 else "all its signals"
@@ -647,9 +626,7 @@ def _main(log: Log, options: ReadOptions) -> Track:
     return track
 
 
-def _meta(
-    logs: Sequence[Log], own: Stamps, start: Decimal, offset: Mapping[str, float]
-) -> dict[str, Any]:
+def _meta(logs: Sequence[Log], own: Stamps, start: Decimal) -> dict[str, Any]:
     meta: dict[str, Any] = {
         **{key: value for log in logs for key, value in log.meta.items() if key != "stamps"},
         "source": [log.path.name for log in logs],
@@ -659,8 +636,6 @@ def _meta(
     unordered = [log.meta["stamps"] for log in logs if "stamps" in log.meta]
     if unordered:
         meta["stamps"] = {key: sum(each[key] for each in unordered) for key in unordered[0]}
-    if offset:
-        meta["offset"] = dict(offset)
     return meta
 
 
@@ -718,17 +693,12 @@ def _lost(before: float, after: float) -> str:
     return f": nothing above {plain(after / 2, 4)} Hz is left" if after < before / SAME_RATE else ""
 
 
-def signals_of(
+def _signals_of(
     parts: Sequence[tuple[str, tuple[str, ...], Real]], time: Array, valid: Mask
 ) -> tuple[dict[str, Any], dict[str, str], list[str]]:
     """Signals of a run by joint, with missing velocities differentiated.
 
     A signal that some of the joints lack, and that cannot be computed, is left out.
-
-    Args:
-        parts: Signals, the joints of their columns, and values, shape (samples, columns).
-        time: Uniform, shape (samples,), in [s].
-        valid: False in gaps, shape (samples,).
     """
     signals: dict[str, Any] = {}
     differentiated: dict[str, str] = {}
@@ -780,90 +750,3 @@ def _ordered(signal: tuple[tuple[str, ...], Real], joints: Sequence[str]) -> Rea
     if tuple(joints) == known:
         return values
     return values[:, [known.index(joint) for joint in joints]]
-
-
-# Signals that contradict each other
-
-FACTORS: Mapping[float, str] = {
-    180 / np.pi: "velocities look like degrees per second beside positions in radians",
-    np.pi / 180: "positions look like degrees beside velocities in radians per second",
-    30 / np.pi: "velocities look like turns per minute beside positions in radians",
-    1 / 6: "velocities look like turns per minute beside positions in degrees",
-    1 / (2 * np.pi): "velocities look like turns per second beside positions in radians",
-}
-"""Warnings by the ratio of velocities to the slope of positions."""
-NEAR_FACTOR = 0.02
-"""Largest relative deviation from a factor, less than half the distance of two of them."""
-STRETCH = 0.2
-"""Time over which velocities are integrated and compared with positions, in [s]."""
-AGREE = 0.2
-"""Largest relative deviation of a velocity from the slope of its position: filters attenuate."""
-RELATED, UNRELATED = 0.9, 0.3
-"""Correlation of the two from which a factor is one, and below which they have no relation."""
-WAY = 0.02
-"""Root mean square of the way in a stretch from which a joint is compared, in [rad] or [m]."""
-ENOUGH = 5
-"""Fewest stretches."""
-
-
-def contradictions(run: Run) -> Iterator[str]:
-    """Clauses on velocities that are not the slopes of their positions."""
-    differentiated = run.meta.get("differentiated")
-    by_import = isinstance(differentiated, Mapping) and "velocity" in differentiated
-    ways = None if run.position is None or by_import else _ways(run)
-    if ways is None:
-        return
-    way, summed = ways
-    own, other = np.square(way).sum(axis=0), np.square(summed).sum(axis=0)
-    both, clear = (way * summed).sum(axis=0), own > 0
-    if not clear.any():
-        return
-    factor = np.where(clear, both / np.where(clear, own, 1.0), 1.0)
-    median = float(np.median(factor[clear]))
-    for known, warning in FACTORS.items():
-        if abs(median / known - 1) <= NEAR_FACTOR:
-            yield f"{warning} ({median:.4g} times their slope)"
-            return
-    if len(way) < ENOUGH:
-        return
-    moves = (own > len(way) * WAY**2) & (other > 0)
-    correlation = both / np.sqrt(np.where(own * other > 0, own * other, 1.0))
-    strange = moves & (correlation < UNRELATED)
-    wrong = moves & (correlation >= RELATED) & (np.abs(factor - 1) > AGREE)
-    if strange.any():
-        yield (
-            f"velocities of {_joints(run, strange)} have no relation to the slopes of their"
-            f" positions (correlation {float(correlation[strange].max()):.2g})"
-        )
-    if wrong.any():
-        sizes = factor[wrong]
-        alike = float(np.ptp(sizes)) <= AGREE * abs(float(sizes.mean()))
-        size = f"{float(sizes.mean()):.3g}" if alike else f"{sizes.min():.3g} to {sizes.max():.3g}"
-        yield (
-            f"velocities of {_joints(run, wrong)} are {size} times the slopes of their positions:"
-            " another unit, or another rate?"
-        )
-
-
-def _joints(run: Run, chosen: Mask) -> str:
-    names = [name for name, is_one in zip(run.joint_names, chosen, strict=True) if is_one]
-    return "all joints" if len(names) == len(run.joint_names) > 1 else listed(names)
-
-
-def _ways(run: Run) -> tuple[Array, Array] | None:
-    """Changes of positions, and integrals of velocities, over stretches without a gap."""
-    assert run.position is not None
-    length = max(2, round(STRETCH * run.rate))
-    starts = np.arange(0, len(run.time) - length, length)
-    gaps = np.concatenate(([0], np.cumsum(~run.mask)))
-    starts = starts[gaps[starts + length + 1] == gaps[starts]]
-    if not len(starts):
-        return None
-    way = run.position[starts + length].astype(np.float64) - run.position[starts]
-    whole = run.velocity[: len(run.time) // length * length]
-    sums = whole.reshape(-1, length, way.shape[1]).sum(axis=1, dtype=np.float64)[starts // length]
-    ends = (run.velocity[starts + length].astype(np.float64) - run.velocity[starts]) / 2
-    summed = (sums + ends) / run.rate  # trapezoids
-    turn = 2 * np.pi  # of an angle that wraps: it stays within a turn, and jumps
-    wraps = np.abs(np.ptp(run.position, axis=0) - turn) < 0.1 * turn
-    return np.where(wraps, way - turn * np.round((way - summed) / turn), way), summed

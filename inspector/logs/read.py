@@ -20,9 +20,9 @@ from typing import Any
 from inspector.errors import InspectorError, LogError
 from inspector.logs.log import LogReader, Progress, without_progress
 from inspector.logs.mapping import ReadOptions, read_options
-from inspector.logs.motion import Imported, contradictions, prepared, run_of
+from inspector.logs.motion import Imported, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
-from inspector.logs.wrongrobot import check_joints, limit_warnings, named
+from inspector.logs.plausibility import check_joints, contradictions, limit_warnings, named
 from inspector.text import counted, printable
 from noiseclassifier.jsontext import from_json
 from noisemodel import NoiseModelError, OutputError, Robot, RobotError, Run, RunFileError, runfile

@@ -16,7 +16,7 @@ from inspector.audit.signals import without_placeholder
 from inspector.colors import SERIES, Color, of_classes
 from inspector.errors import InspectorError, OptionError
 from inspector.logs.clocks import without_hold
-from inspector.logs.wrongrobot import check_joints
+from inspector.logs.plausibility import check_joints
 from inspector.report.picture import require as require
 from inspector.text import counted, progress
 from noiseclassifier import Assessment
