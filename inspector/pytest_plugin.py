@@ -203,7 +203,7 @@ class Noise:
         __tracebackhide__ = True
         from inspector.errors import Status
         from inspector.reference.verdicts import classes_found
-        from noisemodel.errors import hint
+        from noisemodel.types import hint
 
         known = (*classes_found(self._library), Status.CANNOT_TELL.value)
         allowed = (allow,) if isinstance(allow, str) else tuple(allow)

@@ -6,7 +6,13 @@ and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robot
 """
 
 from noisemodel.compare import Comparison, Comparisons, LeftOut, compare
-from noisemodel.errors import (
+from noisemodel.extended import KINDS, extended, surface_speed
+from noisemodel.noise import Noise, by_joint, norms, simplified
+from noisemodel.recorder import Recorder
+from noisemodel.robot import ROBOTS, Robot, link_twists
+from noisemodel.run import Block, Run, decimated, resample
+from noisemodel.surface import Surface
+from noisemodel.types import (
     GeometryError,
     MeshError,
     NoiseModelError,
@@ -18,12 +24,6 @@ from noisemodel.errors import (
     UnknownKindError,
     UnknownRobotError,
 )
-from noisemodel.extended import KINDS, extended, surface_speed
-from noisemodel.noise import Noise, by_joint, norms, simplified
-from noisemodel.recorder import Recorder
-from noisemodel.robot import ROBOTS, Robot, link_twists
-from noisemodel.run import Block, Run, decimated, resample
-from noisemodel.surface import Surface
 
 __all__ = [
     "KINDS",

@@ -9,20 +9,21 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from noisemodel.errors import (
-    GeometryError,
-    NoiseModelError,
-    RobotError,
-    RunError,
-    UnknownKindError,
-)
 from noisemodel.extended import KINDS, chunk_speeds, vibrating
 from noisemodel.noise import CHUNK, decibel, simplified, sound_power
 from noisemodel.parallel import DIED, Jobs, in_order
 from noisemodel.robot import Robot, is_name, limits_of
 from noisemodel.run import Block, Run, is_robot_file, part, stretches
 from noisemodel.surface import GEOMETRIES, TINY, Surface
-from noisemodel.types import Array, Real
+from noisemodel.types import (
+    Array,
+    GeometryError,
+    NoiseModelError,
+    Real,
+    RobotError,
+    RunError,
+    UnknownKindError,
+)
 
 if TYPE_CHECKING:
     import pyarrow

@@ -8,13 +8,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel.errors import NoiseModelError, UnknownKindError
 from noisemodel.noise import CHUNK, SOUND_SPEED, Noise, check_positive, sound_power
 from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
 from noisemodel.run import Run, rows_of, stretches
 from noisemodel.runfile import AT_ONCE, pieces
 from noisemodel.surface import LinkSurface, Surface, check_surface, point_speeds, turning_speed
-from noisemodel.types import Array, Mask, Real
+from noisemodel.types import Array, Mask, NoiseModelError, Real, UnknownKindError
 
 Index: TypeAlias = NDArray[np.intp]
 

@@ -22,7 +22,7 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel.errors import NoiseModelError, OutputError, RobotError
+from noisemodel.types import NoiseModelError, OutputError, RobotError
 
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 

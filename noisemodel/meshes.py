@@ -17,9 +17,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel.errors import MeshError
 from noisemodel.files import Arrays, beyond, cached, limit, parsed_xml
-from noisemodel.types import Array, Indices
+from noisemodel.types import Array, Indices, MeshError
 
 Mesh: TypeAlias = tuple[Array, Indices]
 """Points, shape (points, 3), and triangles as indices of points, shape (triangles, 3)."""

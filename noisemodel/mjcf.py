@@ -26,9 +26,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel.errors import RobotError
 from noisemodel.files import beyond, limit, read_xml
-from noisemodel.types import Array
+from noisemodel.types import Array, RobotError
 from noisemodel.urdf import (
     HINT,
     LinkShape,

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from noisemodel.errors import NoiseModelError
 from noisemodel.run import Run
-from noisemodel.types import Array, Real
+from noisemodel.types import Array, NoiseModelError, Real
 
 DENSITY = 1.204
 """Of air at 20 °C, in [kg/m³]."""

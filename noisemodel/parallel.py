@@ -20,7 +20,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from noisemodel.errors import NoiseModelError
+from noisemodel.types import NoiseModelError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

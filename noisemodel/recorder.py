@@ -10,7 +10,6 @@ from typing import Any, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from noisemodel.errors import RunError, UnknownJointError, hint
 from noisemodel.robot import ROBOTS, Robot
 from noisemodel.run import (
     LONGEST,
@@ -21,7 +20,7 @@ from noisemodel.run import (
     resample,
     with_velocities,
 )
-from noisemodel.types import Array, Mask
+from noisemodel.types import Array, Mask, RunError, UnknownJointError, hint
 
 Values: TypeAlias = ArrayLike | Mapping[str, float]
 

@@ -17,17 +17,18 @@ from typing import Any, Self
 import numpy as np
 
 from noisemodel import mjcf, urdf
-from noisemodel.errors import (
+from noisemodel.files import MAX_BYTES
+from noisemodel.mjcf import Mjcf
+from noisemodel.run import Run, is_robot_file
+from noisemodel.types import (
+    Array,
     NoiseModelError,
+    Real,
     RobotError,
     RunError,
     UnknownJointError,
     UnknownRobotError,
 )
-from noisemodel.files import MAX_BYTES
-from noisemodel.mjcf import Mjcf
-from noisemodel.run import Run, is_robot_file
-from noisemodel.types import Array, Real
 from noisemodel.urdf import Mimic
 
 MENAGERIE = "menagerie/"

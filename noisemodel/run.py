@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel import runfile
-from noisemodel.errors import RunError, RunFileError
 from noisemodel.files import beyond, limit
 from noisemodel.runfile import OnDemand, either_way, pieces, rows_at_once
-from noisemodel.types import Array, Mask, Real
+from noisemodel.types import Array, Mask, Real, RunError, RunFileError
 
 SAMPLED = (
     "time",

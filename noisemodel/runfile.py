@@ -23,9 +23,8 @@ from numpy.lib import format as npy
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
-from noisemodel.errors import OutputError, RunFileError, hint
 from noisemodel.files import replacing
-from noisemodel.types import Array
+from noisemodel.types import Array, OutputError, RunFileError, hint
 
 FORMAT = "noise-run/1"
 STAGE = "stage_"

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel import meshes
-from noisemodel.errors import GeometryError, MeshError
 from noisemodel.files import beyond, cached, limit
 from noisemodel.robot import Robot
-from noisemodel.types import Array, Indices
+from noisemodel.types import Array, GeometryError, Indices, MeshError
 from noisemodel.urdf import LinkShape, find_mesh, shapes_in
 
 GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(

@@ -16,9 +16,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel.errors import GeometryError, MeshError, RobotError
 from noisemodel.files import beyond, limit, read_xml
-from noisemodel.types import Array
+from noisemodel.types import Array, GeometryError, MeshError, RobotError
 
 NUMBERS = {"xyz": 3, "rpy": 3, "ixx": 1, "iyy": 1, "izz": 1, "ixy": 1, "ixz": 1, "iyz": 1}
 

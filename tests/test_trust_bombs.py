@@ -14,8 +14,8 @@ from inspector.errors import LogError
 from inspector.library import load_library, model_files
 from inspector.logs.read import read_log
 from noisemodel import Robot, RobotError, Run, RunFileError, meshes
-from noisemodel.errors import MeshError
 from noisemodel.surface import LinkSurface, fine
+from noisemodel.types import MeshError
 
 LAUGHS = "".join(f'<!ENTITY l{n + 1} "{f"&l{n};" * 10}">' for n in range(9))
 

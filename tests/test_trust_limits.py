@@ -5,7 +5,7 @@ import pytest
 from commandline import call
 
 from noisemodel import NoiseModelError, Robot, RobotError, Run, files, meshes
-from noisemodel.errors import MeshError
+from noisemodel.types import MeshError
 
 TIME = np.arange(40) / 100
 

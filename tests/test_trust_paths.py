@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from noisemodel import Robot, RobotError, robot
-from noisemodel.errors import MeshError
 from noisemodel.surface import triangles
+from noisemodel.types import MeshError
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 URDF = """<robot name="r"><link name="base"/><link name="arm"><visual><geometry>

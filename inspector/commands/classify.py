@@ -179,7 +179,7 @@ def classify(
 def _classes(given: "Sequence[str]", library: "Library") -> tuple[str, ...]:
     """The classes that fail a run."""
     from inspector.reference.verdicts import classes_found
-    from noisemodel.errors import hint
+    from noisemodel.types import hint
 
     known = classes_found(library)
     names = [name for each in given for name in each.split(",")]

@@ -134,7 +134,7 @@ def _start(path: Path) -> str:
 
 
 def _unknown(path: Path, where: str, key: str, known: frozenset[str]) -> OptionError:
-    from noisemodel.errors import hint
+    from noisemodel.types import hint
 
     return OptionError(f"{path}:{where} no setting {key!r}{hint(key, sorted(known))}")
 

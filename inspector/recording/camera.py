@@ -16,9 +16,8 @@ from rerun.urdf import UrdfJoint, UrdfTree
 from inspector.recording import axes, robot
 from inspector.recording.unstable import Camera
 from noisemodel import meshes
-from noisemodel.errors import MeshError
 from noisemodel.run import Run
-from noisemodel.types import Array
+from noisemodel.types import Array, MeshError
 from noisemodel.urdf import shapes_in
 
 FIELD_OF_VIEW = np.deg2rad(55.0)

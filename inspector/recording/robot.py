@@ -15,12 +15,11 @@ import noisemodel
 from inspector.errors import InspectorError
 from inspector.recording import axes, unstable
 from noisemodel import meshes, robot, urdf
-from noisemodel.errors import UnknownJointError
 from noisemodel.mjcf import is_mjcf
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.surface import link_names, pieces
-from noisemodel.types import Array
+from noisemodel.types import Array, UnknownJointError
 from noisemodel.urdf import find_mesh
 
 FRAMES_PER_SECOND = 50.0
