@@ -20,7 +20,7 @@ import noisemodel as nm
 from inspector.localisation.localise import Localisation, fault_links, localise
 from noiseclassifier.scenarios import ROBOTS, ScenarioError, SimulationError, simulate
 from noiseclassifier.scenarios.robots import limbs
-from noisemodel.extended import LinkNoise, link_noise
+from noisemodel.noise import LinkNoise, link_noise
 
 SCENARIOS = (
     "obstacle-full",

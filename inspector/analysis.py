@@ -36,8 +36,8 @@ from noiseclassifier.lasting import MARGIN as LASTING_MARGIN
 from noiseclassifier.lasting import WINDOW as LASTING_WINDOW
 from noiseclassifier.lasting import joined
 from noisemodel import Block, Run
-from noisemodel.extended import vibrating
 from noisemodel.files import replacing
+from noisemodel.noise import vibrating
 from noisemodel.robot import is_name
 from noisemodel.run import is_robot_file
 from noisemodel.runfile import pieces
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from inspector.levels import Spectrogram
     from inspector.localisation.order import Order
     from inspector.localisation.stage import Localisation
-    from noisemodel.extended import LinkNoise
+    from noisemodel.noise import LinkNoise
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -326,7 +326,7 @@ def analyse_file(
 
 def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysis:
     """Add the noise link by link, if the run names a robot that is known and holds positions."""
-    from noisemodel.extended import link_noise
+    from noisemodel.noise import link_noise
 
     run = analysis.run
     found = replace(analysis, missing=tuple(_missing(run)))

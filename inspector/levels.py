@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector import colors
-from noisemodel.extended import LinkNoise, vibrating_pieces
-from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating_pieces
 from noisemodel.runfile import rows_at_once
 from noisemodel.types import Array, Mask, Real
 

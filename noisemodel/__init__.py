@@ -6,8 +6,7 @@ and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robot
 """
 
 from noisemodel.compare import Comparison, Comparisons, LeftOut, compare
-from noisemodel.extended import KINDS, extended, surface_speed
-from noisemodel.noise import Noise, by_joint, norms, simplified
+from noisemodel.noise import KINDS, Noise, by_joint, extended, norms, simplified, surface_speed
 from noisemodel.recorder import Recorder
 from noisemodel.robot import ROBOTS, Robot, link_twists
 from noisemodel.run import Block, Run, decimated, resample

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from noisemodel.extended import KINDS, chunk_speeds, vibrating
-from noisemodel.noise import CHUNK, decibel, simplified, sound_power
+from noisemodel.noise import CHUNK, KINDS, chunk_speeds, decibel, simplified, sound_power, vibrating
 from noisemodel.parallel import DIED, Jobs, in_order
 from noisemodel.robot import Robot, is_name, limits_of
 from noisemodel.run import Block, Run, is_robot_file, part, stretches

@@ -1,12 +1,23 @@
-"""Noise of motions: the simplified estimate with its parts, sound power and levels."""
+"""Noise of motions: the simplified estimate, and the sound power of every link.
 
-from collections.abc import Sequence
+The extended estimate is that power: a link radiates by its surface and the mean speed of it.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from noisemodel.run import Run
-from noisemodel.types import Array, NoiseModelError, Real
+from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
+from noisemodel.run import Run, rows_of, stretches
+from noisemodel.runfile import AT_ONCE, pieces
+from noisemodel.surface import LinkSurface, Surface, check_surface, point_speeds, turning_speed
+from noisemodel.types import Array, Mask, NoiseModelError, Real, UnknownKindError
+
+Index: TypeAlias = NDArray[np.intp]
 
 DENSITY = 1.204
 """Of air at 20 °C, in [kg/m³]."""
@@ -22,6 +33,26 @@ LOUDEST = 5
 
 CHUNK = 4096
 """Samples that are worked on at once: few enough for the cache, with little overhead of Python."""
+
+KINDS = ("paper", "A", "B", "C", "mean", "rms", "normal")
+"""The kinds of mean speed."""
+
+QUADRATIC = ("rms", "normal")
+"""The kinds whose square is a quadratic form of a link's twist."""
+
+BLOCK_OF_POINTS = 256
+"""Samples of all points of a link that fit into the cache."""
+BIN = 0.01
+"""Shortest bin, in [s]."""
+BINS = 4000
+"""Most bins that a run is divided into."""
+BLOCK = 2**16
+"""Samples whose running mean is taken at once."""
+FAST = 10.0
+"""Motion below this frequency moves the robot and does not vibrate, in [Hz]."""
+
+
+# The simplified estimate, and sound power.
 
 
 def simplified(velocity: Real, velocity_desired: Real | None = None) -> Array:
@@ -218,3 +249,550 @@ def check_positive(name: str, value: float, unit: str) -> None:
     """Refuse a number that is not positive and finite."""
     if not 0.0 < value < np.inf:
         raise NoiseModelError(f"{name} is {value:g} {unit}, expected a positive number")
+
+
+# Mean speeds of a link's surface: the paper's equation and its alternatives.
+
+
+def surface_speed(robot: Robot, surface: Surface, q: Real, v: Real, kind: str = "paper") -> Array:
+    """Mean speed of the surface of every link.
+
+    Args:
+        robot: The robot.
+        surface: Its surface.
+        q: Configurations as Pinocchio has them, shape (samples, nq).
+        v: Velocities as Pinocchio has them, shape (samples, nv).
+        kind: "paper", the sum of the paper's terms "A", "B" and "C", or one of these; "mean",
+            the exact mean that the sum is an upper bound of; "rms", the root of the mean-square
+            speed; "normal", the same for the speed normal to the surface.
+
+    Returns:
+        Shape (samples, links), in [m/s]; 0 for links without geometry.
+
+    Raises:
+        UnknownKindError: If there is no such kind.
+        GeometryError: If the surface belongs to another robot.
+        NoiseModelError: If ``q`` or ``v`` are of another shape or not finite.
+    """
+    check_kind(kind)
+    check_surface(surface, robot)
+    check_motion(robot, q, v)
+    speeds = np.empty((len(surface.links), len(q)))
+    for start in range(0, len(q), CHUNK):
+        part = slice(start, start + CHUNK)
+        speeds[:, part] = chunk_speeds(robot, surface, q[part], v[part], kind)
+    return speeds.T
+
+
+def chunk_speeds(
+    robot: Robot, surface: Surface, q: Real, v: Real, kind: str, dipole: "Dipole | None" = None
+) -> Array:
+    """Mean speeds of all links in a few thousand samples, shape (links, samples)."""
+    twists = np.empty((len(robot.joints) + 1, 6, len(q)))
+    chunk_twists(robot.joints, q, v, out=twists)
+    velocities = np.ascontiguousarray(v.T, dtype=np.float64)
+    speeds = np.zeros((len(surface.links), len(q)))
+    for place, (link, index) in enumerate(zip(surface.links, surface.joint, strict=True)):
+        if link.area:
+            joint, twist = robot.joints[index - 1], twists[index]
+            velocity = velocities[joint.first_v : joint.first_v + joint.nv]
+            if dipole is not None:
+                radiating = dipole(place, np.vstack((twist, velocity)))
+                twist, velocity = radiating[:6], radiating[6:]
+            speeds[place] = _link_speed(kind, link, joint, twist, velocity)
+    return speeds
+
+
+def _link_speed(kind: str, link: LinkSurface, joint: Joint, twist: Array, velocity: Array) -> Array:
+    """Mean speed of a link by its twist, shape (6, samples), and its joint's, (nv, samples)."""
+    if kind == "mean":
+        starts = range(0, twist.shape[1], BLOCK_OF_POINTS)
+        blocks = (twist[:, start : start + BLOCK_OF_POINTS] for start in starts)
+        points, weights = link.points.points, link.points.weights
+        return np.concatenate([weights @ point_speeds(points, block) for block in blocks])
+    if kind in QUADRATIC:
+        form = link.mean_square if kind == "rms" else link.mean_square_normal
+        squares = np.einsum("is,is->s", form @ twist, twist)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))  # rounding, where nothing moves out
+    own = joint.subspace @ velocity
+    carried = twist - own
+    terms: dict[str, Callable[[], Array]] = {  # Sec. II-A
+        "A": lambda: _length(carried[:3]),  # |v_O|
+        "B": lambda: _turning(link, carried),  # <|w_parent x r|>
+        "C": lambda: _driven(link, own),
+    }
+    if kind == "paper":
+        return terms["A"]() + terms["B"]() + terms["C"]()
+    return terms[kind]()
+
+
+def _driven(link: LinkSurface, own: Array) -> Array:
+    """C = |v_rel| + <|w_rel x r|>; for a joint with one axis the latter is |qdot| G."""
+    turning = _turning(link, own) if np.isnan(link.lever) else _length(own[3:]) * link.lever
+    return _length(own[:3]) + turning
+
+
+def _turning(link: LinkSurface, twist: Array) -> Array:
+    return turning_speed(link.turning, link.rounding, twist[3:])
+
+
+def _length(vectors: Array) -> Array:
+    length: Array = np.sqrt(np.einsum("is,is->s", vectors, vectors))
+    return length
+
+
+def check_kind(kind: str) -> None:
+    """Refuse an unknown kind."""
+    if kind not in KINDS:
+        raise UnknownKindError(kind, KINDS)
+
+
+def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q", "v")) -> None:
+    """Refuse a motion that is not this robot's, or not finite."""
+    for name, array, width in zip(names, (q, v), (robot.nq, robot.nv), strict=True):
+        if array.shape != (len(q), width):
+            raise NoiseModelError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
+        finite = np.isfinite(array)
+        if not finite.all():
+            row, column = np.argwhere(~finite)[0]
+            raise NoiseModelError(
+                f"{name}: {array[row, column]} in row {row}, column {column}; cut gaps out"
+            )
+
+
+class Dipole:
+    """The radiation of small bodies that oscillate: the lower the frequency, the less.
+
+    A sphere of radius a that oscillates at the frequency f radiates with the efficiency
+    x^4 / (4 + x^4), x = 2 pi f a / c. That is the squared magnitude of a Butterworth high-pass of
+    order 2 with its corner at f_c = sqrt(2) c / (2 pi a), so it acts on motions in time. A link
+    counts as the sphere of its area, a = sqrt(S / 4 pi); its frame hardly turns during 1 / f_c.
+    The filter of every link keeps its state from one chunk to the next.
+
+    Before its first sample the robot counts as having moved as it does then.
+    """
+
+    def __init__(self, surface: Surface, rate: float) -> None:
+        from scipy.signal import butter
+
+        sources = np.flatnonzero(surface.area)
+        corners = np.full(len(surface.area), np.inf)
+        radius = np.sqrt(surface.area[sources] / (4.0 * np.pi))
+        corners[sources] = np.sqrt(2.0) * SOUND_SPEED / (2.0 * np.pi * radius)
+        small = [link for link in sources if corners[link] >= 0.5 * rate]
+        if small:
+            named = ", ".join(f"{surface.names[i]} ({corners[i]:.0f} Hz)" for i in small)
+            raise NoiseModelError(
+                f"at {rate:g} Hz efficiency 'dipole' needs corners below {rate / 2:g} Hz, these"
+                f" links are too small: {named}; give a number for the efficiency, or a higher rate"
+            )
+        self._filters = {
+            int(link): butter(2, corners[link], "highpass", fs=rate, output="sos")
+            for link in sources
+        }
+        self._states: dict[int, Array] = {}
+
+    def __call__(self, link: int, motion: Array) -> Array:
+        """Filter the next chunk of a link's motion."""
+        from scipy.signal import sosfilt, sosfilt_zi
+
+        sections = self._filters[link]
+        if link not in self._states:
+            self._states[link] = sosfilt_zi(sections)[:, None, :] * motion[:, :1]
+        radiating, self._states[link] = sosfilt(sections, motion, zi=self._states[link])
+        return radiating
+
+
+def extended(
+    robot: Robot,
+    surface: Surface,
+    q: Real,
+    v: Real,
+    kind: str = "paper",
+    *,
+    efficiency: float | Sequence[float] | Real | str = 1.0,
+    rate: float | None = None,
+    q_desired: Real | None = None,
+    v_desired: Real | None = None,
+) -> Noise:
+    """Estimate the sound power that each link radiates.
+
+    Args:
+        robot: The robot.
+        surface: Its surface.
+        q: Configurations as Pinocchio has them, shape (samples, nq).
+        v: Velocities as Pinocchio has them, shape (samples, nv).
+        kind: How the mean speed of a surface is taken, see ``surface_speed``.
+        efficiency: Radiation efficiency: one for all links, one for each, shape (links,), or
+            "dipole": a small body that oscillates radiates less at low frequencies, see `Dipole`.
+            This is physics for the kind "normal"; the other kinds get the same filter, so that
+            they can be compared.
+        rate: Sample rate, which only "dipole" needs, in [Hz].
+        q_desired: Desired configurations, shape (samples, nq); ``q`` unless given.
+        v_desired: Desired velocities, shape (samples, nv); the power of this motion is added.
+            A floating base is stationary in it, whatever is given.
+
+    Returns:
+        The sound power of every link.
+
+    Raises:
+        UnknownKindError: If the kind does not exist.
+        GeometryError: If the surface belongs to another robot.
+        NoiseModelError: If ``q`` or ``v`` are of another shape than the robot's, or not finite; a
+            number is not positive; lengths differ; or a link is too small for "dipole".
+    """
+    check_kind(kind)
+    check_surface(surface, robot)
+    check_motion(robot, q, v)
+    if isinstance(efficiency, str) and efficiency != "dipole":
+        raise NoiseModelError(f"efficiency is {efficiency!r}, expected numbers or 'dipole'")
+
+    motions = _motions(robot, q, v, q_desired, v_desired)
+    dipoles: list[Dipole | None] = [None] * len(motions)
+    if isinstance(efficiency, str):
+        if rate is None:
+            raise NoiseModelError("efficiency 'dipole' needs the rate of the samples, in Hz")
+        check_positive("rate", rate, "Hz")
+        dipoles = [Dipole(surface, rate) for _ in motions]
+    each = _efficiencies(efficiency, surface)[:, None]
+    power, stop = np.empty((len(surface.links), len(q))), 0
+    for squares in _squares(robot, surface, motions, kind, CHUNK, dipoles):
+        start, stop = stop, stop + squares.shape[1]
+        power[:, start:stop] = sound_power(squares, surface.area[:, None], each)
+    return Noise(power.T, surface.names)
+
+
+def _motions(
+    robot: Robot, q: Real, v: Real, q_desired: Real | None, v_desired: Real | None
+) -> list[tuple[Real, Real]]:
+    """The measured motion, and the desired one if there is one, whose base is stationary."""
+    if v_desired is None:
+        if q_desired is not None:
+            raise NoiseModelError(
+                "q_desired is given and v_desired is not; positions alone radiate nothing"
+            )
+        return [(q, v)]
+    wanted = q if q_desired is None else q_desired
+    check_motion(robot, wanted, v_desired, names=("q_desired", "v_desired"))
+    if len(v_desired) != len(v):
+        raise NoiseModelError(f"v has {len(v)} samples, v_desired {len(v_desired)}")
+    if robot.floating_base:
+        v_desired = np.hstack((np.zeros((len(v), 6)), v_desired[:, 6:]))
+    return [(q, v), (wanted, v_desired)]
+
+
+def _squares(
+    robot: Robot,
+    surface: Surface,
+    motions: Sequence[tuple[Real, Real]],
+    kind: str,
+    chunk: int,
+    dipoles: "Sequence[Dipole | None]" = (None, None),
+) -> Iterator[Array]:
+    """Squared mean speeds of links, summed over motions, chunk by chunk: (links, samples)."""
+    for start in range(0, len(motions[0][0]), chunk):
+        rows = slice(start, start + chunk)
+        first, *more = (
+            chunk_speeds(robot, surface, q[rows], v[rows], kind, dipole) ** 2
+            for (q, v), dipole in zip(motions, dipoles, strict=False)
+        )
+        yield sum(more, first)
+
+
+def _efficiencies(efficiency: float | Sequence[float] | Real | str, surface: Surface) -> Array:
+    """Efficiency of each link, shape (links,); "dipole" is in the motion instead."""
+    each = np.asarray(1.0 if isinstance(efficiency, str) else efficiency, dtype=np.float64)
+    if each.shape not in ((), (len(surface.links),)):
+        raise NoiseModelError(
+            f"efficiency has shape {each.shape}, expected one number or ({len(surface.links)},)"
+        )
+    if not ((each > 0.0) & (each < np.inf)).all():
+        raise NoiseModelError(f"efficiency is {each.min():g}, expected positive numbers")
+    return np.broadcast_to(each, len(surface.links))
+
+
+# The noise of a run, link by link, in bins of time.
+
+
+@dataclass(frozen=True, eq=False)
+class LinkNoise:
+    """Sound power of each link.
+
+    Attributes:
+        kind: How the mean speed of a surface was taken.
+        links: Names of the links, shape (links,).
+        movers: Names of the joints that move each link, shape (links,).
+        time: Centres of the bins, shape (bins,), in [s].
+        power: Mean power in each bin, shape (bins, links), in [W].
+        vibration: That of the measured motion above 10 Hz alone, normal to the surface,
+            shape (bins, links), in [W].
+        terms: Total power by each of the paper's terms A, B and C, shape (bins,), in [W]; empty
+            unless they are requested.
+        remarks: What is missing or assumed, a sentence each.
+    """
+
+    kind: str
+    links: tuple[str, ...]
+    movers: tuple[frozenset[str], ...]
+    time: Array
+    power: Array
+    vibration: Array
+    terms: dict[str, Array]
+    remarks: tuple[str, ...]
+
+    @property
+    def total(self) -> Array:
+        """Power of the whole robot, shape (bins,), in [W]."""
+        return np.asarray(self.power.sum(axis=1))
+
+    @property
+    def loudest(self) -> list[int]:
+        """Indices of the links, the one that vibrates with the largest peak first."""
+        return [int(i) for i in np.argsort(-self.vibration.max(axis=0), kind="stable")]
+
+
+def link_noise(
+    run: Run, kind: str = "normal", *, geometry: str = "auto", terms: bool = False
+) -> LinkNoise:
+    """The extended noise of a run of a known robot, with positions, in bins.
+
+    ``kind`` is one of ``KINDS``, ``geometry`` as in `Surface.of`. ``terms`` adds the paper's terms.
+    """
+    assert run.robot is not None
+    floating = True if run.base_pose is not None else None
+    robot = Robot.load(run.robot, floating_base=floating)
+    surface = Surface.of(robot, geometry)
+    bins = _edges(run)
+    middles = _middles(run, bins)
+
+    q, wanted = robot.configuration(middles)[0], robot.desired(middles)
+    motion, wanted_motion = run.motion, run.velocity_desired
+
+    def fast_part(first: int, stop: int) -> Array:
+        return _vibrating_part(motion, run.mask, run.rate, first, stop)
+
+    fast = _moments(robot, run, fast_part, bins)
+    motions, desired = [("normal", fast)], []
+    if kind in QUADRATIC:
+        motions.append((kind, _moments(robot, run, lambda a, b: motion[a:b], bins)))
+        if wanted_motion is not None:
+            by_part = lambda a, b: wanted_motion[a:b]  # noqa: E731
+            desired = [(kind, _moments(robot, run, by_part, bins, desired=True))]
+    if run.position_desired is None:  # desired velocities at measured positions: one pose for all
+        motions, desired = [*motions, *desired], []
+    vibration, *power = by_moments(robot, surface, q, motions)
+    if desired and wanted is not None:
+        power += by_moments(robot, surface, wanted[0], desired)
+    if kind not in QUADRATIC:
+        power = [by_samples(robot, surface, run, kind, bins)]
+    return LinkNoise(
+        kind=kind,
+        links=surface.names,
+        movers=tuple(_movers(robot, joint) for joint in surface.joint.tolist()),
+        time=run.time[bins[:-1]] + np.diff(bins) / 2 / run.rate,
+        power=np.sum(power, axis=0),
+        vibration=vibration,
+        terms={
+            term: by_samples(robot, surface, run, term, bins).sum(axis=1)
+            for term in ("ABC" if terms else "")
+        },
+        remarks=tuple(_remarks(run, robot, surface)),
+    )
+
+
+def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
+    """The fast part of a motion: without its running mean over a tenth of a second.
+
+    It holds what vibrates at 10 Hz and above, shape (samples, nv), and little of what is slower.
+    ``valid`` is False in gaps, which no mean reaches over.
+    """
+    fast = np.zeros(velocity.shape[::-1])
+    half = _half(rate)
+    for stretch in stretches(valid, len(velocity)):
+        length = stretch.stop - stretch.start
+        for begin in range(0, length, BLOCK):
+            centre = np.arange(begin, min(begin + BLOCK, length))
+            # Towards the ends the mean is taken over less, so that it stays in the middle.
+            reach = np.minimum(np.minimum(centre, length - 1 - centre), half)
+            low, high = max(0, begin - half), min(begin + BLOCK + half, length)
+            first, last = centre - reach - low, centre + reach + 1 - low
+            count = (last - first).astype(np.float64)
+            sums = np.zeros(high - low + 1)
+            inside = velocity[stretch.start + low : stretch.start + high]
+            around = np.ascontiguousarray(inside.T, dtype=np.float64)
+            rows = slice(stretch.start + begin, stretch.start + begin + len(centre))
+            for part, found in zip(around, fast[:, rows], strict=True):  # each stays in the cache
+                np.cumsum(part, out=sums[1:])
+                found[:] = part[begin - low :][: len(centre)] - (sums[last] - sums[first]) / count
+    return fast.T
+
+
+def vibrating_pieces(
+    velocity: Real, valid: Mask, rate: float, multiple: int = 1
+) -> Iterator[tuple[slice, Array]]:
+    """The fast part of a motion, see `vibrating`, piece by piece."""
+    for rows in pieces(velocity, multiple):
+        yield rows, _vibrating_part(velocity, valid, rate, rows.start, rows.stop)
+
+
+def _vibrating_part(velocity: Real, valid: Mask, rate: float, first: int, stop: int) -> Array:
+    half = _half(rate)
+    around = slice(max(0, first - half), stop + half)
+    found = vibrating(velocity[around], valid[around], rate)
+    return found[first - around.start :][: stop - first]
+
+
+def _half(rate: float) -> int:
+    """Samples on each side of the middle of the running mean."""
+    return max(1, round(rate / FAST / 2))
+
+
+def _edges(run: Run) -> Index:
+    """First sample of each bin, and the end; there are two bins or more."""
+    samples = len(run.time)
+    size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
+    return np.append(np.arange(0, samples, size), samples)
+
+
+def _middles(run: Run, bins: Index) -> Run:
+    """Take one sample of each bin: the middle one of those that are valid."""
+    samples = (bins[:-1] + bins[1:]) // 2
+    for index in np.flatnonzero(~run.mask[samples]):
+        valid = bins[index] + np.flatnonzero(run.mask[bins[index] : bins[index + 1]])
+        if len(valid):
+            samples[index] = valid[len(valid) // 2]
+
+    time = np.arange(len(samples)) * int(bins[1]) / run.rate
+    return rows_of(run, samples, time=time, stages={}, effort=None)
+
+
+def _moments(
+    robot: Robot,
+    run: Run,
+    motion: Callable[[int, int], Real],
+    bins: Index,
+    *,
+    desired: bool = False,
+) -> Array:
+    """Mean products of a run's velocities, in Pinocchio's order, shape (bins, nv, nv)."""
+    first = {joint.name: joint.first_v for joint in robot.joints}
+    names = run.desired_joint_names if desired else run.joint_names
+    entries, chosen = [first[name] for name in names], slice(None)
+    if not desired and run.base_velocity is not None:
+        if robot.floating_base:
+            entries = [*range(6), *entries]
+        else:
+            chosen = slice(6, None)
+    size, width = int(bins[1]), len(entries) or 1
+    many = size * max(1, AT_ONCE // (8 * size * width))
+    # A bin that is shorter than the others is taken with those before it.
+    starts = [start for start in range(0, len(run.time), many) if len(run.time) - start >= size]
+    parts = pairwise([*starts, len(run.time)])
+    products = np.concatenate(
+        [
+            second_moments(motion(*part)[:, chosen], run.mask[slice(*part)], size=size)
+            for part in parts
+        ]
+    )
+    moments = np.zeros((robot.nv, robot.nv, len(bins) - 1))  # in memory as `by_moments` reads it
+    moments[np.array(entries)[:, None], entries] = products.transpose(1, 2, 0)
+    return moments.transpose(2, 0, 1)
+
+
+def _movers(robot: Robot, carrier: int) -> frozenset[str]:
+    names = set[str]()
+    while carrier:  # 0 is the universe
+        joint = robot.joints[carrier - 1]
+        names.add(joint.name)
+        carrier = joint.parent
+    return frozenset(names)
+
+
+def _remarks(run: Run, robot: Robot, surface: Surface) -> Iterator[str]:
+    missing = [name for name in robot.joint_names if name not in run.joint_names]
+    if missing:
+        yield f"Not in the log, assumed stationary: {', '.join(missing)}."
+    if surface.without_geometry:
+        yield f"Links without geometry make no noise: {', '.join(surface.without_geometry)}."
+    if robot.floating_base and run.base_velocity is None:
+        yield "The run has no base velocity: its base is assumed stationary."
+
+
+def by_samples(robot: Robot, surface: Surface, run: Run, kind: str, bins: Index) -> Array:
+    """Average the power of each link over bins, of any kind; gaps do not count."""
+    size = int(bins[1])
+    motions = [robot.configuration(run)]
+    if (wanted := robot.desired(run)) is not None:
+        motions.append(wanted)
+    means, start = [], 0
+    chunk = size * max(1, CHUNK // size)
+    for squares in _squares(robot, surface, motions, kind, chunk):
+        power = sound_power(squares, surface.area[:, None]).T
+        counted = run.mask[start : start + len(power), None]
+        firsts = np.arange(0, len(counted), size)
+        energy = np.add.reduceat(power * counted, firsts, axis=0)
+        means.append(energy / np.maximum(np.add.reduceat(counted.astype(float), firsts), 1.0))
+        start += len(counted)
+    return np.concatenate(means)
+
+
+def by_moments(
+    robot: Robot, surface: Surface, q: Array, motions: Sequence[tuple[str, Array]]
+) -> list[Array]:
+    """Average powers that are quadratic in velocities, from second moments instead of samples.
+
+    Within a bin of some ten milliseconds the robot hardly moves. With a link's Jacobian J as it
+    is in the middle of the bin, < nu' M nu > = < v' J' M J v > = sum_jk (J' M J)_jk < v_j v_k >.
+    ``q`` are these configurations, shape (bins, nq). Each motion is one of ``QUADRATIC`` with mean
+    products of velocities, shape (bins, nv, nv), and gets powers, shape (bins, links), in [W].
+    """
+    jacobians = _jacobians(robot, q)
+    # Bins lie next to each other in memory: all of them are worked on at once.
+    products = [np.ascontiguousarray(moments.transpose(1, 2, 0)) for _, moments in motions]
+    power = [np.zeros((len(q), len(surface.links))) for _ in motions]
+    for place, (link, joint) in enumerate(zip(surface.links, surface.joint, strict=True)):
+        if not link.area:
+            continue
+        entries, jacobian = jacobians(int(joint))
+        forms = {"normal": link.mean_square_normal, "rms": link.mean_square}
+        projected = {}  # J' M J, shape (entries, entries, bins)
+        for kind in {kind for kind, _ in motions}:
+            pushed = (forms[kind] @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
+            projected[kind] = np.einsum("ajb,akb->jkb", pushed, jacobian)
+        for total, (kind, _), product in zip(power, motions, products, strict=True):
+            square = np.einsum("jkb,jkb->b", projected[kind], product[entries[:, None], entries])
+            # Rounding may make a square negative.
+            total[:, place] = sound_power(np.maximum(square, 0.0), link.area)
+    return power
+
+
+def second_moments(velocity: Real, valid: Mask, *, size: int) -> Array:
+    """Average the products of velocities over each bin; the last bin may be shorter."""
+    if not valid.all():
+        velocity = np.where(valid[:, None], velocity, 0.0)
+    parts = np.lib.stride_tricks.sliding_window_view(velocity, size, axis=0)[::size]
+    rest = velocity[None, len(parts) * size :].transpose(0, 2, 1)
+    products = [part @ part.transpose(0, 2, 1) for part in (parts, rest) if part.size]
+    counts = np.add.reduceat(valid.astype(float), np.arange(0, len(valid), size))
+    return np.asarray(np.concatenate(products) / np.maximum(counts, 1.0)[:, None, None])
+
+
+def _jacobians(robot: Robot, q: Array) -> Callable[[int], tuple[Index, Array]]:
+    """Move the joints one after the other, those on different branches at once."""
+    chains: dict[int, list[int]] = {0: []}
+    for index, joint in enumerate(robot.joints, start=1):
+        chains[index] = [*chains[joint.parent], *range(joint.first_v, joint.first_v + joint.nv)]
+    # Each entry's turn is its place in the chain from the root: none in a chain share one.
+    turn = np.zeros(robot.nv, dtype=np.intp)
+    for chain in chains.values():
+        turn[chain] = np.arange(len(chain))
+    unit = (turn == np.arange(turn.max(initial=0) + 1)[:, None]).astype(np.float64)
+    v = np.repeat(unit, len(q), axis=0)
+    twists = link_twists(robot, np.tile(q, (len(unit), 1)), v)
+    twists = twists.transpose(1, 2, 0).reshape(-1, 6, len(unit), len(q))
+
+    def jacobian(joint: int) -> tuple[Index, Array]:
+        entries = np.array(chains[joint], dtype=np.intp)
+        return entries, twists[joint].take(turn[entries], axis=1)
+
+    return jacobian

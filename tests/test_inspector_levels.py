@@ -5,7 +5,7 @@ import pytest
 
 from inspector import colors
 from inspector.levels import FLOOR_DB, JOINTS, LINKS, STEP, link_levels, velocity_levels
-from noisemodel.extended import LinkNoise
+from noisemodel.noise import LinkNoise
 
 RATE = 1000.0
 

@@ -14,7 +14,7 @@ from inspector.live.robot import LinkLevels, LiveRobot
 from inspector.live.samples import Clock, Warnings
 from inspector.recording import robot as scene
 from inspector.recording.camera import FIELD_OF_VIEW, sight
-from noisemodel.extended import link_noise
+from noisemodel.noise import link_noise
 
 
 def warnings():

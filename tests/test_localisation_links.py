@@ -7,7 +7,7 @@ from inspector.localisation.localise import fault_links
 from inspector.localisation.stage import Localisation
 from noiseclassifier import Event
 from noisemodel import Robot, Run
-from noisemodel.extended import LinkNoise, link_noise
+from noisemodel.noise import LinkNoise, link_noise
 
 LINKS = ("body", "thigh", "foot", "other_foot")
 MOVERS = (set(), {"hip"}, {"hip", "knee"}, {"other_knee"})

@@ -39,7 +39,7 @@ from noisemodel.compare import (
     moving,
     spectral_distances,
 )
-from noisemodel.extended import vibrating
+from noisemodel.noise import vibrating
 from noisemodel.robot import limits_of
 
 RATE = 1000.0

@@ -18,7 +18,7 @@ from noisemodel import (
     extended,
     surface_speed,
 )
-from noisemodel.extended import (
+from noisemodel.noise import (
     by_moments,
     by_samples,
     link_noise,
@@ -367,7 +367,7 @@ def test_chunks_carry_on_with_the_filters_of_the_chunk_before(tmp_path, kind, mo
     options = {"efficiency": "dipole", "rate": RATE, "v_desired": v[::-1] ** 3}
     whole = extended(robot, surface, q, v, kind, **options).power
     for chunk in (1, 64):
-        monkeypatch.setattr(sys.modules["noisemodel.extended"], "CHUNK", chunk)
+        monkeypatch.setattr(sys.modules["noisemodel.noise"], "CHUNK", chunk)
         together = extended(robot, surface, q, v, kind, **options).power
         assert np.allclose(together, whole, rtol=1e-9, atol=1e-12 * whole.max())
 
@@ -598,7 +598,7 @@ def test_a_bin_that_begins_in_a_gap_takes_the_pose_of_its_valid_part(little, kin
 
 @pytest.mark.parametrize("chunk", [4, 25, 1000])
 def test_power_of_samples_is_averaged_in_bins_whatever_the_chunks(tmp_path, monkeypatch, chunk):
-    monkeypatch.setattr(sys.modules["noisemodel.extended"], "CHUNK", chunk)
+    monkeypatch.setattr(sys.modules["noisemodel.noise"], "CHUNK", chunk)
     robot = chain(tmp_path, "revolute", "prismatic")
     q, v = motion(robot, samples=95)
     valid = np.ones(95, dtype=bool)

@@ -15,7 +15,7 @@ import pytest
 import noisemodel as nm
 from noisemodel import MeshError, Robot, RobotError, Run, UnknownRobotError, mjcf
 from noisemodel.compare import excitation
-from noisemodel.extended import link_noise
+from noisemodel.noise import link_noise
 from noisemodel.robot import limits_of
 from noisemodel.surface import Surface, link_names, triangles
 from noisemodel.urdf import Mimic, capsule

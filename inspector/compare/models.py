@@ -27,9 +27,8 @@ from inspector.report.picture import require
 from inspector.text import cell
 from noisemodel import Comparison, Comparisons
 from noisemodel.compare import TERMS, medians
-from noisemodel.extended import vibrating
 from noisemodel.files import refuse_existing, replacing
-from noisemodel.noise import decibel
+from noisemodel.noise import decibel, vibrating
 from noisemodel.types import Array
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from inspector.library import Library
 from inspector.logs.read import Opened, open_run
 from noisemodel import Block, Run, decimated
 from noisemodel import robot as robots
-from noisemodel.extended import LinkNoise, vibrating
+from noisemodel.noise import LinkNoise, vibrating
 from noisemodel.run import part
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask, Real

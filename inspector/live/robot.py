@@ -17,8 +17,7 @@ from inspector.recording import camera as cameras
 from inspector.recording import robot as scene
 from inspector.recording.camera import fitted
 from inspector.recording.unstable import Camera
-from noisemodel.extended import FAST, by_moments, second_moments, vibrating
-from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.noise import FAST, REFERENCE_POWER, by_moments, decibel, second_moments, vibrating
 from noisemodel.robot import Limits, joint_limits
 from noisemodel.types import Array
 

@@ -14,7 +14,7 @@ from inspector.localisation.stage import (
 )
 from noiseclassifier import Event
 from noisemodel import Block, Run
-from noisemodel.extended import FAST, LinkNoise
+from noisemodel.noise import FAST, LinkNoise
 from noisemodel.types import Array, Real
 
 ANNOTATED = 0.1

@@ -39,7 +39,7 @@ import numpy as np
 from inspector.levels import Spectrogram, amplitudes, in_bands
 from noiseclassifier import Event
 from noisemodel import Block, Run
-from noisemodel.extended import vibrating
+from noisemodel.noise import vibrating
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 

@@ -25,8 +25,7 @@ from inspector.reference.levels import HOP
 from inspector.report.markdown import brief, classes_of, finding_of, spoken
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
-from noisemodel.extended import LinkNoise, vibrating
-from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
 from noisemodel.types import Array, Real
 
 HATCHES = 6

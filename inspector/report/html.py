@@ -16,9 +16,8 @@ from inspector.report.findings import excused
 from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
 from inspector.report.picture import picture, require
 from inspector.verdict import Verdict
-from noisemodel.extended import vibrating_pieces
 from noisemodel.files import replacing
-from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.noise import REFERENCE_POWER, decibel, vibrating_pieces
 from noisemodel.types import Array
 
 AUDIBLE = "Audible are the joints' velocities above 20 Hz; their powers are added."
