@@ -36,52 +36,29 @@ JOINT = "{joint}"
 
 @dataclass(frozen=True)
 class Clock:
-    """Rate, jitter and gaps of timestamps.
+    """Rate, jitter and gaps of timestamps."""
 
-    Attributes:
-        nominal: Inverse of the median step, in [Hz].
-        rate: The rate that is used: the nominal one of uniform stamps, else the nearest round
-            one, unless it is given; in [Hz].
-        uniform: Whether the stamps are uniform.
-        jitter_rms: Root mean square deviation of the steps from that rate's, without gaps, in [s].
-        jitter_max: Largest deviation, in [s].
-        gaps: Start and end of each gap, in [s].
-        stretches: The samples between gaps.
-    """
-
-    nominal: float
-    rate: float
+    nominal: float  # inverse of the median step, in [Hz]
+    rate: float  # given; else the nominal one if stamps are uniform, or the nearest round one
     uniform: bool
-    jitter_rms: float
-    jitter_max: float
-    gaps: tuple[tuple[float, float], ...]
-    stretches: tuple[slice, ...]
+    jitter_rms: float  # deviation of the steps from that rate's, without gaps, in [s]
+    jitter_max: float  # in [s]
+    gaps: tuple[tuple[float, float], ...]  # start and end of each, in [s]
+    stretches: tuple[slice, ...]  # the samples between gaps
 
 
 @dataclass(frozen=True, eq=False)
 class Stamps:
-    """Timestamps of samples; fields that were sampled together share them.
+    """Timestamps of samples; fields that were sampled together share them."""
 
-    Attributes:
-        start: The first stamp, in [s], exact.
-        time: Time since the first stamp, as logged, shape (samples,), in [s].
-        rows: Line number of each sample, if the file has lines.
-        unit: Unit of the stamps in the log; ``SAMPLES`` until the rate is known.
-        remark: On their source, if it is not the expected one.
-        held: Whether values apply between stamps however far apart, as in a planned
-            trajectory do.
-        rate: The rate that the log is said to have, in [Hz].
-        name: Their column.
-    """
-
-    start: Decimal
-    time: Array
-    rows: Sequence[int] | None = None
-    unit: str = "seconds"
-    remark: str = ""
-    held: bool = False
-    rate: float | None = None
-    name: str = ""
+    start: Decimal  # the first stamp, in [s], exact
+    time: Array  # time since the first stamp, as logged, shape (samples,), in [s]
+    rows: Sequence[int] | None = None  # line number of each sample, if the file has lines
+    unit: str = "seconds"  # of the stamps in the log; `SAMPLES` until the rate is known
+    remark: str = ""  # on their source, if it is not the expected one
+    held: bool = False  # values apply between stamps however far apart, as in a planned trajectory
+    rate: float | None = None  # that the log is said to have, in [Hz]
+    name: str = ""  # of their column
 
     @classmethod
     def of_nanoseconds(
@@ -92,6 +69,11 @@ class Stamps:
         return cls(
             Decimal(first).scaleb(-9), np.multiply(stamps - first, 1e-9), remark=remark, held=held
         )
+
+    @classmethod
+    def counted(cls, samples: int) -> "Stamps":
+        """Stamps of a log that has none, until its rate is known."""
+        return cls(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES)
 
     @classmethod
     def every(cls, step: float, samples: int, remark: str = "") -> "Stamps":
@@ -109,7 +91,11 @@ class Stamps:
             )
         nominal = float(f"{1 / step:.9g}")
         uniform = bool((np.abs(steps - step) <= UNIFORM * step).all())
-        rate = self.rate or (nominal if uniform else _round(nominal))
+        rate = self.rate or nominal
+        if not self.rate and not uniform:
+            power = 10.0 ** np.floor(np.log10(nominal))
+            near = float(power * min(ROUND, key=lambda digit: abs(digit * power / nominal - 1)))
+            rate = near if abs(near / nominal - 1) <= NEAR else nominal
         uniform = uniform and abs(rate * step - 1) <= UNIFORM
         wide = np.empty(0, dtype=np.int64) if self.held else np.flatnonzero(steps > GAP / rate)
         deviations = np.delete(steps, wide) - 1 / rate
@@ -125,58 +111,30 @@ class Stamps:
         )
 
 
-def _round(rate: float) -> float:
-    """The nearest round rate, or the rate itself if none is near."""
-    power = 10.0 ** np.floor(np.log10(rate))
-    near = float(power * min(ROUND, key=lambda digit: abs(digit * power / rate - 1)))
-    return near if abs(near / rate - 1) <= NEAR else rate
-
-
 @dataclass(frozen=True, eq=False)
 class Field:
-    """One array of a log, as logged.
-
-    Attributes:
-        name: Its name in the log.
-        values: Shape (samples, columns).
-        stamps: Its timestamps.
-        joints: Joints of the columns, if the log names them; else empty.
-        signal: The signal, if the format defines it; else empty.
-        source: The topic or file that it comes from.
-        rank: Of several sources of one signal those with the lowest rank are taken.
-    """
+    """One array of a log, as logged."""
 
     name: str
-    values: Real
+    values: Real  # shape (samples, columns)
     stamps: Stamps
-    joints: tuple[str, ...] = ()
-    signal: str = ""
-    source: str = ""
-    rank: int = 0
+    joints: tuple[str, ...] = ()  # of the columns, if the log names them
+    signal: str = ""  # if the format defines it
+    source: str = ""  # the topic or file that it comes from
+    rank: int = 0  # of several sources of one signal those with the lowest rank are taken
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One signal of some joints, or of the base.
+    """One signal of some joints, or of the base."""
 
-    Attributes:
-        signal: One of ``inspector.logs.names.SIGNALS``.
-        joints: Joints of the columns; empty for the base.
-        labels: Names of the columns in the log.
-        stamps: Its timestamps.
-        values: Shape (samples, columns).
-        missing: Samples that hold no values, where they are interpolated, shape (samples,); None
-            if there are none.
-        angles: Whether each column is an angle, which may wrap.
-    """
-
-    signal: str
-    joints: tuple[str, ...]
-    labels: tuple[str, ...]
+    signal: str  # one of `inspector.logs.names.SIGNALS`
+    joints: tuple[str, ...]  # of the columns; empty for the base
+    labels: tuple[str, ...]  # names of the columns in the log
     stamps: Stamps
-    values: Real
-    missing: Mask | None = None
-    angles: Sequence[bool] = ()
+    values: Real  # shape (samples, columns)
+    missing: Mask | None = None  # samples without values, which are interpolated, shape (samples,)
+    angles: Sequence[bool] = ()  # whether each column is an angle, which may wrap
 
     @property
     def is_desired(self) -> bool:
@@ -204,18 +162,11 @@ class Track:
 
 @dataclass(frozen=True)
 class Entry:
-    """Mapping of one column or array to a signal, or of many columns by a pattern.
+    """Mapping of one column or array to a signal, or of many columns by a pattern."""
 
-    Attributes:
-        signal: One of ``inspector.logs.names.SIGNALS``, or "time".
-        joint: The joint, for a single column; for a base its convention; empty for an
-            array of all joints. In a pattern it holds ``{joint}``, as the source does.
-        source: The column or array, or a part of it: ``qpos[7:]``, ``qvel[6]``.
-    """
-
-    signal: str
-    joint: str
-    source: str
+    signal: str  # one of `inspector.logs.names.SIGNALS`, or "time"
+    joint: str  # of a single column; of a base its convention; empty for an array of all joints
+    source: str  # the column or array, or a part of it: `qpos[7:]`, `qvel[6]`
 
     @property
     def target(self) -> str:
@@ -240,37 +191,21 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """One recording, as logged, and once its signals are known.
-
-    Attributes:
-        path: The file or folder.
-        fields: Its arrays; none once ``tracks`` are known.
-        episode: Name of the episode, where the file holds several.
-        not_read: Names of what was not read.
-        remarks: What was lost or decided, a sentence each.
-        units: Why the unit of angles is not known, if the format does not define it.
-        urdf: Text of the URDF in the log, may be empty.
-        suggested: Mapping that the format defines; the options' mapping takes precedence.
-        meta: Further metadata of the log.
-        time: Name of the column or array with the stamps, if it has one.
-        tracks: Its signals, in SI units, with increasing stamps.
-        names: Names of its columns and arrays, which a mapping may refer to.
-        in_degrees: "position" and "velocity" if these were found to be in degrees.
-    """
+    """One recording, as logged, and once its signals are known."""
 
     path: Path
-    fields: tuple[Field, ...]
-    episode: str = ""
-    not_read: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-    units: str = ""
-    urdf: str = ""
-    suggested: tuple[Entry, ...] = ()
+    fields: tuple[Field, ...]  # none once `tracks` are known
+    episode: str = ""  # where the file holds several
+    not_read: tuple[str, ...] = ()  # names of what was not read
+    remarks: tuple[str, ...] = ()  # what was lost or decided, a sentence each
+    units: str = ""  # why the unit of angles is not known, if the format does not define it
+    urdf: str = ""  # text of the URDF in the log
+    suggested: tuple[Entry, ...] = ()  # the format's mapping; the options' takes precedence
     meta: Mapping[str, Any] = field(default_factory=dict)
-    time: str = ""
-    tracks: tuple[Track, ...] = ()
-    names: tuple[str, ...] = ()
-    in_degrees: tuple[str, ...] = ()
+    time: str = ""  # name of the column or array with the stamps
+    tracks: tuple[Track, ...] = ()  # its signals, in SI units, with increasing stamps
+    names: tuple[str, ...] = ()  # of columns and arrays, which a mapping may refer to
+    in_degrees: tuple[str, ...] = ()  # "position" and "velocity" if found to be in degrees
 
 
 Progress: TypeAlias = Callable[[Iterable[Any], int], Iterable[Any]]
@@ -284,19 +219,10 @@ def without_progress(items: Iterable[Any], total: int) -> Iterable[Any]:
 
 @dataclass(frozen=True)
 class LogReader:
-    """A log of a known format: its episodes, and functions that read it.
+    """A log of a known format: its episodes, and functions that read it."""
 
-    Attributes:
-        kind: Name of the format.
-        episodes: Names of the episodes, each of which becomes a run; a single "" for a log
-            without episodes.
-        read: Reads one episode by its name.
-        listing: Lists the contents without reading all of them, a line each.
-        run: Reads the run, if the log is a run file.
-    """
-
-    kind: str
-    episodes: tuple[str, ...]
-    read: Callable[[str, Progress], Log]
-    listing: Callable[[], tuple[str, ...]]
-    run: Callable[[], Run] | None = None
+    kind: str  # name of the format
+    episodes: tuple[str, ...]  # each becomes a run; a single "" for a log without episodes
+    read: Callable[[str, Progress], Log]  # one episode, by its name
+    listing: Callable[[], tuple[str, ...]]  # the contents, without reading all, a line each
+    run: Callable[[], Run] | None = None  # of a run file
