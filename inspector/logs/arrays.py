@@ -1,19 +1,29 @@
-"""A log made of named arrays, as simulators and policies write them, by a table of their names."""
+"""Files of named arrays, NumPy's and MATLAB's, and what arrays hold, by a table of their names.
+
+Simulators and policies write them. Of MATLAB's files, those of version 5 are read here, each size
+once it agrees with what the file holds; those of version 7.3 are HDF5. The format:
+https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf
+"""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from decimal import Decimal
+from functools import partial
 from itertools import pairwise
+from math import prod
 from pathlib import Path
+from struct import error as struct_error
+from struct import unpack_from
 from typing import Any
 
 import numpy as np
+from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
 from inspector.logs.clocks import counted_stamps, counting, stamps_of
-from inspector.logs.log import SAMPLES, Entry, Field, Log, Stamps
+from inspector.logs.log import SAMPLES, Entry, Field, Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions, pose_of
 from inspector.logs.names import (
     SIGNALS,
@@ -24,7 +34,10 @@ from inspector.logs.names import (
     listed,
     time_column,
 )
-from noisemodel.types import Array, Real
+from noisemodel import Run, RunError, runfile
+from noisemodel.run import check_time
+from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
+from noisemodel.types import Real
 
 COMMAND, COPY = "command", "copy"
 QPOS, QVEL, FORCE = "qpos", "qvel", "qfrc_actuator"
@@ -51,7 +64,10 @@ TABLE: tuple[tuple[str, str], ...] = (
     (r"(.*/)?joint_?velocit(y|ies)", "velocity"),
     (r"(.*/)?(appliedjointmotortorques?|joint_torques|torques)", "effort"),
     (r"(.*/)?(targetpositions?|(joint_)?target_positions?)", "position_desired"),
-    (r"(.*/)?(targetvelocit(y|ies)|(joint_)?target_velocit(y|ies))", "velocity_desired"),
+    (
+        r"(.*/)?(targetvelocit(y|ies)|(joint_)?target_velocit(y|ies))",
+        "velocity_desired",
+    ),
     # What a policy says: positions, or anything else; decided by the values (`followed`)
     (r"processed_actions", COMMAND),
     (r"(.*/)?(ctrl|actions?|(joint_)?targets?|commands?)", COMMAND),
@@ -68,11 +84,21 @@ EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
 """Flags of D4RL and Gymnasium: the last step of an episode has one."""
 
 CELLS = re.compile(
-    r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?", re.IGNORECASE
+    r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?",
+    re.IGNORECASE,
 )
 """Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``."""
 
-RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate", "fs")
+RATES = (
+    "fps",
+    "hz",
+    "rate",
+    "frequency",
+    "control_freq",
+    "sample_rate",
+    "sampling_rate",
+    "fs",
+)
 STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
 """Names of the number that is the rate in [Hz], or the step in [s]."""
 
@@ -112,13 +138,19 @@ def log_of(
     options: ReadOptions,
     *,
     episode: str = "",
-    rate: float | None = None,
-    numbers: Mapping[str, float] | None = None,
+    stated: tuple[str, float | None] = ("", None),
     joints: Mapping[str, tuple[str, ...]] | None = None,
     controller: str = "",
     not_read: Sequence[str] = (),
 ) -> Log:
-    """Log of the arrays of one episode."""
+    """Log of the arrays of one episode.
+
+    Args:
+        stated: What states the rate, and the rate, in [Hz].
+        joints: Names of the columns of measured signals, by "", and of desired ones, by "_desired".
+        controller: Type of the controller that follows the commands.
+        not_read: Names of what the file holds besides.
+    """
     arrays = dict(_unpacked(arrays))
     options = options.for_columns(path, [*arrays])
     mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
@@ -128,28 +160,31 @@ def log_of(
         raise LogError(path, _nothing(episode, arrays))
     time, arrays = _time(arrays, options)
     arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
-    suggested, remarks = [*_of_mujoco(arrays, roles)], list[str]()
-    place, position, velocity = _measured(arrays, roles, suggested, options)
     samples = len(arrays[motion[0]])
-    stated = ("env_args", rate) if rate else _stated(numbers or {})
-    stamps = Stamps(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES)
+    state, targets, remarks, measured = _state(arrays, roles, options, controller)
+    stamps = Stamps.counted(samples)
     if time:
         stamps = stamps_of(path, time, arrays[time], options.rate)
-    if stamps.unit == SAMPLES and not any(arrays[name].ndim == 1 for name in motion):
-        stamps = counted_stamps(path, stamps, options, position, velocity, stated)
+    columns = any(arrays[name].ndim == 1 for name in motion)
+    if stamps.unit == SAMPLES and not columns:
+        stamps = counted_stamps(path, stamps, options, *measured, stated)
     elif stamps.unit == SAMPLES and stated[1] and not options.rate:
         stamps = counted_stamps(path, stamps, options, None, None, stated)
-    suggested += _base_of_isaac(arrays, roles, stamps, remarks)
-    suggested += _targets(arrays, roles, options, position, place, controller, remarks)
+    base, still = _base_of_isaac(arrays, roles, stamps)
+    suggested = (*state, *base, *targets)
     if RELATIVE_TO in roles and not any(STATES.fullmatch(name) for name in roles):
         remarks.append(RELATIVE)
+
+    def is_column(name: str, each: NDArray[Any]) -> bool:  # whose name may tell its joint
+        return each.ndim == 1 and bool(column_signal(name) or array_signal(name))
+
     fields = tuple(
         Field(
             name,
-            _numbers(each.reshape(samples, -1)),
+            floats(each.reshape(samples, -1)),
             stamps,
             joints=_joints(joints or {}, name, roles, each.size // samples, suggested),
-            signal=roles[name] if roles[name] in SIGNALS and _is_array(name, each) else "",
+            signal="" if roles[name] not in SIGNALS or is_column(name, each) else roles[name],
             source=path.name,
             rank=0 if STATES.fullmatch(name) else 1,
         )
@@ -161,16 +196,14 @@ def log_of(
         path,
         fields,
         episode,
-        not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
-        remarks=(*_taken(fields, suggested, options), *remarks),
-        suggested=tuple(suggested),
+        not_read=(
+            *(n for n in arrays if n not in read and meaning(n) != COPY),
+            *not_read,
+        ),
+        remarks=(*_taken(fields, suggested, options), *still, *remarks),
+        suggested=suggested,
         time=time,
     )
-
-
-def _is_array(name: str, each: NDArray[Any]) -> bool:
-    """Whether it is no column, whose name may tell its joint."""
-    return each.ndim == 2 or (column_signal(name) is None and array_signal(name) is None)
 
 
 def gathered(log: Log, options: ReadOptions) -> Log:
@@ -191,24 +224,27 @@ def gathered(log: Log, options: ReadOptions) -> Log:
         name: np.hstack([columns[number].values for number in sorted(columns)])
         for name, columns in groups.items()
     }
-    roles, remarks = {name: meaning(name) for name in arrays}, list[str]()
-    suggested = [*_of_mujoco(arrays, roles)]
-    place, position, velocity = _measured(arrays, roles, suggested, options)
-    suggested += _targets(arrays, roles, options, position, place, "", remarks)
+    roles = {name: meaning(name) for name in arrays}
+    state, targets, remarks, measured = _state(arrays, roles, options)
+    suggested = (*state, *targets)
     columns = {id(each) for members in groups.values() for each in members.values()}
-    stamps, source = log.fields[0].stamps, log.path.name
+    stamps = log.fields[0].stamps
     if stamps.unit == SAMPLES:
-        stamps = counted_stamps(log.path, stamps, options, position, velocity)
-    fields = (
-        *(replace(each, stamps=stamps) for each in log.fields if id(each) not in columns),
-        *(Field(name, each, stamps, source=source) for name, each in arrays.items()),
-    )
+        stamps = counted_stamps(log.path, stamps, options, *measured)
     return replace(
         log,
-        fields=fields,
-        suggested=tuple(suggested),
+        fields=(
+            *(replace(each, stamps=stamps) for each in log.fields if id(each) not in columns),
+            *(Field(name, each, stamps, source=log.path.name) for name, each in arrays.items()),
+        ),
+        suggested=suggested,
         remarks=(*log.remarks, *_taken((), suggested, options), *remarks),
     )
+
+
+def floats(values: NDArray[Any]) -> Real:
+    """Values as floating-point numbers; no copy of what they are already."""
+    return values if values.dtype.kind == "f" else values.astype(np.float64)
 
 
 def episodes_of(arrays: Arrays) -> dict[str, slice]:
@@ -228,14 +264,24 @@ def episodes_of(arrays: Arrays) -> dict[str, slice]:
     return {str(number): part for number, part in enumerate(found)}
 
 
-def single_numbers(items: Mapping[str, Any]) -> dict[str, float]:
-    """Single numbers among arrays or attributes, by name."""
-    arrays = {name: np.asarray(each) for name, each in items.items()}
+def part_of(arrays: Arrays, episode: str) -> Arrays:
+    """Arrays of which those that have as many samples as the longest are cut to an episode."""
+    part = episodes_of(arrays)[episode]
+    samples = max((len(each) for each in arrays.values() if each.ndim), default=0)
     return {
-        name: float(each.item())
-        for name, each in arrays.items()
-        if each.size == 1 and each.dtype.kind in "iuf"
+        n: each[part] if each.ndim and len(each) == samples else each for n, each in arrays.items()
     }
+
+
+def stated_rate(items: Mapping[str, Any]) -> tuple[str, float | None]:
+    """Name of the number among arrays or attributes that states the rate, and the rate in [Hz]."""
+    for name, item in items.items():
+        last, each = name.rpartition("/")[2].lower(), np.asarray(item)
+        if last in (*RATES, *STEPS) and each.size == 1 and each.dtype.kind in "iuf":
+            number = float(each.item())
+            if number > 0:
+                return name, float(f"{number if last in RATES else 1 / number:.9g}")
+    return "", None
 
 
 def followed(command: Real, position: Real) -> int:
@@ -251,51 +297,14 @@ def followed(command: Real, position: Real) -> int:
         if moves:
             deviation = float(np.std(wanted)), float(np.std(actual))
             common = float(np.mean((wanted - wanted.mean()) * (actual - actual.mean())))
-            correlation, slope = common / (deviation[0] * deviation[1]), common / deviation[0] ** 2
+            correlation, slope = (
+                common / (deviation[0] * deviation[1]),
+                common / deviation[0] ** 2,
+            )
             if correlation < FOLLOWS or not SLOPES[0] <= slope <= SLOPES[1]:
                 break
         count, moving = count + 1, moving + moves
     return count if moving and 2 * count >= position.shape[1] else 0
-
-
-def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
-    """Name of the array with the stamps, empty without; a part of one is an array then."""
-    rows = [name for name, each in arrays.items() if each.ndim == 1]
-    if not options.time:
-        samples = max((len(each) for each in arrays.values() if each.ndim), default=0)
-        counters = {
-            name: arrays[name]
-            for name in rows
-            if len(arrays[name]) == samples and not (column_signal(name) or array_signal(name))
-        }
-        return time_column(rows) or counting(counters), arrays
-    entry = next(each for each in options.entries if each.signal == "time")
-    name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
-    if name not in arrays:
-        return time_column(rows), arrays
-    values = arrays[name].reshape(len(arrays[name]), -1)[:, part]
-    return (entry.source, {**arrays, entry.source: values[:, 0]}) if values.size else ("", arrays)
-
-
-def _roles(arrays: Arrays, mapped: set[str]) -> dict[str, str]:
-    """Meaning of the arrays, without those for which another one stands."""
-    naming = Naming.of(name for name, each in arrays.items() if each.ndim == 1)
-    roles = {name: "" if name in mapped else meaning(name) for name in arrays}
-    for name, each in arrays.items():  # columns that name their joint
-        if name not in mapped and not roles[name] and each.ndim == 1:
-            known = column_signal(name, naming)
-            roles[name] = known[0] if known else ""
-    robots = {match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
-    chosen = "robot" if "robot" in robots else min(robots, default="")
-    dropped = []
-    for name, what in roles.items():
-        match = STATES.fullmatch(name)
-        others = [n for n in roles if n != name and roles[n] == what and n not in dropped]
-        if (match and match["robot"] != chosen and name not in mapped) or (
-            what in (QPOS, QVEL, FORCE) and others and name != min((name, *others), key=len)
-        ):
-            dropped.append(name)
-    return {n: what for n, what in roles.items() if what != COPY and n not in dropped}
 
 
 def _unpacked(arrays: Arrays) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -309,6 +318,49 @@ def _unpacked(arrays: Arrays) -> Iterator[tuple[str, NDArray[Any]]]:
             yield name, each[:, 0]
         elif each.ndim in (1, 2) and len(each) > 1:
             yield name, each
+
+
+def _roles(arrays: Arrays, mapped: set[str]) -> dict[str, str]:
+    """Meaning of the arrays, without those for which another one stands."""
+    naming = Naming.of(name for name, each in arrays.items() if each.ndim == 1)
+    roles = {name: "" if name in mapped else meaning(name) for name in arrays}
+    for name, each in arrays.items():  # columns that name their joint
+        if name not in mapped and not roles[name] and each.ndim == 1:
+            roles[name] = (column_signal(name, naming) or ("",))[0]
+    robots = {match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
+    chosen = "robot" if "robot" in robots else min(robots, default="")
+    dropped = []
+    for name, what in roles.items():
+        match = STATES.fullmatch(name)
+        others = [n for n in roles if n != name and roles[n] == what and n not in dropped]
+        if (match and match["robot"] != chosen and name not in mapped) or (
+            what in (QPOS, QVEL, FORCE) and others and name != min((name, *others), key=len)
+        ):
+            dropped.append(name)
+    return {n: what for n, what in roles.items() if what != COPY and n not in dropped}
+
+
+def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
+    """Name of the array with the stamps, empty without; a part of one is an array then."""
+    rows = [name for name, each in arrays.items() if each.ndim == 1]
+    if not options.time:
+        samples = max((len(each) for each in arrays.values()), default=0)
+        counters = {
+            name: arrays[name]
+            for name in rows
+            if len(arrays[name]) == samples and not (column_signal(name) or array_signal(name))
+        }
+        return time_column(rows) or counting(counters), arrays
+    values = _part(arrays, Entry("time", "", options.time))
+    if values is None:
+        return time_column(rows), arrays
+    return (options.time, {**arrays, options.time: values[:, 0]}) if values.size else ("", arrays)
+
+
+def _part(arrays: Arrays, entry: Entry) -> NDArray[Any] | None:
+    """What an entry names, shape (samples, columns); None if there is no such array."""
+    name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
+    return arrays[name].reshape(len(arrays[name]), -1)[:, part] if name in arrays else None
 
 
 def _of_one_length(
@@ -330,18 +382,48 @@ def _of_one_length(
             transposed = each.ndim == 2 and each.shape[1] == samples
             hint = "; samples come first, is it transposed?" if transposed else ""
             raise LogError(
-                path, f"{name!r} has shape {each.shape}, there are {samples} stamps{hint}"
+                path,
+                f"{name!r} has shape {each.shape}, there are {samples} stamps{hint}",
             )
     return dict(arrays)
 
 
-def _stated(numbers: Mapping[str, float]) -> tuple[str, float | None]:
-    """Name of the number that states the rate, and the rate, in [Hz]."""
-    for name, number in numbers.items():
-        last = name.rpartition("/")[2].lower()
-        if number > 0 and last in (*RATES, *STEPS):
-            return name, float(f"{number if last in RATES else 1 / number:.9g}")
-    return "", None
+def _state(
+    arrays: Arrays, roles: Mapping[str, str], options: ReadOptions, controller: str = ""
+) -> tuple[list[Entry], list[Entry], list[str], tuple[Real | None, Real | None]]:
+    """What holds the state, and what the positions follow: mappings of both, and remarks.
+
+    Besides, the positions and velocities, by the options, the format or names; None without.
+    """
+    state = [*_of_mujoco(arrays, roles)]
+    measured: dict[str, Real | None] = {}
+    place = ""
+    for signal in ("velocity", "position"):
+        entries = (e for e in (*options.entries, *state) if e.signal == signal and not e.joint)
+        named = (name for name, what in roles.items() if what == signal)
+        isaac_first = sorted(named, key=lambda name: not STATES.fullmatch(name))
+        place = (*(entry.source for entry in entries), *isaac_first, "")[0]
+        values = _part(arrays, Entry(signal, "", place))
+        measured[signal] = None if values is None else floats(values)
+    position, velocity = measured["position"], measured["velocity"]
+    targets, remarks = list[Entry](), list[str]()
+    given = {entry.signal for entry in options.entries} | set(roles.values())
+    commands = [n for n, what in roles.items() if what == COMMAND and arrays[n].ndim == 2]
+    if position is None or "position_desired" in given or not commands:
+        return state, targets, remarks, (position, velocity)
+    for name in sorted(commands, key=lambda name: "processed" not in name):
+        command = arrays[name]
+        if len(command) == len(position) and (count := followed(command, position)):
+            part = name if count == command.shape[1] else f"{name}[0:{count}]"
+            targets.append(Entry("position_desired", "", part))
+            break
+    else:
+        to = f", they are the input of a controller of type {controller}" if controller else ""
+        remarks.append(
+            f"{listed(commands)} not taken as desired positions: {place} does not follow{to};"
+            f" --map position_desired={commands[0]} takes it"
+        )
+    return state, targets, remarks, (position, velocity)
 
 
 def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
@@ -391,91 +473,34 @@ def _floating(qpos: Real, count: int) -> list[int]:
 
 
 def _base_of_isaac(
-    arrays: Arrays, roles: Mapping[str, str], stamps: Stamps, remarks: list[str]
-) -> Iterator[Entry]:
-    """Mapping of a root that moves; the root of a robot on a table stands still and is left out."""
+    arrays: Arrays, roles: Mapping[str, str], stamps: Stamps
+) -> tuple[list[Entry], list[str]]:
+    """Mapping of a root that moves; that of a robot on a table is left out, with a remark."""
     found = {match["what"]: name for name in roles if (match := STATES.fullmatch(name))}
     pose = arrays.get(found.get("root_pose", ""))
     if pose is None or pose.shape != (len(stamps.time), 7):
-        return
+        return [], []
     velocity = arrays.get(found.get("root_velocity", ""))
     turning = velocity is not None and bool(np.abs(velocity).max() > STILL)
     if np.ptp(pose, axis=0).max() < STILL and not turning:
-        remarks.append(f"{found['root_pose']} stands still: the base is taken as fixed")
-        return
-    order = "wxyz"
-    if velocity is not None and velocity.shape == (len(pose), 6):
-        # Isaac Lab 3.0 changed the order: the one whose turns are the logged angular velocities.
-        errors = {
-            each: np.linalg.norm(_turns(pose_of(pose, each), stamps) - velocity[:, 3:])
-            for each in ("wxyz", "xyzw")
-        }
-        order = min(errors, key=lambda each: float(errors[each]))
-        yield Entry("base_velocity", "world", found["root_velocity"])
-    yield Entry("base_pose", order, found["root_pose"])
+        return [], [f"{found['root_pose']} stands still: the base is taken as fixed"]
+    if velocity is None or velocity.shape != (len(pose), 6):
+        return [Entry("base_pose", "wxyz", found["root_pose"])], []
 
+    def error(order: str) -> float:
+        """Distance of the logged angular velocities from the turns of the pose, in world axes."""
+        turned = pose_of(pose, order)[:, 3:]
+        rate = np.gradient(turned, stamps.time, axis=0)
+        vector, scalar = turned[:, :3], turned[:, 3:]
+        # omega = 2 vec(q_dot conj(q))
+        omega = scalar * rate[:, :3] - rate[:, 3:] * vector - np.cross(rate[:, :3], vector)
+        return float(np.linalg.norm(2 * omega - velocity[:, 3:]))
 
-def _turns(pose: Array, stamps: Stamps) -> Array:
-    """Angular velocity of a base in world axes, shape (samples, 3), in [rad/s]."""
-    rate = np.gradient(pose[:, 3:], stamps.time, axis=0)
-    vector, scalar = pose[:, 3:6], pose[:, 6:]
-    # omega = 2 vec(q_dot conj(q))
-    turned: Array = scalar * rate[:, :3] - rate[:, 3:] * vector - np.cross(rate[:, :3], vector)
-    return 2 * turned
-
-
-def _targets(
-    arrays: Arrays,
-    roles: Mapping[str, str],
-    options: ReadOptions,
-    position: Real | None,
-    source: str,
-    controller: str,
-    remarks: list[str],
-) -> Iterator[Entry]:
-    """Mapping of the first command that the positions follow."""
-    given = {entry.signal for entry in options.entries} | set(roles.values())
-    if position is None or "position_desired" in given:
-        return
-    commands = [n for n, what in roles.items() if what == COMMAND and arrays[n].ndim == 2]
-    for name in sorted(commands, key=lambda name: "processed" not in name):
-        command = arrays[name]
-        count = followed(command, position) if len(command) == len(position) else 0
-        if count:
-            part = name if count == command.shape[1] else f"{name}[0:{count}]"
-            yield Entry("position_desired", "", part)
-            return
-    if commands:
-        to = f", they are the input of a controller of type {controller}" if controller else ""
-        remarks.append(
-            f"{listed(commands)} not taken as desired positions: {source} does not follow{to};"
-            f" --map position_desired={commands[0]} takes it"
-        )
-
-
-def _measured(
-    arrays: Arrays, roles: Mapping[str, str], suggested: Sequence[Entry], options: ReadOptions
-) -> tuple[str, Real | None, Real | None]:
-    """Where the positions are, and positions and velocities: by the mapping, the format, or names.
-
-    Either is None if there is no such array.
-    """
-    found: dict[str, Real | None] = {}
-    place = ""
-    for signal in ("velocity", "position"):
-        mapped = [e for e in (*options.entries, *suggested) if e.signal == signal and not e.joint]
-        named = sorted(
-            (n for n in roles if roles[n] == signal), key=lambda n: not STATES.fullmatch(n)
-        )
-        entry = (*mapped, *(Entry(signal, "", name) for name in named), Entry(signal, "", ""))[0]
-        name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
-        each, place = arrays.get(name), entry.source
-        found[signal] = None if each is None else _numbers(each.reshape(len(each), -1)[:, part])
-    return place, found["position"], found["velocity"]
-
-
-def _numbers(values: NDArray[Any]) -> Real:
-    return values if values.dtype.kind == "f" else values.astype(np.float64)
+    order = min(("wxyz", "xyzw"), key=error)  # Isaac Lab 3.0 changed it
+    return [
+        Entry("base_velocity", "world", found["root_velocity"]),
+        Entry("base_pose", order, found["root_pose"]),
+    ], []
 
 
 def _joints(
@@ -491,9 +516,10 @@ def _joints(
         return tuple(f"{match['arm']}_joint_{number}" for number in range(width))
     parts = [entry for entry in suggested if entry.part()[0] == name]
     signal = parts[-1].signal if parts else roles[name]
-    names = joints.get("_desired" if signal.endswith("_desired") else "", joints.get("", ()))
+    desired = signal.endswith("_desired")
+    names = joints.get("_desired" if desired else "", joints.get("", ()))
     first, stop, _ = (parts[-1].part()[1] if parts else slice(None)).indices(width)
-    if signal.endswith("_desired") and parts:
+    if desired and parts:
         names = names[: stop - first]
     if not names or len(names) != stop - first:
         return ()
@@ -520,10 +546,6 @@ def _why(entry: Entry) -> str:
     return f" ({QUATERNION[entry.joint]})" if entry.joint in QUATERNION else ""
 
 
-def _shape(name: str, each: NDArray[Any]) -> str:
-    return f"{name} ({', '.join(map(str, each.shape))})"
-
-
 def _nothing(episode: str, arrays: Arrays) -> str:
     """Problem of a file that is not known to hold motion: what it holds, and what to type."""
     where = episode or "the file"
@@ -535,7 +557,271 @@ def _nothing(episode: str, arrays: Arrays) -> str:
         example = f"--map position={name}[0:{half}] --map velocity={name}[{half}:{2 * half}]"
     if name == "states":  # of robosuite, before robomimic has extracted observations
         example = "--map position=states[1:8] (MuJoCo's flattened states are time, qpos, qvel)"
+    shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])
     return (
         f"{where} holds no known joint positions or velocities; name them, such as {example};"
-        f" it has {listed([_shape(*each) for each in arrays.items()])}"
+        f" it has {shapes}"
     )
+
+
+# NumPy's files
+
+OBJECTS = (
+    "Python objects, such as None, or PyBullet's joint states as they are; save numbers:"
+    " np.savez(path, time=times, position=positions, velocity=velocities)"
+)
+SAMPLE = "noise-sample/"
+SAMPLE_PROBLEM = (
+    "holds the noise of a simulated run, not its motion: the folder of the data set is for"
+    " `inspector train`, `tune` and `evaluate`; `inspector simulate run` writes runs"
+)
+ALONE = "array"
+"""Name of the array in a .npy file, for a mapping."""
+
+
+def open_log(path: Path, options: ReadOptions) -> LogReader:
+    """Reader of an archive, an array alone, or a MATLAB file of version 5."""
+    with path.open("rb") as stream:
+        if stream.read(len(MATLAB)) == MATLAB:
+            return _matlab(path, options)
+    arrays = _arrays(path)
+    if str(arrays.get("format", "")).startswith(SAMPLE):
+        raise LogError(path, SAMPLE_PROBLEM)
+    as_log = options.entries or options.units or options.joints
+    return LogReader(
+        "npz",
+        tuple(episodes_of(arrays)),
+        lambda episode, progress: _read(path, options, episode),
+        lambda: _listing(_arrays(path)),
+        partial(Run.load, path) if _is_run(arrays) and not as_log else None,
+    )
+
+
+def _listing(arrays: Arrays) -> tuple[str, ...]:
+    return tuple(f"{name}  {each.dtype} {each.shape}" for name, each in arrays.items())
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        with path.open("rb") as stream:
+            if stream.read(len(MAGIC_PREFIX)) == MAGIC_PREFIX:
+                stream.seek(0)
+                array = np.asarray(runfile.read_array(stream, "it", path.stat().st_size))
+                names = array.dtype.names or ()
+                return {name: array[name] for name in names} if names else {ALONE: array}
+        return runfile.read_npz(path)
+    except OSError as error:
+        raise LogError(path, f"cannot be read ({error.strerror or error})") from error
+    except runfile.ObjectArrayError as error:
+        problem = f"not an archive of plain arrays: {error.name!r} holds {OBJECTS}"
+        raise LogError(path, problem) from error
+    except ArchiveError as error:
+        raise LogError(path, f"not an archive of plain arrays: {error}") from error
+
+
+def _is_run(arrays: Arrays) -> bool:
+    """Whether it is a run file with uniform time; one without is resampled."""
+    known = all(name in runfile.ARRAYS or name.startswith(runfile.STAGE) for name in arrays)
+    if not known or "time" not in arrays:
+        return False
+    try:
+        check_time(arrays["time"])
+    except (RunError, TypeError):
+        return False
+    return True
+
+
+def _read(path: Path, options: ReadOptions, episode: str) -> Log:
+    arrays = _arrays(path)
+    joints = {
+        ending: tuple(map(str, arrays[key].ravel()))
+        for ending, key in (("", "joint_names"), ("_desired", "desired_joint_names"))
+        if key in arrays and arrays[key].dtype.kind == "U"
+    }
+    numbers = {
+        name: each
+        for name, each in part_of(arrays, episode).items()
+        if each.ndim and each.dtype.kind in "iufM"
+    }
+    stated = stated_rate(arrays)
+    return log_of(path, numbers, options, episode=episode, stated=stated, joints=joints)
+
+
+# MATLAB's files of version 5
+
+MATLAB = b"MATLAB 5.0 MAT-f"
+"""The first bytes of such a file."""
+HEADER = 128
+"""Bytes before the first variable."""
+MATRIX, COMPRESSED, FLAGS, DIMENSIONS = 14, 15, 6, 5
+"""Types of elements: a variable, one that is packed, and what a variable begins with."""
+STORED = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}
+"""Types of elements that hold numbers, whatever the class of the variable is."""
+STRUCT, TEXT, NESTED = 2, 4, (1, 2)
+"""Classes of variables; cells and structs hold others."""
+NO_NUMBERS = (3, 5, 16, 17, 18)
+"""Classes of objects, sparse matrices and functions."""
+COMPLEX = 0x800
+"""The flag of a variable with imaginary parts."""
+DEPTH = 20
+"""Structs and cells within each other."""
+
+DATA = ("signals/values", "Data", "data", "Values", "values")
+"""Fields of a timeseries, or of what Simulink logs as a struct, that hold the signal itself."""
+STAMPS = ("Time", "time", "t")
+
+MATLAB_OBJECTS = (
+    "holds MATLAB objects ({}), such as a timeseries or Simulink's logsout, not numbers; in MATLAB:"
+    " t = ts.Time; q = ts.Data; save('log.mat', 't', 'q'); of Simulink, ts = logsout{{1}}.Values"
+)
+
+
+def _matlab(path: Path, options: ReadOptions) -> LogReader:
+    variables = _variables(path)
+    return LogReader(
+        "MATLAB 5",
+        ("",),
+        lambda episode, progress: log_of_variables(path, _variables(path), options),
+        lambda: _listing(variables),
+    )
+
+
+def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log:
+    """Log of variables, whose samples are along either axis, as in MATLAB."""
+    named = {}
+    for name, each in variables.items():
+        field = next((f"/{field}" for field in DATA if name.endswith(f"/{field}")), "")
+        last = name.rpartition("/")[2]
+        plain = name.removesuffix(field) or name  # `q/Data` is `q`, its stamps are `Time`
+        if each.dtype.kind in "iuf":
+            named[last if not field and last in STAMPS else plain] = (
+                each.ravel() if 1 in each.shape else each
+            )
+    time = options.time or time_column([name for name, each in named.items() if each.ndim == 1])
+    longest = max((max(each.shape) for each in named.values() if each.ndim), default=0)
+    samples = len(named[time]) if time in named else longest
+    turned = {
+        name: each.T if each.ndim == 2 and each.shape[1] == samples != each.shape[0] else each
+        for name, each in named.items()
+    }
+    return log_of(path, turned, options, stated=stated_rate(turned))
+
+
+def check_numbers(path: Path, arrays: Arrays, objects: Collection[str]) -> None:
+    """Refuse a file of objects alone: only MATLAB's own code reads what they hold."""
+    if objects and not any(each.size > 1 for each in arrays.values()):
+        raise LogError(path, MATLAB_OBJECTS.format(", ".join(sorted(set(objects))[:3])))
+
+
+def _variables(path: Path) -> dict[str, NDArray[Any]]:
+    """Arrays of numbers in a file; of a struct its fields, of cells each by its number."""
+    objects, found = list[str](), dict[str, NDArray[Any]]()
+    try:
+        for data in _unpacked_variables(path.read_bytes()):
+            parts = _elements(data, 8, len(data))
+            texts = [data[slice(*part[1:])].decode("latin1") for part in parts if part[0] in (1, 2)]
+            name = next(iter(texts), "")
+            arrays = dict(_numbers_in(data, 8, len(data), name))
+            numbers = {each: array for each, array in arrays.items() if array is not None}
+            if len(numbers) < len(arrays):
+                objects.append(next((text for text in texts if text.strip("\0")), "unnamed"))
+            elif name and not name.startswith("__"):
+                found |= numbers
+    except struct_error as error:
+        raise LogError(path, "damaged: a variable is cut off") from error
+    except (ArchiveError, OSError) as error:
+        raise LogError(path, one_line(error)) from error
+    check_numbers(path, found, objects)
+    return found
+
+
+def _unpacked_variables(data: bytes) -> Iterator[bytes]:
+    """The variables of a file, each with its tag."""
+    if data[126:128] != b"IM":
+        raise ArchiveError("a MATLAB file of another byte order; save it again with MATLAB")
+    place, total = HEADER, 0
+    while place + 8 <= len(data):
+        kind, size = unpack_from("<II", data, place)
+        element = data[place : place + 8 + size]
+        place += 8 + size
+        if len(element) < 8 + size:
+            raise ArchiveError("damaged or cut off: a variable is shorter than it states")
+        if kind == COMPRESSED:
+            pieces, unpacker, waiting = [], zlib.decompressobj(), element[8:]
+            while waiting and not unpacker.eof:
+                try:
+                    pieces.append(unpacker.decompress(waiting, PIECE))
+                except zlib.error as error:
+                    raise ArchiveError(f"damaged: {error}") from error
+                waiting = unpacker.unconsumed_tail
+                total += len(pieces[-1])
+                check_unpacked(total, len(data))
+            element = b"".join(pieces)
+        if unpack_from("<I", element) == (MATRIX,):
+            yield element
+
+
+def _elements(data: bytes, place: int, stop: int) -> Iterator[tuple[int, int, int]]:
+    """Type, start and end of each element: small ones have their data in their tag."""
+    while place + 8 <= stop:
+        kind, size = unpack_from("<II", data, place)
+        start = place + 8
+        following = start + size + (-size % 8)
+        if kind >> 16:
+            kind, size, start, following = kind & 0xFFFF, kind >> 16, place + 4, place + 8
+        if start + size > stop:
+            raise ArchiveError("damaged: an element is longer than its variable")
+        yield kind, start, start + size
+        place = following
+
+
+def _numbers_in(
+    data: bytes, place: int, stop: int, name: str, depth: int = DEPTH
+) -> Iterator[tuple[str, NDArray[Any] | None]]:
+    """Arrays of numbers in a variable, of the sizes that it states; None for an object."""
+    parts = [*_elements(data, place, stop)]
+    if not parts:
+        yield name, np.empty((1, 0))  # an empty cell
+        return
+    flags, dims = NO_NUMBERS[0], tuple[Any, ...]()
+    if depth and len(parts) > 2 and (parts[0][0], parts[1][0]) == (FLAGS, DIMENSIONS):
+        (flags,) = unpack_from("<I", data, parts[0][1])
+        dims = unpack_from(f"<{(parts[1][2] - parts[1][1]) // 4}i", data, parts[1][1])
+    kind, count = flags & 0xFF, prod(dims)
+    if kind in NO_NUMBERS or min(dims, default=0) < 0:
+        yield name, None
+    elif kind in NESTED:
+        fields, inner = [""], parts[3:]
+        if kind == STRUCT and len(parts) > 4:  # the length of the fields' names, and these
+            (length,), inner = unpack_from("<i", data, parts[3][1]), parts[5:]
+            names = data[slice(*parts[4][1:])]
+            each = (names[at : at + length] for at in range(0, len(names), max(1, length)))
+            fields = [f"/{text.partition(bytes(1))[0].decode('latin1')}" for text in each]
+        held = sum(part[0] == MATRIX for part in inner)
+        if held < len(inner) or count > max(1, held) or count * len(fields) > held:
+            raise ArchiveError(f"damaged: a variable states {count} cells and holds {held}")
+        # NumPy counts along the last axis first
+        for number, cell in enumerate(np.arange(count).reshape(dims, order="F").ravel()):
+            numbered = f"{name}/{number}" if count > 1 else name
+            for field, part in zip(fields, inner[cell * len(fields) :], strict=False):
+                yield from _numbers_in(data, *part[1:], f"{numbered}{field}", depth - 1)
+    else:
+        size = sum(end - start for _, start, end in parts[3:])
+        stored, start, end = (*parts, (1, stop, stop))[3]
+        dtype = np.dtype(STORED.get(stored, "i1"))
+        plain = kind != TEXT and not flags & COMPLEX
+        if count > size or (plain and count * dtype.itemsize != end - start):
+            raise ArchiveError(f"damaged: a variable states {count} numbers and holds {size} bytes")
+        if plain and len(dims) <= 2:
+            yield name, np.ndarray(dims, dtype, data, start, order="F")

@@ -6,7 +6,7 @@ MATLAB's files of version 7.3 are HDF5 too: structs are groups, and arrays are t
 import re
 import subprocess
 import sys
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from math import inf, prod
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from inspector.errors import LogError
 from inspector.logs.arrays import (
@@ -23,10 +24,14 @@ from inspector.logs.arrays import (
     RATES,
     STATES,
     STEPS,
+    Arrays,
+    check_numbers,
     episodes_of,
     log_of,
+    log_of_variables,
     meaning,
-    single_numbers,
+    part_of,
+    stated_rate,
 )
 from inspector.logs.log import Log, LogReader
 from inspector.logs.mapping import ReadOptions
@@ -71,80 +76,72 @@ REFERENCES = "#refs#"
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of an HDF5 file."""
+    with path.open("rb") as stream:
+        is_matlab = stream.read(len(MATLAB)) == MATLAB
     try:
         with h5py.File(path) as file:
-            home, episodes = _episodes(path, file)
+            home, episodes = _episodes(path, file, is_matlab=is_matlab)
             about = _arguments(path, file.get(EPISODES, file).attrs)
     except LogError:
         raise
     except DAMAGE as error:
         raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
     return LogReader(
-        "MATLAB 7.3" if _is_matlab(path) else "HDF5",
+        "MATLAB 7.3" if is_matlab else "HDF5",
         episodes,
-        lambda episode, progress: _read(path, options, home, episode, about),
+        lambda episode, progress: _read(path, options, home, episode, about, is_matlab=is_matlab),
         lambda: _listing(path, home, episodes),
     )
 
 
-def _is_matlab(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return stream.read(len(MATLAB)) == MATLAB
-
-
-def _episodes(path: Path, file: Any) -> tuple[str, tuple[str, ...]]:
+def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str, ...]]:
     """Name of the group that holds a group for each episode, and names of these.
 
     The name is empty where the episodes are in the file itself, one after the other or alone.
     """
     for home in (EPISODES, "/"):
-        if isinstance(group := _own(path, file.get(home), file), h5py.Group):
+        group = _own(path, file.get(home), file)
+        if isinstance(group, h5py.Group) and not is_matlab:
             groups = {
                 h5py.h5o.get_info(each.id).addr: name  # of many links to one group the last
                 for name, each in group.items()
                 if isinstance(each, h5py.Group)
             }
-            found = [
-                name for name in groups.values() if home == EPISODES or NUMBERED.fullmatch(name)
-            ]
-            if found and not _is_matlab(path):
-                by_number = lambda name: [int(n) for n in re.findall(r"\d+", name)]  # noqa: E731
-                return home, tuple(sorted(found, key=by_number))
-    ends = ((name, _own(path, file.get(name), file)) for name in EPISODE_ENDS)
-    flags = dict(_values(path, [each for each in ends if isinstance(each[1], h5py.Dataset)]))
-    return "", tuple(episodes_of(flags))
+            if found := [n for n in groups.values() if home == EPISODES or NUMBERED.fullmatch(n)]:
+                found.sort(key=lambda name: [int(number) for number in re.findall(r"\d+", name)])
+                return home, tuple(found)
+    flags = {name: file.get(name) for name in EPISODE_ENDS}
+    datasets = {name: each for name, each in flags.items() if isinstance(each, h5py.Dataset)}
+    return "", tuple(episodes_of(_values(path, file, datasets)))
 
 
-def _read(path: Path, options: ReadOptions, home: str, episode: str, about: str) -> Log:
+def _read(
+    path: Path, options: ReadOptions, home: str, episode: str, about: str, *, is_matlab: bool
+) -> Log:
     try:
         with h5py.File(path) as file:
             group = _own(path, file[f"{home}/{episode}"], file) if home else file
             datasets, left_out = _wanted(group, options)
-            objects = [name for name, each in datasets if OBJECT in each.attrs]
-            datasets = [(name, each) for name, each in datasets if name not in objects]
-            arrays = dict(_values(path, [(n, _own(path, each, file)) for n, each in datasets]))
+            objects = [name for name, each in datasets.items() if OBJECT in each.attrs]
+            plain = {name: each for name, each in datasets.items() if name not in objects}
+            arrays: Arrays = _values(path, file, plain)
             attributes = {**_single(file.attrs), **_single(group.attrs)}
     except LogError:
         raise
     except DAMAGE as error:
         raise LogError(path, f"{episode or 'it'} is damaged ({one_line(error)})") from error
-    if _is_matlab(path):
-        from inspector.logs.matlab import check_numbers, log_of_variables
-
+    if is_matlab:
         check_numbers(path, arrays, objects)
         log = log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
         return replace(log, not_read=(*log.not_read, *objects))
-    if not home:
-        part, samples = episodes_of(arrays)[episode], max(map(len, arrays.values()), default=0)
-        arrays = {n: each[part] if len(each) == samples else each for n, each in arrays.items()}
-    controller = CONTROLLER.search(about)
+    arrays = arrays if home else part_of(arrays, episode)
+    controller, rate = CONTROLLER.search(about), _rate(about)
     return log_of(
         path,
         {name: each for name, each in arrays.items() if each.dtype.kind in "iuf"},
         options,
         episode=episode,
-        rate=_rate(about),
-        numbers=single_numbers(attributes | arrays),
+        stated=(ARGUMENTS, rate) if rate else stated_rate({**attributes, **arrays}),
         controller=controller[1] if controller else "",
         not_read=left_out,
     )
@@ -188,35 +185,34 @@ def _own(path: Path, each: Any, file: Any) -> Any:
     return each
 
 
-def _values(path: Path, datasets: Sequence[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
+def _values(path: Path, file: Any, datasets: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     """Read datasets that are in the file, or nearly so: a few bytes may state any shape."""
+    own = {name: _own(path, each, file) for name, each in datasets.items()}
     try:
-        check_unpacked(sum(int(each.nbytes) for _, each in datasets), path.stat().st_size)
+        check_unpacked(sum(int(each.nbytes) for each in own.values()), path.stat().st_size)
     except ArchiveError as error:
         raise LogError(path, str(error)) from error
-    for name, dataset in datasets:
-        yield name, np.atleast_1d(dataset[()])
+    return {name: np.atleast_1d(each[()]) for name, each in own.items()}
 
 
-def _wanted(group: Any, options: ReadOptions) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
+def _wanted(group: Any, options: ReadOptions) -> tuple[dict[str, Any], list[str]]:
     """Numeric datasets of up to two dimensions, or three of joint states, by name in the group.
 
     Besides, the names of large ones that nothing is known of.
     """
     mapped = {entry.part()[0] for entry in options.entries}
-    found: list[tuple[str, Any]] = []
+    found: dict[str, Any] = {}
     left_out: list[str] = []
-
-    for name, each in _datasets(group, mapped):
+    for name, each in _datasets(group, mapped).items():
+        last = name.rpartition("/")[2].lower()
         if each.dtype.kind not in "iufb" or each.attrs.get("MATLAB_class") == b"char":
             continue
-        last = name.rpartition("/")[2].lower()
         if 1 <= each.ndim <= 2 or (each.ndim == 3 and last in JOINT_STATES) or each.size == 1:
             if _is_known(name, mapped) or each.nbytes <= SMALL:
-                found.append((name, each))
+                found[name] = each
             else:
                 left_out.append(name)
-    return found, tuple(left_out)
+    return found, left_out
 
 
 def _is_known(name: str, mapped: Collection[str]) -> bool:
@@ -224,7 +220,7 @@ def _is_known(name: str, mapped: Collection[str]) -> bool:
     return known or name in mapped or name.rpartition("/")[2].lower() in NAMES
 
 
-def _datasets(group: Any, mapped: Collection[str]) -> list[tuple[str, Any]]:
+def _datasets(group: Any, mapped: Collection[str]) -> dict[str, Any]:
     """Datasets in a group, each once, by a name that is known if one of its links has such."""
     found: dict[int, tuple[str, Any]] = {}
     seen, waiting = set[int](), [("", group)]
@@ -242,7 +238,7 @@ def _datasets(group: Any, mapped: Collection[str]) -> list[tuple[str, Any]]:
             elif isinstance(inside, h5py.Group) and address not in seen:
                 seen.add(address)
                 waiting.append((f"{path}/", inside))
-    return sorted(found.values(), key=lambda each: each[0])
+    return dict(sorted(found.values(), key=lambda each: each[0]))
 
 
 def _rate(env_args: str) -> float | None:

@@ -36,11 +36,11 @@ MAGIC = {
     b"#ROSBAG V": "bags",
     b"PAR1": "parquet",
     b"\x89HDF\r\n\x1a\n": "hdf5",
-    b"PK\x03\x04": "npz",
-    b"PK\x05\x06": "npz",
-    b"\x93NUMPY": "npz",
+    b"PK\x03\x04": "arrays",
+    b"PK\x05\x06": "arrays",
+    b"\x93NUMPY": "arrays",
     b"MATLAB 7.3 MAT-f": "hdf5",
-    b"MATLAB 5.0 MAT-f": "matlab",
+    b"MATLAB 5.0 MAT-f": "arrays",
 }
 """The first bytes of a file, and the module here that reads it; other files are CSV."""
 
