@@ -1,14 +1,16 @@
-"""Parquet logs with a row per sample, and columns of numbers or of lists of numbers.
+"""Parquet logs with a row per sample, and LeRobot's data sets of such files, v2 and v3.
 
 What columns unpack to is known before by the headers of their pages: pyarrow makes room for a page
 by its header, whatever the end of the file states, and its table of columns ends the process on
 some damage. Both are structs of Thrift's compact protocol:
 https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md and
 https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift
+
+The states and actions of a LeRobot data set are joint positions, in a unit that it does not name:
+radians, degrees, or normalised to each joint's calibrated range.
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from decimal import Decimal
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -20,32 +22,80 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
+from inspector.logs.arrays import floats
 from inspector.logs.clocks import counting, stamps_of
-from inspector.logs.log import SAMPLES, Field, Log, LogReader, Stamps
+from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions, check_unit
-from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
+from inspector.logs.names import (
+    Naming,
+    array_signal,
+    column_signal,
+    listed,
+    time_column,
+)
+from inspector.text import counted
+from noiseclassifier.jsontext import from_json, text_of
 from noisemodel.files import beyond, limit
 from noisemodel.runfile import ArchiveError, check_regular, check_unpacked, one_line
+from noisemodel.types import Real
 
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
 """Errors that pyarrow raises for damaged files."""
-
 EPISODE = "episode_index"
 """The column with the number of the episode, if there is one."""
 
+INFO = Path("meta", "info.json")
+"""The file that describes a LeRobot data set."""
+STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
+FURTHER = {"observation.velocity": "velocity", "observation.effort": "effort"}
+"""Features that some data sets have besides (ALOHA's), and their signals."""
+PARTS = {"pos": "position", "vel": "velocity", "effort": "effort", "torque": "effort"}
+"""Signals by the last part of a name: ``shoulder_pan.pos``."""
+CARTESIAN = {
+    "x",
+    "y",
+    "z",
+    "roll",
+    "pitch",
+    "yaw",
+    "rx",
+    "ry",
+    "rz",
+    "qx",
+    "qy",
+    "qz",
+    "qw",
+}
+"""Column names of an end effector's pose."""
+SLOWEST, FASTEST = 1e-3, 1e6
+"""Rates that a data set may have, in [Hz]."""
+LATEST = 9e9
+"""Stamps and frame numbers lie before: in nanoseconds, these fit into 64 bits."""
+TOLERANCE = 1e-4
+"""Largest difference of a stamp from its frame number over the rate, in [s], as in LeRobot."""
+UNKNOWN = (
+    "LeRobot does not log the unit of its '.pos' features: specify --units degrees, normalised"
+    " (-100 to 100 of each joint's range, needs --robot) or radians"
+)
+
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
-    """Reader of a Parquet file."""
-    schema = schema_of(path)
+    """Reader of a Parquet file, or of a LeRobot data set or one of its files."""
+    above = [path] if path.is_dir() else path.resolve().parents[:3]
+    if folder := next((each for each in above if (each / INFO).is_file()), None):
+        return _data_set(path, folder, options)
     return LogReader(
         "Parquet",
-        episodes_of(path) if EPISODE in schema.names else ("",),
+        _episodes(path),
         lambda episode, progress: _read(path, options, episode),
-        lambda: listing(path),
+        lambda: (
+            f"{pyarrow.parquet.read_metadata(path).num_rows} rows",
+            *(f"{each.name}  {each.type}" for each in _schema(path)),
+        ),
     )
 
 
-def schema_of(path: Path) -> Any:
+def _schema(path: Path) -> Any:
     """Names and types of the columns."""
     try:
         check_regular(path)
@@ -56,58 +106,48 @@ def schema_of(path: Path) -> Any:
         raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
 
 
-def table_of(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any:
-    """Table of some columns, of one episode if there are several."""
-    filters = [(EPISODE, "==", int(episode))] if episode else None
-    try:
-        for path in paths:
-            _check_size(path, {*columns, *([EPISODE] if episode else [])})
-        tables = [
-            pyarrow.parquet.read_table(path, columns=list(columns), filters=filters)
-            for path in paths
-        ]
-    except LogError:
-        raise
-    except DAMAGE as error:
-        raise LogError(paths[0], f"damaged or cut off ({one_line(error)})") from error
-    return pyarrow.concat_tables(tables)
-
-
-def _check_size(path: Path, columns: Collection[str]) -> None:
-    """Refuse columns that unpack to more than is read: a run of one value takes a few bytes."""
-    unpacked, width = unpacked_size(path, columns)
-    if width > limit("columns"):
-        raise LogError(path, f"lists of {width} numbers in a row, {beyond('columns')}")
-    try:
-        check_unpacked(unpacked, path.stat().st_size)
-    except ArchiveError as error:
-        raise LogError(path, str(error)) from error
-
-
-def episodes_of(path: Path) -> tuple[str, ...]:
-    """Episodes in a file."""
-    schema = schema_of(path)
+def _episodes(path: Path) -> tuple[str, ...]:
+    """Episodes in a file; "" if it does not number them."""
+    schema = _schema(path)
     if EPISODE not in schema.names:
-        raise LogError(path, f"there is no column {EPISODE!r}; it has {listed(schema.names)}")
+        return ("",)
     kind = schema.field(EPISODE).type
     if not pyarrow.types.is_integer(kind):
         raise LogError(path, f"column {EPISODE!r} holds {kind}, expected whole numbers")
-    column = table_of([path], [EPISODE], "").column(0)
+    column = _table([path], [EPISODE], "").column(0)
     if column.null_count:
         raise LogError(path, f"column {EPISODE!r} has rows without a number")
     return tuple(str(each) for each in np.unique(column.to_numpy()))
 
 
-def values_of(path: Path, name: str, column: Any) -> NDArray[Any] | None:
+def _table(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any:
+    """Table of some columns, of one episode if there are several."""
+    filters = [(EPISODE, "==", int(episode))] if episode else None
+    tables = []
+    for path in paths:
+        try:
+            unpacked, width = unpacked_size(path, {*columns, *([EPISODE] if episode else [])})
+            if width > limit("columns"):
+                raise ArchiveError(f"lists of {width} numbers in a row, {beyond('columns')}")
+            check_unpacked(unpacked, path.stat().st_size)
+            tables.append(pyarrow.parquet.read_table(path, columns=list(columns), filters=filters))
+        except ArchiveError as error:
+            raise LogError(path, str(error)) from error
+        except DAMAGE as error:
+            raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
+    return pyarrow.concat_tables(tables)
+
+
+def _values(path: Path, table: Any, name: str) -> NDArray[Any] | None:
     """Column as an array, shape (samples, columns); None if it holds no numbers."""
-    kind, lists = column.type, False
+    column = table.column(name)
+    samples, kind = len(column), column.type
     while _is_list(kind):
-        kind, lists = kind.value_type, True
-    if pyarrow.types.is_timestamp(kind) and not lists:
+        kind = kind.value_type
+    if pyarrow.types.is_timestamp(column.type):
         return np.asarray(column.to_numpy())[:, None]
     if not (pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)):
         return None
-    samples = len(column)
     flat = column.combine_chunks()
     while _is_list(flat.type):
         flat = flat.flatten()
@@ -123,53 +163,41 @@ def _is_list(kind: Any) -> bool:
     return bool(pyarrow.types.is_list(kind) or pyarrow.types.is_fixed_size_list(kind))
 
 
-def listing(path: Path) -> tuple[str, ...]:
-    """Columns of a file with their types, a line each."""
-    schema = schema_of(path)
-    rows = pyarrow.parquet.read_metadata(path).num_rows
-    return (f"{rows} rows", *(f"{each.name}  {each.type}" for each in schema))
-
-
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
-    schema = schema_of(path)
+    schema = _schema(path)
     names = schema.names
     time = options.time if options.time in names else time_column(names)
-    options = options.for_columns(path, [name for name in names if name not in (time, EPISODE)])
+    signals = [name for name in names if name not in (time, EPISODE)]
+    options = options.for_columns(path, signals)
     mapped = {name for entry in options.entries for name in (entry.source, entry.part()[0])}
     naming = Naming.of(names, options.known_joints)
-    wanted = [
-        name
-        for name in names
-        if name in mapped
-        or (name not in (time, EPISODE) and (column_signal(name, naming) or array_signal(name)))
-    ]
+    known = {n for n in signals if column_signal(n, naming) or array_signal(n)}
+    wanted = [name for name in names if name in mapped | known]
     for name in wanted:
         if name not in mapped:
             check_unit(path, name, column_signal(name, naming))
-    whole = [
+    counters = [
         each.name
         for each in schema
-        if pyarrow.types.is_integer(each.type) and each.name not in (*wanted, EPISODE)
+        if not time and pyarrow.types.is_integer(each.type) and each.name not in (*wanted, EPISODE)
     ]
-    others = [time] if time and time not in wanted else [] if time else whole
-    table = table_of([path], [*wanted, *others], episode)
-    if not time:
-        time = counting({name: table.column(name).to_numpy() for name in whole})
-    stamps = Stamps(Decimal(0), np.arange(len(table), dtype=np.float64), unit=SAMPLES)
+    table = _table([path], [*wanted, *counters, *({time} - {"", *wanted})], episode)
+    time = time or counting({name: table.column(name).to_numpy() for name in counters})
+    stamps = Stamps.counted(len(table))
     if time:
-        column = values_of(path, time, table.column(time))
+        column = _values(path, table, time)
         if column is None or column.shape[1] != 1:
             raise LogError(path, f"column {time!r} holds no stamps but {table.column(time).type}")
         stamps = stamps_of(path, time, column[:, 0], options.rate)
-    fields = []
-    for name in wanted:
-        values = values_of(path, name, table.column(name))
-        if values is not None and values.dtype.kind in "iuf":
-            floats = values if values.dtype.kind == "f" else values.astype(np.float64)
-            fields.append(Field(name, floats, stamps, source=path.name))
-    read = {field.name for field in fields} | {time, EPISODE}
+    arrays = {name: _values(path, table, name) for name in wanted}
+    fields = tuple(
+        Field(name, floats(values), stamps, source=path.name)
+        for name, values in arrays.items()
+        if values is not None and values.dtype.kind in "iuf"
+    )
+    read = {time, EPISODE, *(field.name for field in fields)}
     not_read = tuple(name for name in names if name not in read)
-    return Log(path, tuple(fields), episode, not_read=not_read, time=time)
+    return Log(path, fields, episode, not_read=not_read, time=time)
 
 
 # What columns unpack to
@@ -177,7 +205,7 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
 TRUE, FALSE, BYTE, DOUBLE, BINARY, LIST, SET, STRUCT = 1, 2, 3, 7, 8, 9, 10, 12
 NUMBERS = (4, 5, 6)
 """Types of Thrift's compact protocol; the last are integers of 16, 32 and 64 bits."""
-DEPTH = 12
+DEPTH = 13
 """Structs and lists within each other; the end of a file has eight."""
 MAGIC = b"PAR1"
 LARGEST_END = 32 * 2**20
@@ -190,14 +218,20 @@ UNPACKED, PACKED = 2, 3
 
 
 def unpacked_size(path: Path, columns: Collection[str]) -> tuple[int, int]:
-    """Bytes that columns unpack to, by what states more, their pages or the end of the file."""
+    """Bytes that columns unpack to, by what states more, their pages or the end of the file.
+
+    Besides, the most numbers that they hold in a row.
+    """
     stated = held = width = 0
-    with path.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as data:
+    with (
+        path.open("rb") as stream,
+        mmap(stream.fileno(), 0, access=ACCESS_READ) as data,
+    ):
         length = int.from_bytes(data[-8:-4], "little")
         if data[-4:] != MAGIC or length > min(LARGEST_END, len(data) - 8):
             raise ValueError("its end is no table of columns")
         try:
-            for group in _struct(data, len(data) - 8 - length)[0][ROW_GROUPS]:
+            for group in _thrift(data, len(data) - 8 - length)[0][ROW_GROUPS]:
                 numbers = 0
                 for about in (chunk[META_DATA] for chunk in group[COLUMNS]):
                     name = b".".join(about[PATH]).decode(errors="replace")
@@ -206,6 +240,8 @@ def unpacked_size(path: Path, columns: Collection[str]) -> tuple[int, int]:
                         stated += max(about[ALL_UNPACKED], 8 * about[VALUES])
                         held += sum(_pages(data, about))
                 width = max(width, numbers // max(1, group[ROWS]))
+        except IndexError as error:
+            raise ValueError("a header is cut off") from error
         except (KeyError, TypeError, AttributeError) as error:
             raise ValueError("its end is no table of columns") from error
     return max(stated, held), width
@@ -218,65 +254,51 @@ def _pages(data: mmap, about: dict[int, Any]) -> Iterator[int]:
         place = about[DICTIONARY_PAGE]
     stop = min(place + about[ALL_PACKED], len(data))
     while 0 <= place < stop:
-        header, place = _struct(data, place)
+        header, place = _thrift(data, place)
         if min(header.get(UNPACKED, -1), header.get(PACKED, -1)) < 0:
             raise ValueError("a page has no size")
         yield header[UNPACKED]
         place += header[PACKED]
 
 
-def _struct(data: mmap, place: int, depth: int = DEPTH) -> tuple[dict[int, Any], int]:
-    """Fields of a struct by their numbers, and where it ends."""
-    found: dict[int, Any] = {}
-    name = 0
-    try:
-        while head := data[place]:
-            place += 1
-            if head >> 4:
-                name += head >> 4
-            else:
-                name, place = _integer(data, place)
-            kind = head & 15
-            found[name], place = (
-                (kind == TRUE, place) if kind in (TRUE, FALSE) else _value(data, place, kind, depth)
-            )
-    except IndexError as error:
-        raise ValueError("a header is cut off") from error
-    return found, place + 1
-
-
-def _value(data: mmap, place: int, kind: int, depth: int) -> tuple[Any, int]:
+def _thrift(data: mmap, place: int, kind: int = STRUCT, depth: int = DEPTH) -> tuple[Any, int]:
+    """A value, and where it ends; a struct is its fields by their numbers."""
     if not depth:
         raise ValueError("a header is nested too deeply")
-    if kind in NUMBERS:
-        return _integer(data, place)
     if kind in (TRUE, FALSE, BYTE):  # of lists; those of structs are in their heads
         return data[place], place + 1
     if kind == DOUBLE:
         return None, place + 8
+    if kind in NUMBERS:
+        number, place = _varint(data, place)
+        return (number >> 1) ^ -(number & 1), place
     if kind == BINARY:
         size, place = _varint(data, place)
         return data[place : place + size], place + size
-    if kind == STRUCT:
-        return _struct(data, place, depth - 1)
-    if kind not in (LIST, SET):
+    if kind in (LIST, SET):
+        count, kind = data[place] >> 4, data[place] & 15
+        place += 1
+        if count == 15:
+            count, place = _varint(data, place)
+        if count > len(data):
+            raise ValueError("a header has a list of more than there is")
+        items = []
+        for _ in range(count):
+            item, place = _thrift(data, place, kind, depth - 1)
+            items.append(item)
+        return items, place
+    if kind != STRUCT:
         raise ValueError(f"a header has a field of kind {kind}")
-    count, kind = data[place] >> 4, data[place] & 15
-    place += 1
-    if count == 15:
-        count, place = _varint(data, place)
-    if count > len(data):
-        raise ValueError("a header has a list of more than there is")
-    items = []
-    for _ in range(count):
-        item, place = _value(data, place, kind, depth - 1)
-        items.append(item)
-    return items, place
-
-
-def _integer(data: mmap, place: int) -> tuple[int, int]:
-    number, place = _varint(data, place)
-    return (number >> 1) ^ -(number & 1), place
+    fields: dict[int, Any] = {}
+    name = 0
+    while head := data[place]:
+        name, place, kind = name + (head >> 4), place + 1, head & 15
+        if not head >> 4:
+            name, place = _thrift(data, place, NUMBERS[0])
+        fields[name] = kind == TRUE
+        if kind not in (TRUE, FALSE):
+            fields[name], place = _thrift(data, place, kind, depth - 1)
+    return fields, place + 1
 
 
 def _varint(data: mmap, place: int) -> tuple[int, int]:
@@ -287,3 +309,184 @@ def _varint(data: mmap, place: int) -> tuple[int, int]:
         if data[place - 1] < 128:
             return number, place
     raise ValueError("a header has a number of more than 64 bits")
+
+
+# LeRobot's data sets
+
+
+def _data_set(path: Path, folder: Path, options: ReadOptions) -> LogReader:
+    """Reader of a data set, or of one of its files."""
+    info = _info(folder / INFO)
+    files = sorted((folder / "data").rglob("*.parquet")) if path.is_dir() else [path]
+    if not files:
+        raise LogError(path, "the data set has no data/**/*.parquet")
+    places: dict[str, list[Path]] = {}
+    for file in files:
+        for episode in _episodes(file):
+            if not episode:
+                has = listed(_schema(file).names)
+                raise LogError(file, f"there is no column {EPISODE!r}; it has {has}")
+            places.setdefault(episode, []).append(file)
+    features = info["features"]
+    return LogReader(
+        f"LeRobot {info.get('codebase_version', '')}".strip(),
+        tuple(sorted(places, key=int)),
+        lambda episode, progress: _episode(path, info, places[episode], episode, options),
+        lambda: (
+            f"{counted(len(places), 'episode')} at {info.get('fps', 'unknown')} Hz",
+            *(
+                f"{name}  {about.get('dtype')} {about.get('shape')}"
+                f"  {listed(_names(features, name))}".rstrip()
+                for name, about in features.items()
+            ),
+        ),
+    )
+
+
+def _info(path: Path) -> dict[str, Any]:
+    try:
+        info = from_json(text_of(path))
+    except (OSError, ValueError) as error:
+        raise LogError(path, f"cannot be read ({error})") from error
+    if not isinstance(info, dict) or not isinstance(info.get("features"), dict):
+        raise LogError(path, "has no features")
+    for name, feature in info["features"].items():
+        if not isinstance(feature, dict):
+            raise LogError(path, f"the feature {name!r} is no table")
+    rate = info.get("fps")
+    if rate is not None and not (type(rate) in (int, float) and SLOWEST <= rate <= FASTEST):
+        raise LogError(path, f"fps is {rate!r}, expected {SLOWEST:g} to {FASTEST:g} Hz")
+    return info
+
+
+def _names(features: dict[str, Any], name: str) -> list[str]:
+    """Names of a feature's columns, flattened; empty if there are none."""
+
+    def flat(names: Any) -> Iterator[str]:
+        if isinstance(names, str):
+            yield names
+        elif isinstance(names, dict | list):
+            for each in names.values() if isinstance(names, dict) else names:
+                yield from flat(each)
+
+    return [*flat(features.get(name, {}).get("names"))]
+
+
+def _episode(
+    path: Path,
+    info: dict[str, Any],
+    files: Sequence[Path],
+    episode: str,
+    options: ReadOptions,
+) -> Log:
+    features, present = info["features"], _schema(files[0]).names
+    mapped = {entry.part()[0] for entry in options.entries}
+    wanted = [name for name in present if name in (STATE, ACTION, *FURTHER) or name in mapped]
+    clock = [name for name in (STAMP, FRAME) if name in present]
+    table = _table(files, [*wanted, *clock], episode)
+    stamps = _stamps(path, info, table, options)
+    found: list[Field] = []
+    remarks = []
+    for name in wanted:
+        values = _values(path, table, name)
+        if values is None:
+            continue
+        names = _names(features, name)
+        names = names if len(names) == values.shape[1] else []
+        if not names and name == STATE:
+            remarks.append(f"{STATE} has no names; it is read as joint positions")
+        found += _fields(name, floats(values), stamps, names, mapped=name in mapped)
+    fields = _checked(path, found, mapped)
+    if taken := [f"{each.signal} = {each.name}" for each in fields if each.signal]:
+        remarks.append(f"taken: {', '.join(taken)}")
+    sources = {each.source for each in fields}
+    if ACTION in {each.source for each in found} - sources:
+        remarks.append(
+            f"{ACTION} not taken as desired positions: its columns are not those of {STATE};"
+            f" --map position_desired={ACTION}[0:6] takes some"
+        )
+    ends = [each.rpartition(".")[1:] for name in sources for each in _names(features, name)]
+    meta = {
+        "robot_type": info.get("robot_type"),
+        "dataset": info.get("codebase_version"),
+    }
+    return Log(
+        path,
+        tuple(fields),
+        episode,
+        not_read=tuple(
+            name
+            for name in features
+            if name not in sources and not name.startswith("observation.images")
+        ),
+        remarks=tuple(remarks),
+        units=UNKNOWN if any(dot and end in PARTS for dot, end in ends) else "",
+        meta={key: value for key, value in meta.items() if value},
+    )
+
+
+def _fields(
+    name: str, values: Real, stamps: Stamps, names: Sequence[str], *, mapped: bool
+) -> Iterator[Field]:
+    """Fields of a feature, one for each signal that its columns hold."""
+    ends = [each.rpartition(".") for each in names]
+    whole = FURTHER.get(name, "position")
+    kinds = ["position" if mapped else PARTS.get(end, whole) for _, _, end in ends]
+    known = name in (STATE, ACTION, *FURTHER) and not mapped
+    for kind in dict.fromkeys(kinds or [whole]):
+        columns = [place for place, each in enumerate(kinds) if each == kind]
+        alone = len(columns) in (0, values.shape[1])
+        signal = f"{kind}_desired" if name == ACTION else kind
+        yield Field(
+            name if alone else f"{name}/{kind}",
+            values if alone else values[:, columns],
+            stamps,
+            joints=tuple(ends[place][0] or ends[place][2] for place in columns),
+            signal=signal if known and signal != "effort_desired" else "",
+            source=name,
+        )
+
+
+def _checked(path: Path, fields: list[Field], mapped: set[str]) -> list[Field]:
+    """Fields without actions that do not match the state; an end effector's pose is refused."""
+    known = set()
+    for each in fields:
+        if each.source == STATE and STATE not in mapped:
+            if CARTESIAN & {name.lower() for name in each.joints}:
+                raise LogError(
+                    path,
+                    f"{STATE} holds {listed(each.joints)}: the pose of an end effector, not joints;"
+                    " name the columns that are joints, such as --map"
+                    " position=observation.state[6:12]",
+                )
+            known.add((each.signal, each.joints, each.values.shape[1]))
+    return [
+        each
+        for each in fields
+        if each.source != ACTION
+        or ACTION in mapped
+        or (each.signal.removesuffix("_desired"), each.joints, each.values.shape[1]) in known
+    ]
+
+
+def _stamps(path: Path, info: dict[str, Any], table: Any, options: ReadOptions) -> Stamps:
+    """Stamps from frame numbers if they agree: logged stamps are float32, too coarse."""
+    rate = options.rate or info.get("fps")
+    clock = {}
+    for name in (FRAME, STAMP):
+        if name in table.column_names:
+            values = _values(path, table, name)
+            if values is None or values.shape[1] != 1 or values.dtype.kind not in "iuf":
+                kind = table.column(name).type
+                raise LogError(path, f"column {name!r} holds {kind}, expected numbers")
+            clock[name] = values[:, 0].astype(np.float64)
+            if not (np.abs(clock[name]) < LATEST).all():
+                raise LogError(path, f"column {name!r} holds a value that is no time")
+    frames, logged = clock.get(FRAME), clock.get(STAMP)
+    if logged is not None and (
+        frames is None or not rate or (np.abs(logged - frames / rate) > TOLERANCE).any()
+    ):
+        return Stamps.of_nanoseconds(np.round(logged * 1e9).astype(np.int64))
+    if not rate:
+        raise LogError(path, "meta/info.json has no fps; specify the rate (--rate)")
+    return Stamps.every(1 / rate, len(table))

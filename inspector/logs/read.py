@@ -97,15 +97,12 @@ def _of_file(path: Path) -> str:
         raise LogError(path, f"cannot be read ({error.strerror})") from error
     except runfile.ArchiveError as error:
         raise LogError(path, str(error)) from error
-    above = path.resolve().parents[:3]
-    if head.startswith(b"PAR1") and any((each / "meta" / "info.json").is_file() for each in above):
-        return "lerobot"
     return next((module for magic, module in MAGIC.items() if head.startswith(magic)), "csv")
 
 
 def _of_folder(path: Path) -> str:
     if (path / "meta" / "info.json").is_file():
-        return "lerobot"
+        return "parquet"
     bags = (path / "metadata.yaml", *path.glob("*.mcap"), *path.glob("*.db3"))
     if any(each.is_file() for each in bags):
         return "bags"
