@@ -5,20 +5,20 @@ import re
 from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 from io import StringIO
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, gathered
 from inspector.logs.clocks import counting, is_counter, stamps_since
-from inspector.logs.log import SAMPLES, Field, Log, LogReader, Progress, Stamps
+from inspector.logs.log import Field, Log, LogReader, Progress, Stamps
 from inspector.logs.mapping import ReadOptions, check_unit, no_motion
 from inspector.logs.names import (
     JOINT_SIGNALS,
@@ -48,10 +48,13 @@ HEAD = 200
 """Lines among which the first row of numbers is looked for."""
 EXAMINED = 20_000
 """Lines of a log without a header from which its columns are recognised."""
+CLEAR = 0.8
+"""Least correlation of columns with the slopes of others that they are named after."""
 SPARSE = 0.5
 """Share of rows without a number from which a column has another clock."""
 LONGEST_LINE = 4 * 2**20
 """Characters of a line: far more than all columns that are read can have."""
+ENDLESS = f"not a CSV log: a line of more than {LONGEST_LINE} characters"
 DIGITS = 30
 """Stamps have at most so many digits before or after the point."""
 PIECE = 2**20
@@ -68,22 +71,13 @@ ZONE = re.compile(r"(?<=[\d:])\s*(?:Z|(?P<sign>[+-])(?P<hours>\d\d):?(?P<minutes
 """End of a date that tells its time zone."""
 
 
-@dataclass(frozen=True)
-class Layout:
-    """How a file is laid out.
-
-    Attributes:
-        delimiter: Mark between cells.
-        header: Names of the columns.
-        row: Line number of the header; 0 if the options name the columns.
-        skip: Lines up to the header, and it itself.
-        remarks: What was found, a sentence each.
-    """
+class Layout(NamedTuple):
+    """How a file is laid out."""
 
     delimiter: str
     header: tuple[str, ...]
-    row: int
-    skip: int
+    row: int = 0  # line number of the header, unless the options name the columns
+    skip: int = 0  # lines up to the header, and it itself
     remarks: tuple[str, ...] = ()
 
 
@@ -96,86 +90,250 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     return LogReader(
         "CSV",
         ("",),
-        lambda _, progress: read(path, options, progress),
+        lambda _, progress: _read(path, options, progress),
         lambda: _listing(path, options),
     )
 
 
-def read(path: Path, options: ReadOptions, progress: Progress) -> Log:
+def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
+    with path.open(newline="", encoding="utf-8-sig", errors="replace") as stream:
+        layout = _layout(path, stream, options)
+        rows = sum(1 for _ in islice(_lines(path, stream), layout.skip, None))
+    time = options.time or time_column(layout.header)
+    naming = Naming.of(layout.header, options.known_joints)
+
+    def held(name: str) -> str:
+        if name == time:
+            return "stamps"
+        if known := column_signal(name, naming):
+            joint = f"joint {known[1]}" if isinstance(known[1], int) else known[1]
+            return f"{known[0]} of {joint}"
+        signal = array_signal(name)
+        return f"{signal} of the only joint" if signal in JOINT_SIGNALS else "not known"
+
+    return (f"{rows} rows", *(f"{name}  {held(name)}" for name in layout.header if name))
+
+
+def _read(path: Path, options: ReadOptions, progress: Progress) -> Log:
     """Log with the columns whose signal is known."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            return _read(path, stream, options, progress)
+            return _log_of(path, stream, options, progress)
     except OSError as error:
         raise LogError(path, f"cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise LogError(path, "not a CSV log: not text in UTF-8") from error
 
 
-def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
-    with path.open(newline="", encoding="utf-8-sig", errors="replace") as stream:
-        layout = _layout(path, stream, options)
-        stream.seek(0)
-        rows = sum(1 for _ in islice(_lines(path, stream), layout.skip, None))
-    time = options.time or time_column(layout.header)
-    naming = Naming.of(layout.header, options.known_joints)
-    return (
-        f"{rows} rows",
-        *(
-            f"{name}  {'stamps' if name == time else _meaning(name, naming)}"
-            for name in layout.header
-            if name
-        ),
-    )
-
-
-def _meaning(name: str, naming: Naming) -> str:
-    if known := column_signal(name, naming):
-        joint = f"joint {known[1]}" if isinstance(known[1], int) else known[1]
-        return f"{known[0]} of {joint}"
-    signal = array_signal(name)
-    return f"{signal} of the only joint" if signal in JOINT_SIGNALS else "not known"
-
-
-def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) -> Log:
+def _log_of(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) -> Log:
     layout = _layout(path, stream, options)
     header = layout.header
-    time = _time_column(header, options)
-    rest = _nanoseconds(header, time)
+    time, rest = _times(header, options)
     names = [name for place, name in enumerate(header) if name and place not in (time, rest)]
     options = options.for_columns(path, names)
     wanted = _wanted(path, layout, time, rest, options)
     named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
     counter = None if time is not None else _counter(path, stream, layout, wanted)
     times = (time if counter is None else counter, rest)
-    rows, values, cells, names_of_joints = _table(
-        path, stream, layout, wanted, times, tuple(named), progress
-    )
+    rows, values, cells, joints = _table(path, stream, layout, wanted, times, [*named], progress)
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
     if counter is not None and _counts(cells):
         time = counter
-    known = {time, rest, *wanted, *named}
-    not_read = tuple(name for place, name in enumerate(header) if name and place not in known)
     if time is None:
-        count = np.arange(len(rows), dtype=np.float64)
-        stamps = Stamps(Decimal(0), count, rows, SAMPLES)
-    else:
-        stamps = _stamps(path, header[time], cells, rows, options.rate)
+        stamps = replace(Stamps.counted(len(rows)), rows=rows)
+    else:  # absolute stamps exceed the precision of a float
+        exact = _decimals(path, header[time], cells, rows)
+        since = np.array([float(stamp - exact[0]) for stamp in exact])
+        stamps = stamps_since(path, header[time], exact[0], since, options.rate, rows)
     _check_sparse(path, [header[place] for place in wanted], values, rows)
-    if len(names_of_joints) > 1:
+    if len(joints) > 1:
         raise LogError(path, f"the joints' names change ({header[min(named)]}); split the log")
-    joints = dict(zip(named.values(), next(iter(names_of_joints), ()), strict=True))
+    of_joints = dict(zip(named.values(), next(iter(joints), ()), strict=True))
     columns = {header[place]: values[:, at : at + 1] for at, place in enumerate(wanted)}
-    fields, converted = _fields(path, columns, stamps, joints, options)
+    fields, converted = _fields(path, columns, stamps, of_joints, options)
+    known = {time, rest, *wanted, *named}
     log = Log(
         path,
         fields,
-        not_read=not_read,
+        not_read=tuple(n for place, n in enumerate(header) if n and place not in known),
         remarks=(*layout.remarks, *converted),
         time="" if time is None else header[time],
     )
     return gathered(log, options)
+
+
+# Header and columns
+
+
+def _lines(path: Path, stream: TextIO) -> Iterator[str]:
+    """Lines of a log, which end."""
+    while line := stream.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise LogError(path, ENDLESS)
+        yield line
+
+
+def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
+    """Delimiter and header of a file, found by its first row of numbers."""
+    lines = list(islice(_lines(path, stream), HEAD))
+    stream.seek(0)
+    if not any(line.strip() for line in lines):
+        raise LogError(path, "the log is empty; expected a header, then a row per sample")
+    try:
+        return _layout_of(path, lines, options)
+    except csv.Error as error:
+        raise LogError(path, f"not a CSV log ({error})") from error
+
+
+def _layout_of(path: Path, lines: Sequence[str], options: ReadOptions) -> Layout:
+    delimiter, first = _first_data(lines)
+    before = {
+        number: _split(line, delimiter)
+        for number, line in enumerate(lines[:first], start=1)
+        if line.strip()
+    }
+
+    def layout(names: Sequence[str], row: int, skip: int, *used: int) -> Layout:
+        others = [number for number in before if number not in used]
+        skipped = f"{counted(len(others), 'line')} before the rows not read"
+        return Layout(delimiter, tuple(names), row, skip, (skipped,) if others else ())
+
+    if options.columns:
+        skip = max(before, default=0) if first is not None else 0
+        return layout([name.strip() for name in options.columns], 0, skip)
+    if first is None:  # no numbers: the first line is the header, and rows tell what is wrong
+        rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+        return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
+    width = len(_split(lines[first], delimiter))
+    fitting = [number for number, cells in before.items() if abs(len(cells) - width) <= 1]
+    plain = [number for number in fitting if not before[number][0].startswith(COMMENTS)]
+    candidates = plain or fitting or [n for n, cells in before.items() if _names_motion(cells)]
+    if not candidates:
+        raise _no_header(path, delimiter, first, max(before, default=0) + 1)
+    row = candidates[-1]
+    # with an open quotation mark, the header takes more lines
+    rows = csv.reader(lines[row - 1 :], delimiter=delimiter, skipinitialspace=True)
+    names = _clean(next(rows))
+    units = [name.strip("[]() ") for name in names]
+    known = all(not unit or unit.lower() in {*SIGNAL_UNITS, *TIME_UNITS} for unit in units)
+    if len(candidates) > 1 and any(units) and known:
+        above = _clean(before[candidates[-2]])
+        pairs = zip(above, units, strict=False)
+        names = tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
+        return layout(names, row, first, row, candidates[-2])
+    return layout(names, row, first, row)
+
+
+def _first_data(lines: Sequence[str]) -> tuple[str, int | None]:
+    """Delimiter, and index of the first line of numbers; None if there is none."""
+
+    def share_of_numbers(line: str, mark: str) -> float:
+        cells = _split(line, mark)
+        if len(cells) < 2 or not (_is_number(cells[0]) or _is_date(cells[0])):
+            return 0.0
+        return sum(_is_number(each) or _is_missing(each) for each in cells) / len(cells)
+
+    for place, line in enumerate(lines):
+        shares = {mark: share_of_numbers(line, mark) for mark in DELIMITERS}
+        best = max(shares, key=lambda mark: shares[mark])  # the first of equals
+        if shares[best] >= 0.5:
+            return best, place
+    head = next(line for line in lines if line.strip())
+    return next((mark for mark in DELIMITERS if mark in head), " "), None
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    return next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True), [])
+
+
+def _clean(cells: Sequence[str]) -> tuple[str, ...]:
+    """Names of a header; NumPy writes "# time", rostopic "%time"."""
+    first = cells[0].strip().lstrip("#% ")
+    marked_alone = cells[0].strip() and not first  # as in "# time q"
+    return (*(() if marked_alone else (first,)), *(name.strip() for name in cells[1:]))
+
+
+def _names_motion(cells: Sequence[str]) -> bool:
+    names = _clean(cells)
+    return bool(time_column(names)) or any(map(column_signal, names))
+
+
+def _no_header(path: Path, delimiter: str, skip: int, row: int) -> LogError:
+    """Error of a log without a header, with names for its columns by what they hold."""
+    rows: list[list[float]] = []
+    with path.open(newline="", encoding="utf-8-sig") as stream, suppress(ValueError, csv.Error):
+        for line in islice(stream, skip, skip + EXAMINED):
+            cells = _split(line, delimiter)
+            cells = cells[:-1] if cells[-1:] == [""] else cells
+            rows.append([float(cell.replace(",", ".")) for cell in cells])
+    width = len(rows[0]) if rows else 0
+    if not width:
+        return LogError(path, "there is no row of numbers", row)
+    names, how = _suggested(np.array([each for each in rows if len(each) == width]))
+    return LogError(
+        path,
+        f"there is no header; the first row has {width} numbers. Name the columns in their order,"
+        f" such as --columns {','.join(names)}{how}",
+        row,
+    )
+
+
+def _suggested(table: Array) -> tuple[list[str], str]:
+    """Names of the columns of a table, by what they hold, and what else has to be typed.
+
+    The first is time if it rises evenly. Columns are velocities if they are the slopes of as many
+    columns before them; without such, all are positions.
+    """
+    steps = np.diff(table[:, 0])
+    even = len(steps) > 0 and (steps > 0).all() and np.ptp(steps) <= 2 * float(np.mean(steps))
+    columns = table[:, int(even) :]
+    left = columns.shape[1]
+    best, names = CLEAR, [f"q{number}" for number in range(1, left + 1)]
+    for count in range(1, left // 2 + 1):
+        quantities = ("q", "dq", "tau")[: 2 if left == 2 * count else 3]
+        numbers = range(1, count + 1)
+        by_quantity = [f"{quantity}{number}" for quantity in quantities for number in numbers]
+        by_joint = [f"{quantity}{number}" for number in numbers for quantity in quantities]
+        for order in (by_quantity, by_joint):
+            named = [*order, *[""] * left][:left]
+            position, velocity = (
+                columns[:, [name.startswith(quantity) for name in named]]
+                for quantity in ("q", "dq")
+            )
+            fit = _fit(position, velocity)
+            if fit > best + 0.01:
+                best, names = fit, named
+    names = ["time", *names] if even else names
+    if even and not is_counter(steps, float(table[0, 0])):
+        return names, " (without stamps: no time, but --rate HZ)"
+    return names, "" if best > CLEAR else " --rate HZ (the log's samples per second)"
+
+
+def _fit(position: Array, velocity: Array) -> float:
+    """Correlation of columns with the slopes of others; 0 if a column has no other."""
+    if position.shape != velocity.shape or len(position) < 3:
+        return 0.0
+    slopes = (position[2:] - position[:-2]) / 2
+    speed = velocity[1:-1]
+    size = float(np.sum(slopes**2) * np.sum(speed**2))
+    return float(np.sum(slopes * speed)) / size**0.5 if size > 0 and np.isfinite(size) else 0.0
+
+
+def _times(header: Sequence[str], options: ReadOptions) -> tuple[int | None, int | None]:
+    """Places of the stamps, and of the nanoseconds beside whole seconds, as ROS has them."""
+    name = options.time
+    if not name or name not in header:
+        mapped = {entry.source for entry in options.entries}
+        name = time_column([each for each in header if each not in mapped])
+    if not name:
+        return None, None
+    rest = None
+    if seconds := SECONDS.fullmatch(name):
+        places = {each.lower(): place for place, each in enumerate(header)}
+        words = (f"{seconds['record']}{word}".lower() for word in NANOSECONDS)
+        rest = next((places[word] for word in words if word in places), None)
+    return header.index(name), rest
 
 
 def _counter(path: Path, stream: TextIO, layout: Layout, wanted: Sequence[int]) -> int | None:
@@ -244,13 +402,47 @@ def _wanted(
     return wanted
 
 
+def _fields(
+    path: Path,
+    columns: dict[str, Array],
+    stamps: Stamps,
+    joints: dict[str, str],
+    options: ReadOptions,
+) -> tuple[tuple[Field, ...], list[str]]:
+    """Fields of the columns, in SI units where a name has a unit, and remarks on units."""
+    fields: list[Field] = []
+    converted: dict[str, list[str]] = {}
+    for name, values in columns.items():
+        if (factor := factor_of(name)) != 1.0 and not options.units:
+            values = values * factor
+            converted.setdefault(without_unit(name)[1], []).append(name)
+        known = column_signal(name)
+        joint = joints.get(f"{NAME}{known[1]}") if known else None
+        fields.append(
+            Field(
+                name,
+                values,
+                stamps,
+                joints=(joint,) if joint else (),
+                signal=known[0] if known and joint else "",
+                source=path.name,
+                rank=int(says_twice(name)),
+            )
+        )
+    remarks = [f"{listed(n)}: converted from {u}, as the header says" for u, n in converted.items()]
+    return tuple(fields), remarks
+
+
+# Rows
+
+
 def _table(
     path: Path,
     stream: TextIO,
     layout: Layout,
     wanted: Sequence[int],
     time: tuple[int | None, int | None],
-    named: tuple[int, ...],
+    named: Sequence[int],
     progress: Progress,
 ) -> tuple["array[int]", Array, list[str], set[tuple[str, ...]]]:
     """Line numbers, numbers, stamps and the sets of joints' names of all rows."""
@@ -297,12 +489,8 @@ def _piece(path: Path, stream: TextIO) -> str:
         more.append(line)
         odd ^= line.count('"') % 2
     if max(map(len, more), default=0) >= LONGEST_LINE:
-        raise _endless(path)
+        raise LogError(path, ENDLESS)
     return text + "".join(more)
-
-
-def _endless(path: Path) -> LogError:
-    return LogError(path, f"not a CSV log: a line of more than {LONGEST_LINE} characters")
 
 
 def numbers_in(
@@ -344,289 +532,6 @@ def numbers_in(
     return numbers.reshape(rows, len(wanted)), texts
 
 
-def _fields(
-    path: Path,
-    columns: dict[str, Array],
-    stamps: Stamps,
-    joints: dict[str, str],
-    options: ReadOptions,
-) -> tuple[tuple[Field, ...], tuple[str, ...]]:
-    """Fields of the columns, in SI units where a name has a unit, and remarks on units."""
-    fields: list[Field] = []
-    converted: dict[str, list[str]] = {}
-    for name, values in columns.items():
-        if (factor := factor_of(name)) != 1.0 and not options.units:
-            values = values * factor
-            converted.setdefault(without_unit(name)[1], []).append(name)
-        known = column_signal(name)
-        joint = joints.get(f"{NAME}{known[1]}") if known else None
-        fields.append(
-            Field(
-                name,
-                values,
-                stamps,
-                joints=(joint,) if joint else (),
-                signal=known[0] if known and joint else "",
-                source=path.name,
-                rank=int(says_twice(name)),
-            )
-        )
-    remarks = (
-        f"{listed(names)}: converted from {unit}, as the header says"
-        for unit, names in converted.items()
-    )
-    return tuple(fields), tuple(remarks)
-
-
-def _lines(path: Path, stream: TextIO) -> Iterator[str]:
-    """Lines of a log, which end."""
-    while line := stream.readline(LONGEST_LINE):
-        if len(line) == LONGEST_LINE:
-            raise _endless(path)
-        yield line
-
-
-def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
-    """Delimiter and header of a file, found by its first row of numbers."""
-    lines = list(islice(_lines(path, stream), HEAD))
-    stream.seek(0)
-    try:
-        return _layout_of(path, lines, options)
-    except csv.Error as error:
-        raise LogError(path, f"not a CSV log ({error})") from error
-
-
-def _layout_of(path: Path, lines: Sequence[str], options: ReadOptions) -> Layout:
-    if not any(line.strip() for line in lines):
-        raise LogError(path, "the log is empty; expected a header, then a row per sample")
-    delimiter, first = _first_data(lines)
-    before = [
-        (number, _split(line, delimiter))
-        for number, line in enumerate(lines[:first], start=1)
-        if line.strip()
-    ]
-    if options.columns:
-        skip = before[-1][0] if before and first is not None else 0
-        columns = tuple(name.strip() for name in options.columns)
-        return Layout(delimiter, columns, 0, skip, _skipped(before, ()))
-    if first is None:  # no numbers: the first line is the header, and rows tell what is wrong
-        rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
-        return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
-    width = len(_split(lines[first], delimiter))
-    fitting = [each for each in before if abs(len(each[1]) - width) <= 1]
-    plain = [each for each in fitting if not each[1][0].startswith(COMMENTS)]
-    candidates = plain or fitting or [each for each in before if _names_motion(each[1])]
-    if not candidates:
-        raise _no_header(path, delimiter, first, before[-1][0] + 1 if before else 1)
-    row = candidates[-1][0]
-    rows = csv.reader(lines[row - 1 :], delimiter=delimiter, skipinitialspace=True)
-    header: list[str] = next(rows)  # with an open quotation mark, it takes more lines
-    names, used = _clean(header), [row]
-    if len(candidates) > 1 and _are_units(names):
-        used.append(candidates[-2][0])
-        units = [name.strip("[]() ") for name in names]
-        names = tuple(
-            f"{name} [{unit}]" if unit else name
-            for name, unit in zip(_clean(candidates[-2][1]), units, strict=False)
-        )
-    return Layout(delimiter, names, row, first, _skipped(before, used))
-
-
-def _first_data(lines: Sequence[str]) -> tuple[str, int | None]:
-    """Delimiter, and index of the first line of numbers; None if there is none."""
-    for place, line in enumerate(lines):
-        shares = {mark: _share_of_numbers(_split(line, mark)) for mark in DELIMITERS}
-        best = max(shares, key=lambda mark: shares[mark])  # the first of equals
-        if shares[best] >= 0.5:
-            return best, place
-    head = next(line for line in lines if line.strip())
-    return next((mark for mark in DELIMITERS if mark in head), " "), None
-
-
-def _share_of_numbers(cells: Sequence[str]) -> float:
-    """Share of cells that hold a number or nothing; 0 unless it may be a row of numbers."""
-    if len(cells) < 2 or not (_is_number(cells[0]) or is_date(cells[0])):
-        return 0.0
-    return sum(_is_number(cell) or cell.strip().lower() in MISSING for cell in cells) / len(cells)
-
-
-def _split(line: str, delimiter: str) -> list[str]:
-    return next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True), [])
-
-
-def _clean(cells: Sequence[str]) -> tuple[str, ...]:
-    """Names of a header; NumPy writes "# time", rostopic "%time"."""
-    first = cells[0].strip().lstrip("#% ")
-    marked_alone = cells[0].strip() and not first  # as in "# time q"
-    return (*(() if marked_alone else (first,)), *(name.strip() for name in cells[1:]))
-
-
-def _names_motion(cells: Sequence[str]) -> bool:
-    names = _clean(cells)
-    return bool(time_column(names)) or any(map(column_signal, names))
-
-
-def _are_units(names: Sequence[str]) -> bool:
-    units = [name.strip("[]() ").lower() for name in names]
-    return any(units) and all(
-        not each or each in SIGNAL_UNITS or each in TIME_UNITS for each in units
-    )
-
-
-def _skipped(before: Sequence[tuple[int, list[str]]], used: Sequence[int]) -> tuple[str, ...]:
-    lines = [number for number, _ in before if number not in used]
-    if not lines:
-        return ()
-    return (f"{counted(len(lines), 'line')} before the rows not read",)
-
-
-def _no_header(path: Path, delimiter: str, skip: int, row: int) -> LogError:
-    """Error of a log without a header, with names for its columns by what they hold."""
-    rows: list[list[float]] = []
-    with path.open(newline="", encoding="utf-8-sig") as stream, suppress(ValueError, csv.Error):
-        for line in islice(stream, skip, skip + EXAMINED):
-            cells = [cell.replace(",", ".") for cell in _split(line, delimiter)]
-            rows.append([float(cell) for cell in (cells if cells[-1:] != [""] else cells[:-1])])
-    width = len(rows[0]) if rows else 0
-    if not width:
-        return LogError(path, "there is no row of numbers", row)
-    table = np.array([each for each in rows if len(each) == width])
-    names, how = suggested(table.reshape(-1, width))
-    return LogError(
-        path,
-        f"there is no header; the first row has {width} numbers. Name the columns in their order,"
-        f" such as --columns {','.join(names)}{how}",
-        row,
-    )
-
-
-CLEAR = 0.8
-"""Least correlation of columns with the slopes of others that they are named after."""
-
-
-def suggested(table: Array) -> tuple[list[str], str]:
-    """Names of the columns of a table, by what they hold, and what else has to be typed.
-
-    The first is time if it rises evenly. Columns are velocities if they are the slopes of as many
-    columns before them; without such, all are positions.
-    """
-    width = table.shape[1]
-    steps = np.diff(table[:, 0])
-    even = len(steps) > 0 and (steps > 0).all() and np.ptp(steps) <= 2 * float(np.mean(steps))
-    counter = bool(even) and is_counter(steps, float(table[0, 0]))
-    columns = table[:, int(even) :]
-    left = columns.shape[1]
-    best, order = CLEAR, [("q", number) for number in range(1, left + 1)]
-    for count in range(1, left // 2 + 1):
-        apart = [("q", 0), ("dq", 1)] if left == 2 * count else [("q", 0), ("dq", 1), ("tau", 2)]
-        for stride in (1, len(apart)):
-            named = _named(left, count, apart, stride)
-            places = [
-                [k for k, each in enumerate(named) if each[0] == name] for name in ("q", "dq")
-            ]
-            fit = _fit(columns[:, places[0]], columns[:, places[1]])
-            if fit > best + 0.01:
-                best, order = fit, named
-    names = [f"{name}{number}" if name else "" for name, number in order]
-    names = (["time"] if even else []) + names
-    if width and even and not counter:
-        return names, " (without stamps: no time, but --rate HZ)"
-    return names, "" if best > CLEAR else " --rate HZ (the log's samples per second)"
-
-
-def _named(
-    left: int, count: int, apart: Sequence[tuple[str, int]], stride: int
-) -> list[tuple[str, int]]:
-    """Quantity and number of each column: quantity by quantity, or joint by joint."""
-    named = [("", 0)] * left
-    for name, part in apart:
-        for number in range(count):
-            place = part + number * stride if stride > 1 else part * count + number
-            if place < left:
-                named[place] = (name, number + 1)
-    return named
-
-
-def _fit(position: Array, velocity: Array) -> float:
-    """Correlation of columns with the slopes of others; 0 if a column has no other."""
-    if position.shape != velocity.shape or len(position) < 3:
-        return 0.0
-    slopes = (position[2:] - position[:-2]) / 2
-    speed = velocity[1:-1]
-    size = float(np.sum(slopes**2) * np.sum(speed**2))
-    return float(np.sum(slopes * speed)) / size**0.5 if size > 0 and np.isfinite(size) else 0.0
-
-
-def _time_column(header: Sequence[str], options: ReadOptions) -> int | None:
-    """Place of the column with the stamps; None if there is none."""
-    if options.time and options.time in header:
-        return header.index(options.time)
-    mapped = {entry.source for entry in options.entries}
-    found = time_column([name for name in header if name not in mapped])
-    return header.index(found) if found else None
-
-
-def _nanoseconds(header: Sequence[str], time: int | None) -> int | None:
-    """Place of the nanoseconds beside stamps in whole seconds, as ROS has them; None without."""
-    if time is None or not (seconds := SECONDS.fullmatch(header[time])):
-        return None
-    whole = {name.lower(): place for place, name in enumerate(header)}
-    names = (f"{seconds['record']}{word}".lower() for word in NANOSECONDS)
-    return next((whole[name] for name in names if name in whole), None)
-
-
-def _stamps(
-    path: Path, name: str, cells: Sequence[str], rows: Sequence[int], rate: float | None
-) -> Stamps:
-    exact = _decimals(path, name, cells, rows)  # absolute stamps exceed the precision of a float
-    since = np.array([float(stamp - exact[0]) for stamp in exact])
-    return stamps_since(path, name, exact[0], since, rate, rows)
-
-
-def _decimals(
-    path: Path, name: str, cells: Sequence[str], rows: Sequence[int]
-) -> Sequence[Decimal]:
-    """Stamps, of dates in [s] since 1970."""
-    if is_date(cells[0]):
-        return [_date(path, name, cell, row) for cell, row in zip(cells, rows, strict=True)]
-    found = []
-    for row, cell in zip(rows, cells, strict=True):
-        try:
-            stamp = Decimal(cell.strip().replace(",", "."))
-        except InvalidOperation:
-            empty = not cell.strip()
-            what = "is empty" if empty else f"holds {cell[:40]!r}, which is not a number"
-            raise LogError(path, f"column {name!r} {what}", row) from None
-        if not stamp.is_finite():
-            raise LogError(path, f"column {name!r} holds {cell.strip()[:40]}", row)
-        if stamp and not -DIGITS < stamp.adjusted() < DIGITS:
-            raise LogError(path, f"the stamp {cell.strip()[:40]!r} is no time", row)
-        found.append(stamp)
-    return found
-
-
-def _date(path: Path, name: str, cell: str, row: int) -> Decimal:
-    """A date in [s] since 1970, at UTC if it tells its time zone."""
-    zone = ZONE.search(cell.strip()) if ":" in cell else None
-    try:
-        date = np.datetime64(cell.strip()[: zone.start()] if zone else cell.strip(), "ns")
-        coarse = date.astype("datetime64[Y]")
-        written = np.datetime64(cell.strip()[:4], "Y")
-    except ValueError as error:
-        raise LogError(path, f"column {name!r} holds dates and others ({error})", row) from error
-    if abs(int(coarse.astype(int) - written.astype(int))) > 1 or int(written.astype(int)) > (
-        LATEST_YEAR - 1970
-    ):
-        raise LogError(
-            path, f"the stamp {cell.strip()[:40]!r} is no date before {LATEST_YEAR}", row
-        )
-    seconds = Decimal(int(date.astype(np.int64))).scaleb(-9)
-    if zone and zone["sign"]:
-        east = 3600 * int(zone["hours"]) + 60 * int(zone["minutes"])
-        seconds -= east if zone["sign"] == "+" else -east
-    return seconds
-
-
 def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[int, list[str]]]:
     """Line number and cells of each row, without comments, blank lines and trailing separators."""
     lines = csv.reader(
@@ -665,12 +570,9 @@ def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -
     """Numbers of cells of which some are empty, have a decimal comma, or are no numbers."""
     found = []
     for name, cell in zip(names, cells, strict=True):
-        if cell.strip().lower() in MISSING:
-            found.append(np.nan)
-        elif _is_number(cell):
-            found.append(float(cell.replace(",", ".")))
-        else:
+        if not (_is_missing(cell) or _is_number(cell)):
             raise LogError(path, f"column {name!r} holds {cell[:40]!r}, which is not a number", row)
+        found.append(np.nan if _is_missing(cell) else float(cell.replace(",", ".")))
     return found
 
 
@@ -689,21 +591,72 @@ def _check_sparse(path: Path, names: Sequence[str], table: Array, rows: Sequence
         )
 
 
+def _is_missing(cell: str) -> bool:
+    return cell.strip().lower() in MISSING
+
+
 def _is_number(cell: str) -> bool:
     try:
         float(cell.replace(",", "."))
     except ValueError:
         return False
-    return cell.strip().lower() not in MISSING
+    return not _is_missing(cell)
 
 
-def is_date(cell: str) -> bool:
-    """Whether a cell holds a date, with or without a time zone."""
-    text = cell.strip()
-    zone = ZONE.search(text) if ":" in text else None
+# Stamps
+
+
+def _decimals(
+    path: Path, name: str, cells: Sequence[str], rows: Sequence[int]
+) -> Sequence[Decimal]:
+    """Stamps, of dates in [s] since 1970."""
+    if _is_date(cells[0]):
+        return [_date(path, name, cell, row) for cell, row in zip(cells, rows, strict=True)]
+    found = []
+    for row, cell in zip(rows, cells, strict=True):
+        try:
+            stamp = Decimal(cell.strip().replace(",", "."))
+        except InvalidOperation:
+            empty = not cell.strip()
+            what = "is empty" if empty else f"holds {cell[:40]!r}, which is not a number"
+            raise LogError(path, f"column {name!r} {what}", row) from None
+        if not stamp.is_finite():
+            raise LogError(path, f"column {name!r} holds {cell.strip()[:40]}", row)
+        if stamp and not -DIGITS < stamp.adjusted() < DIGITS:
+            raise LogError(path, f"the stamp {cell.strip()[:40]!r} is no time", row)
+        found.append(stamp)
+    return found
+
+
+def _date(path: Path, name: str, cell: str, row: int) -> Decimal:
+    """A date in [s] since 1970, at UTC if it tells its time zone."""
+    text, zone = _without_zone(cell)
     try:
-        return "-" in text[1:] and not np.isnat(
-            np.datetime64(text[: zone.start()] if zone else text, "us")
-        )
+        date = np.datetime64(text, "ns")
+        years = int(date.astype("datetime64[Y]").astype(int)) + 1970
+        written = int(np.datetime64(text[:4], "Y").astype(int)) + 1970
+    except ValueError as error:
+        raise LogError(path, f"column {name!r} holds dates and others ({error})", row) from error
+    if abs(years - written) > 1 or written > LATEST_YEAR:
+        what = f"the stamp {cell.strip()[:40]!r} is no date before {LATEST_YEAR}"
+        raise LogError(path, what, row)
+    seconds = Decimal(int(date.astype(np.int64))).scaleb(-9)
+    if zone and zone["sign"]:
+        east = 3600 * int(zone["hours"]) + 60 * int(zone["minutes"])
+        seconds -= east if zone["sign"] == "+" else -east
+    return seconds
+
+
+def _is_date(cell: str) -> bool:
+    """Whether a cell holds a date, with or without a time zone."""
+    try:
+        return "-" in cell.strip()[1:] and not np.isnat(np.datetime64(_without_zone(cell)[0], "us"))
     except ValueError:
         return False
+
+
+def _without_zone(cell: str) -> tuple[str, re.Match[str] | None]:
+    """A date without its time zone, and that."""
+    text = cell.strip()
+    zone = ZONE.search(text) if ":" in text else None
+    return text[: zone.start()] if zone else text, zone
