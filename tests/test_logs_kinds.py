@@ -586,6 +586,17 @@ def test_a_mat_file_with_objects_alone_says_how_to_save_numbers(tmp_path):
         read_log(tmp_path / "a.mat")
 
 
+def test_a_mat_file_with_numbers_of_an_unknown_type_is_one_line(tmp_path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"t": np.arange(300.0)[:, None]})
+    data = bytearray((tmp_path / "a.mat").read_bytes())
+    data[177] = 255  # of the type, which ended the process in SciPy
+    (tmp_path / "a.mat").write_bytes(data)
+    with pytest.raises(InspectorError, match="states 300 numbers and holds 2400 bytes"):
+        read_log(tmp_path / "a.mat")
+
+
 def test_logsout_of_simulink_says_how_to_save_numbers(tmp_path):
     import h5py
 

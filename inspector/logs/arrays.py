@@ -8,6 +8,7 @@ https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf
 import re
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -64,10 +65,7 @@ TABLE: tuple[tuple[str, str], ...] = (
     (r"(.*/)?joint_?velocit(y|ies)", "velocity"),
     (r"(.*/)?(appliedjointmotortorques?|joint_torques|torques)", "effort"),
     (r"(.*/)?(targetpositions?|(joint_)?target_positions?)", "position_desired"),
-    (
-        r"(.*/)?(targetvelocit(y|ies)|(joint_)?target_velocit(y|ies))",
-        "velocity_desired",
-    ),
+    (r"(.*/)?(targetvelocit(y|ies)|(joint_)?target_velocit(y|ies))", "velocity_desired"),
     # What a policy says: positions, or anything else; decided by the values (`followed`)
     (r"processed_actions", COMMAND),
     (r"(.*/)?(ctrl|actions?|(joint_)?targets?|commands?)", COMMAND),
@@ -84,21 +82,11 @@ EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
 """Flags of D4RL and Gymnasium: the last step of an episode has one."""
 
 CELLS = re.compile(
-    r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?",
-    re.IGNORECASE,
+    r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?", re.IGNORECASE
 )
 """Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``."""
 
-RATES = (
-    "fps",
-    "hz",
-    "rate",
-    "frequency",
-    "control_freq",
-    "sample_rate",
-    "sampling_rate",
-    "fs",
-)
+RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate", "fs")
 STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
 """Names of the number that is the rate in [Hz], or the step in [s]."""
 
@@ -196,10 +184,7 @@ def log_of(
         path,
         fields,
         episode,
-        not_read=(
-            *(n for n in arrays if n not in read and meaning(n) != COPY),
-            *not_read,
-        ),
+        not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
         remarks=(*_taken(fields, suggested, options), *still, *remarks),
         suggested=suggested,
         time=time,
@@ -254,14 +239,12 @@ def episodes_of(arrays: Arrays) -> dict[str, slice]:
         arrays: Arrays by name; only ``EPISODE_ENDS`` are used.
     """
     ends = [each.ravel() for name, each in arrays.items() if name.lower() in EPISODE_ENDS]
-    if not ends or len({len(each) for each in ends}) > 1:
+    if len({len(each) for each in ends}) != 1:
         return {"": slice(None)}
     last = np.flatnonzero(np.logical_or.reduce(ends)) + 1
     edges = [0, *(int(each) for each in last if each < len(ends[0])), len(ends[0])]
     found = [slice(start, stop) for start, stop in pairwise(edges) if stop - start > 1]
-    if len(found) < 2:
-        return {"": slice(None)}
-    return {str(number): part for number, part in enumerate(found)}
+    return {str(n): part for n, part in enumerate(found)} if len(found) > 1 else {"": slice(None)}
 
 
 def part_of(arrays: Arrays, episode: str) -> Arrays:
@@ -297,10 +280,7 @@ def followed(command: Real, position: Real) -> int:
         if moves:
             deviation = float(np.std(wanted)), float(np.std(actual))
             common = float(np.mean((wanted - wanted.mean()) * (actual - actual.mean())))
-            correlation, slope = (
-                common / (deviation[0] * deviation[1]),
-                common / deviation[0] ** 2,
-            )
+            correlation, slope = common / (deviation[0] * deviation[1]), common / deviation[0] ** 2
             if correlation < FOLLOWS or not SLOPES[0] <= slope <= SLOPES[1]:
                 break
         count, moving = count + 1, moving + moves
@@ -351,15 +331,15 @@ def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
             if len(arrays[name]) == samples and not (column_signal(name) or array_signal(name))
         }
         return time_column(rows) or counting(counters), arrays
-    values = _part(arrays, Entry("time", "", options.time))
+    values = _part(arrays, options.time)
     if values is None:
         return time_column(rows), arrays
     return (options.time, {**arrays, options.time: values[:, 0]}) if values.size else ("", arrays)
 
 
-def _part(arrays: Arrays, entry: Entry) -> NDArray[Any] | None:
-    """What an entry names, shape (samples, columns); None if there is no such array."""
-    name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
+def _part(arrays: Arrays, source: str) -> NDArray[Any] | None:
+    """An array or a part of it, shape (samples, columns); None if there is no such array."""
+    name, part = (source, slice(None)) if source in arrays else Entry("", "", source).part()
     return arrays[name].reshape(len(arrays[name]), -1)[:, part] if name in arrays else None
 
 
@@ -382,8 +362,7 @@ def _of_one_length(
             transposed = each.ndim == 2 and each.shape[1] == samples
             hint = "; samples come first, is it transposed?" if transposed else ""
             raise LogError(
-                path,
-                f"{name!r} has shape {each.shape}, there are {samples} stamps{hint}",
+                path, f"{name!r} has shape {each.shape}, there are {samples} stamps{hint}"
             )
     return dict(arrays)
 
@@ -403,7 +382,7 @@ def _state(
         named = (name for name, what in roles.items() if what == signal)
         isaac_first = sorted(named, key=lambda name: not STATES.fullmatch(name))
         place = (*(entry.source for entry in entries), *isaac_first, "")[0]
-        values = _part(arrays, Entry(signal, "", place))
+        values = _part(arrays, place)
         measured[signal] = None if values is None else floats(values)
     position, velocity = measured["position"], measured["velocity"]
     targets, remarks = list[Entry](), list[str]()
@@ -534,16 +513,13 @@ def _taken(
     named = [each for each in fields if each.signal]
     best = {each.signal: each.rank for each in sorted(named, key=lambda each: -each.rank)}
     known = [(each.signal, each.name) for each in named if each.rank == best[each.signal]]
-    known += [(each.signal, f"{each.source}{_why(each)}") for each in suggested]
+    for each in suggested:
+        why = QUATERNION.get(each.joint, "")
+        why = "position follows it" if each.signal == "position_desired" else why
+        known.append((each.signal, f"{each.source} ({why})" if why else each.source))
     order = sorted(known, key=lambda each: SIGNALS.index(each[0]))
     if taken := [f"{signal} = {name}" for signal, name in order if signal not in targets]:
         yield f"taken: {', '.join(taken)}"
-
-
-def _why(entry: Entry) -> str:
-    if entry.signal == "position_desired":
-        return " (position follows it)"
-    return f" ({QUATERNION[entry.joint]})" if entry.joint in QUATERNION else ""
 
 
 def _nothing(episode: str, arrays: Arrays) -> str:
@@ -575,30 +551,36 @@ SAMPLE_PROBLEM = (
     "holds the noise of a simulated run, not its motion: the folder of the data set is for"
     " `inspector train`, `tune` and `evaluate`; `inspector simulate run` writes runs"
 )
-ALONE = "array"
-"""Name of the array in a .npy file, for a mapping."""
+ALONE = "array"  # name of the array in a .npy file, for a mapping
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of an archive, an array alone, or a MATLAB file of version 5."""
     with path.open("rb") as stream:
-        if stream.read(len(MATLAB)) == MATLAB:
-            return _matlab(path, options)
-    arrays = _arrays(path)
+        is_matlab = stream.read(len(MATLAB)) == MATLAB
+    held = _variables if is_matlab else _arrays
+    arrays, run = held(path), None
+
+    def listing() -> tuple[str, ...]:
+        return tuple(f"{name}  {each.dtype} {each.shape}" for name, each in held(path).items())
+
+    if is_matlab:
+        read = partial(log_of_variables, path, options=options)
+        return LogReader("MATLAB 5", ("",), lambda *_: read(held(path)), listing)
     if str(arrays.get("format", "")).startswith(SAMPLE):
         raise LogError(path, SAMPLE_PROBLEM)
-    as_log = options.entries or options.units or options.joints
+    known = all(name in runfile.ARRAYS or name.startswith(runfile.STAGE) for name in arrays)
+    if known and "time" in arrays and not (options.entries or options.units or options.joints):
+        with suppress(RunError, TypeError):  # without uniform time it is resampled
+            check_time(arrays["time"])
+            run = partial(Run.load, path)
     return LogReader(
         "npz",
         tuple(episodes_of(arrays)),
         lambda episode, progress: _read(path, options, episode),
-        lambda: _listing(_arrays(path)),
-        partial(Run.load, path) if _is_run(arrays) and not as_log else None,
+        listing,
+        run,
     )
-
-
-def _listing(arrays: Arrays) -> tuple[str, ...]:
-    return tuple(f"{name}  {each.dtype} {each.shape}" for name, each in arrays.items())
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -619,18 +601,6 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         raise LogError(path, f"not an archive of plain arrays: {error}") from error
 
 
-def _is_run(arrays: Arrays) -> bool:
-    """Whether it is a run file with uniform time; one without is resampled."""
-    known = all(name in runfile.ARRAYS or name.startswith(runfile.STAGE) for name in arrays)
-    if not known or "time" not in arrays:
-        return False
-    try:
-        check_time(arrays["time"])
-    except (RunError, TypeError):
-        return False
-    return True
-
-
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     arrays = _arrays(path)
     joints = {
@@ -649,33 +619,16 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
 
 # MATLAB's files of version 5
 
-MATLAB = b"MATLAB 5.0 MAT-f"
-"""The first bytes of such a file."""
-HEADER = 128
-"""Bytes before the first variable."""
+MATLAB = b"MATLAB 5.0 MAT-f"  # the first bytes of such a file
+HEADER = 128  # bytes before the first variable
 MATRIX, COMPRESSED, FLAGS, DIMENSIONS = 14, 15, 6, 5
 """Types of elements: a variable, one that is packed, and what a variable begins with."""
-STORED = {
-    1: "i1",
-    2: "u1",
-    3: "i2",
-    4: "u2",
-    5: "i4",
-    6: "u4",
-    7: "f4",
-    9: "f8",
-    12: "i8",
-    13: "u8",
-}
-"""Types of elements that hold numbers, whatever the class of the variable is."""
-STRUCT, TEXT, NESTED = 2, 4, (1, 2)
-"""Classes of variables; cells and structs hold others."""
-NO_NUMBERS = (3, 5, 16, 17, 18)
-"""Classes of objects, sparse matrices and functions."""
-COMPLEX = 0x800
-"""The flag of a variable with imaginary parts."""
-DEPTH = 20
-"""Structs and cells within each other."""
+STORED = ("", "i1", "u1", "i2", "u2", "i4", "u4", "f4", "", "f8", "", "", "i8", "u8")
+"""Numbers by the type of their element, whatever the class of the variable is."""
+STRUCT, TEXT, NESTED = 2, 4, (1, 2)  # classes of variables; cells and structs hold others
+NO_NUMBERS = (3, 5, 16, 17, 18)  # classes of objects, sparse matrices and functions
+COMPLEX = 0x800  # the flag of a variable with imaginary parts
+DEPTH = 20  # structs and cells within each other
 
 DATA = ("signals/values", "Data", "data", "Values", "values")
 """Fields of a timeseries, or of what Simulink logs as a struct, that hold the signal itself."""
@@ -685,16 +638,6 @@ MATLAB_OBJECTS = (
     "holds MATLAB objects ({}), such as a timeseries or Simulink's logsout, not numbers; in MATLAB:"
     " t = ts.Time; q = ts.Data; save('log.mat', 't', 'q'); of Simulink, ts = logsout{{1}}.Values"
 )
-
-
-def _matlab(path: Path, options: ReadOptions) -> LogReader:
-    variables = _variables(path)
-    return LogReader(
-        "MATLAB 5",
-        ("",),
-        lambda episode, progress: log_of_variables(path, _variables(path), options),
-        lambda: _listing(variables),
-    )
 
 
 def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log:
@@ -819,7 +762,7 @@ def _numbers_in(
     else:
         size = sum(end - start for _, start, end in parts[3:])
         stored, start, end = (*parts, (1, stop, stop))[3]
-        dtype = np.dtype(STORED.get(stored, "i1"))
+        dtype = np.dtype(dict(enumerate(STORED)).get(stored) or "i1")
         plain = kind != TEXT and not flags & COMPLEX
         if count > size or (plain and count * dtype.itemsize != end - start):
             raise ArchiveError(f"damaged: a variable states {count} numbers and holds {size} bytes")

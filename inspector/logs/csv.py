@@ -38,29 +38,19 @@ from inspector.text import counted
 from noisemodel.files import beyond, limit
 from noisemodel.types import Array
 
-DELIMITERS = (";", "\t", ",", " ")
-"""Marks between cells."""
+DELIMITERS = (";", "\t", ",", " ")  # marks between cells
 COMMENTS = ("#", "%", "//")
 """Beginnings of lines that are comments, or of a header that NumPy or rostopic wrote."""
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
 """Cells without a number, in any case."""
-HEAD = 200
-"""Lines among which the first row of numbers is looked for."""
-EXAMINED = 20_000
-"""Lines of a log without a header from which its columns are recognised."""
-CLEAR = 0.8
-"""Least correlation of columns with the slopes of others that they are named after."""
-SPARSE = 0.5
-"""Share of rows without a number from which a column has another clock."""
-LONGEST_LINE = 4 * 2**20
-"""Characters of a line: far more than all columns that are read can have."""
-ENDLESS = f"not a CSV log: a line of more than {LONGEST_LINE} characters"
-DIGITS = 30
-"""Stamps have at most so many digits before or after the point."""
-PIECE = 2**20
-"""Characters that are read at once."""
-LATEST_YEAR = 2200
-"""Dates lie before: in nanoseconds, they fit into 64 bits."""
+HEAD = 200  # lines among which the first row of numbers is looked for
+EXAMINED = 20_000  # lines of a log without a header from which its columns are recognised
+CLEAR = 0.8  # least correlation of columns with the slopes of others that they are named after
+SPARSE = 0.5  # share of rows without a number from which a column has another clock
+LONGEST_LINE = 4 * 2**20  # characters of a line: far more than all columns that are read can have
+DIGITS = 30  # stamps have at most so many digits before or after the point
+PIECE = 2**20  # characters that are read at once
+LATEST_YEAR = 2200  # dates lie before: in nanoseconds, they fit into 64 bits
 
 SECONDS = re.compile(r"(?P<record>.*?)secs?(?:onds)?", re.IGNORECASE)
 NANOSECONDS = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
@@ -150,14 +140,25 @@ def _log_of(path: Path, stream: TextIO, options: ReadOptions, progress: Progress
     if len(joints) > 1:
         raise LogError(path, f"the joints' names change ({header[min(named)]}); split the log")
     of_joints = dict(zip(named.values(), next(iter(joints), ()), strict=True))
-    columns = {header[place]: values[:, at : at + 1] for at, place in enumerate(wanted)}
-    fields, converted = _fields(path, columns, stamps, of_joints, options)
-    known = {time, rest, *wanted, *named}
+    fields: list[Field] = []
+    converted: dict[str, list[str]] = {}
+    for at, name in enumerate(header[place] for place in wanted):
+        column = values[:, at : at + 1]
+        if (factor := factor_of(name)) != 1.0 and not options.units:
+            column = column * factor
+            converted.setdefault(without_unit(name)[1], []).append(name)
+        known = column_signal(name)
+        joint = of_joints.get(f"{NAME}{known[1]}") if known else None
+        signal, of = (known[0], (joint,)) if known and joint else ("", ())
+        rank = int(says_twice(name))
+        fields.append(Field(name, column, stamps, of, signal, source=path.name, rank=rank))
+    read = {time, rest, *wanted, *named}
+    remarks = (f"{listed(n)}: converted from {u}, as the header says" for u, n in converted.items())
     log = Log(
         path,
-        fields,
-        not_read=tuple(n for place, n in enumerate(header) if n and place not in known),
-        remarks=(*layout.remarks, *converted),
+        tuple(fields),
+        not_read=tuple(n for place, n in enumerate(header) if n and place not in read),
+        remarks=(*layout.remarks, *remarks),
         time="" if time is None else header[time],
     )
     return gathered(log, options)
@@ -170,7 +171,7 @@ def _lines(path: Path, stream: TextIO) -> Iterator[str]:
     """Lines of a log, which end."""
     while line := stream.readline(LONGEST_LINE):
         if len(line) == LONGEST_LINE:
-            raise LogError(path, ENDLESS)
+            raise LogError(path, f"not a CSV log: a line of more than {LONGEST_LINE} characters")
         yield line
 
 
@@ -208,21 +209,29 @@ def _layout_of(path: Path, lines: Sequence[str], options: ReadOptions) -> Layout
     width = len(_split(lines[first], delimiter))
     fitting = [number for number, cells in before.items() if abs(len(cells) - width) <= 1]
     plain = [number for number in fitting if not before[number][0].startswith(COMMENTS)]
-    candidates = plain or fitting or [n for n, cells in before.items() if _names_motion(cells)]
+    names = {number: _clean(cells) for number, cells in before.items()}
+    candidates = (
+        plain
+        or fitting
+        or [
+            number
+            for number, row in names.items()
+            if time_column(row) or any(map(column_signal, row))
+        ]
+    )
     if not candidates:
         raise _no_header(path, delimiter, first, max(before, default=0) + 1)
     row = candidates[-1]
     # with an open quotation mark, the header takes more lines
     rows = csv.reader(lines[row - 1 :], delimiter=delimiter, skipinitialspace=True)
-    names = _clean(next(rows))
-    units = [name.strip("[]() ") for name in names]
+    header = _clean(next(rows))
+    units = [name.strip("[]() ") for name in header]
     known = all(not unit or unit.lower() in {*SIGNAL_UNITS, *TIME_UNITS} for unit in units)
     if len(candidates) > 1 and any(units) and known:
-        above = _clean(before[candidates[-2]])
-        pairs = zip(above, units, strict=False)
-        names = tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
-        return layout(names, row, first, row, candidates[-2])
-    return layout(names, row, first, row)
+        above = zip(names[candidates[-2]], units, strict=False)
+        header = tuple(f"{name} [{unit}]" if unit else name for name, unit in above)
+        return layout(header, row, first, row, candidates[-2])
+    return layout(header, row, first, row)
 
 
 def _first_data(lines: Sequence[str]) -> tuple[str, int | None]:
@@ -252,11 +261,6 @@ def _clean(cells: Sequence[str]) -> tuple[str, ...]:
     first = cells[0].strip().lstrip("#% ")
     marked_alone = cells[0].strip() and not first  # as in "# time q"
     return (*(() if marked_alone else (first,)), *(name.strip() for name in cells[1:]))
-
-
-def _names_motion(cells: Sequence[str]) -> bool:
-    names = _clean(cells)
-    return bool(time_column(names)) or any(map(column_signal, names))
 
 
 def _no_header(path: Path, delimiter: str, skip: int, row: int) -> LogError:
@@ -402,37 +406,6 @@ def _wanted(
     return wanted
 
 
-def _fields(
-    path: Path,
-    columns: dict[str, Array],
-    stamps: Stamps,
-    joints: dict[str, str],
-    options: ReadOptions,
-) -> tuple[tuple[Field, ...], list[str]]:
-    """Fields of the columns, in SI units where a name has a unit, and remarks on units."""
-    fields: list[Field] = []
-    converted: dict[str, list[str]] = {}
-    for name, values in columns.items():
-        if (factor := factor_of(name)) != 1.0 and not options.units:
-            values = values * factor
-            converted.setdefault(without_unit(name)[1], []).append(name)
-        known = column_signal(name)
-        joint = joints.get(f"{NAME}{known[1]}") if known else None
-        fields.append(
-            Field(
-                name,
-                values,
-                stamps,
-                joints=(joint,) if joint else (),
-                signal=known[0] if known and joint else "",
-                source=path.name,
-                rank=int(says_twice(name)),
-            )
-        )
-    remarks = [f"{listed(n)}: converted from {u}, as the header says" for u, n in converted.items()]
-    return tuple(fields), remarks
-
-
 # Rows
 
 
@@ -482,14 +455,12 @@ def _piece(path: Path, stream: TextIO) -> str:
     """Whole lines, of which none is quoted over the end of a piece."""
     text = stream.read(PIECE)
     more, odd = list[str](), text.count('"') % 2
-    while text and (odd or (not text.endswith("\n") and not more)) and len(more) < HEAD:
-        line = stream.readline(LONGEST_LINE)
-        if not line:
-            break
-        more.append(line)
-        odd ^= line.count('"') % 2
-    if max(map(len, more), default=0) >= LONGEST_LINE:
-        raise LogError(path, ENDLESS)
+    if text and (odd or not text.endswith("\n")):
+        for line in islice(_lines(path, stream), HEAD):
+            more.append(line)
+            odd ^= line.count('"') % 2
+            if not odd:
+                break
     return text + "".join(more)
 
 
@@ -543,7 +514,10 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
             if len(cells) != width:
                 if cells in ([], [""]) or cells[0].lstrip().startswith(COMMENTS):
                     continue
-                cells = _fitted(cells, layout.header)
+                if len(cells) == width - 1 and not layout.header[-1]:
+                    cells = [*cells, ""]  # the header ends with a separator
+                elif not any(cell.strip() for cell in cells[width:]):
+                    cells = cells[:width]  # the row does
                 if len(cells) != width:
                     names = "the header names" if layout.row else "--columns names"
                     raise LogError(
@@ -556,14 +530,6 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
             yield first + lines.line_num, cells
     except csv.Error as error:
         raise LogError(path, f"not a CSV log ({error})", first + lines.line_num) from error
-
-
-def _fitted(cells: list[str], header: Sequence[str]) -> list[str]:
-    """Cells without those after a trailing separator, or with the one that the header has."""
-    width = len(header)
-    if len(cells) == width - 1 and not header[-1]:
-        return [*cells, ""]
-    return cells[:width] if not any(cell.strip() for cell in cells[width:]) else cells
 
 
 def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -> list[float]:

@@ -40,8 +40,7 @@ from inspector.text import counted
 from noiseclassifier.jsontext import from_json
 from noisemodel.runfile import ArchiveError, check_unpacked, one_line
 
-EPISODES = "data"
-"""The group that holds the episodes of robomimic and Isaac Lab."""
+EPISODES = "data"  # the group that holds the episodes of robomimic and Isaac Lab
 ARGUMENTS = "env_args"
 """The attribute of that group which tells how robomimic and Isaac Lab set up their simulator."""
 NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
@@ -49,8 +48,7 @@ NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
 
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
 """Errors that h5py raises for damaged files."""
-SMALL = 8 * 2**20
-"""Bytes up to which a dataset is read whatever its name is."""
+SMALL = 8 * 2**20  # bytes up to which a dataset is read whatever its name is
 NAMES = {*TIMES, *EPISODE_ENDS}
 
 # What reads a text of any length, in a process of its own, which can be ended.
@@ -66,12 +64,10 @@ TIMEOUT = 10.0
 
 CONTROLLER = re.compile(r'"type": "((?:OSC|IK|JOINT)_\w+)"')
 """Type of the controller of an arm in robosuite's arguments."""
-MATLAB = b"MATLAB 7.3"
-"""The first bytes of a file that MATLAB wrote."""
+MATLAB = b"MATLAB 7.3"  # the first bytes of a file that MATLAB wrote
 OBJECT = "MATLAB_object_decode"
 """An attribute of MATLAB's objects, of which a file holds numbers and references alone."""
-REFERENCES = "#refs#"
-"""The group in which MATLAB keeps the cells and objects of a file."""
+REFERENCES = "#refs#"  # the group in which MATLAB keeps the cells and objects of a file
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:

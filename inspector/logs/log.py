@@ -17,21 +17,16 @@ from noisemodel import Run
 from noisemodel.run import LONGEST, SHORTEST
 from noisemodel.types import Array, Mask, Real
 
-SAMPLES = "samples"
-"""The unit of stamps that count samples, of a log whose rate is not known yet."""
+SAMPLES = "samples"  # the unit of stamps that count samples, of a log whose rate is not known yet
 
 ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 """Round rates are these, times a power of ten, in [Hz]."""
-NEAR = 0.05
-"""Largest relative difference of a nominal rate to the round one that replaces it."""
-UNIFORM = 1e-3
-"""Largest relative deviation of a uniform clock's steps from their median."""
-GAP = 5.0
-"""Length of a step, in nominal ones, above which it is a gap."""
+NEAR = 0.05  # largest relative difference of a nominal rate to the round one that replaces it
+UNIFORM = 1e-3  # largest relative deviation of a uniform clock's steps from their median
+GAP = 5.0  # length of a step, in nominal ones, above which it is a gap
 
 PART = re.compile(r"(?P<name>.+)\[(?P<first>\d*)(?P<colon>:?)(?P<last>\d*)\]")
-JOINT = "{joint}"
-"""What stands for the name of a joint in a pattern of a mapping."""
+JOINT = "{joint}"  # what stands for the name of a joint in a pattern of a mapping
 
 
 @dataclass(frozen=True)
@@ -74,11 +69,6 @@ class Stamps:
     def counted(cls, samples: int) -> "Stamps":
         """Stamps of a log that has none, until its rate is known."""
         return cls(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES)
-
-    @classmethod
-    def every(cls, step: float, samples: int, remark: str = "") -> "Stamps":
-        """Stamps of a log that has none, with a known step in [s]."""
-        return cls(Decimal(0), np.arange(samples, dtype=np.float64) * step, remark=remark)
 
     @cached_property
     def clock(self) -> Clock:

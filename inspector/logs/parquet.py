@@ -11,6 +11,7 @@ radians, degrees, or normalised to each joint's calibrated range.
 """
 
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -26,13 +27,7 @@ from inspector.logs.arrays import floats
 from inspector.logs.clocks import counting, stamps_of
 from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions, check_unit
-from inspector.logs.names import (
-    Naming,
-    array_signal,
-    column_signal,
-    listed,
-    time_column,
-)
+from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
 from noisemodel.files import beyond, limit
@@ -41,36 +36,18 @@ from noisemodel.types import Real
 
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
 """Errors that pyarrow raises for damaged files."""
-EPISODE = "episode_index"
-"""The column with the number of the episode, if there is one."""
+EPISODE = "episode_index"  # the column with the number of the episode, if there is one
 
-INFO = Path("meta", "info.json")
-"""The file that describes a LeRobot data set."""
+INFO = Path("meta", "info.json")  # the file that describes a LeRobot data set
 STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
 FURTHER = {"observation.velocity": "velocity", "observation.effort": "effort"}
 """Features that some data sets have besides (ALOHA's), and their signals."""
 PARTS = {"pos": "position", "vel": "velocity", "effort": "effort", "torque": "effort"}
 """Signals by the last part of a name: ``shoulder_pan.pos``."""
-CARTESIAN = {
-    "x",
-    "y",
-    "z",
-    "roll",
-    "pitch",
-    "yaw",
-    "rx",
-    "ry",
-    "rz",
-    "qx",
-    "qy",
-    "qz",
-    "qw",
-}
+CARTESIAN = {"x", "y", "z", "roll", "pitch", "yaw", "rx", "ry", "rz", "qx", "qy", "qz", "qw"}
 """Column names of an end effector's pose."""
-SLOWEST, FASTEST = 1e-3, 1e6
-"""Rates that a data set may have, in [Hz]."""
-LATEST = 9e9
-"""Stamps and frame numbers lie before: in nanoseconds, these fit into 64 bits."""
+SLOWEST, FASTEST = 1e-3, 1e6  # rates that a data set may have, in [Hz]
+LATEST = 9e9  # stamps and frame numbers lie before: in nanoseconds, these fit into 64 bits
 TOLERANCE = 1e-4
 """Largest difference of a stamp from its frame number over the rate, in [s], as in LeRobot."""
 UNKNOWN = (
@@ -205,8 +182,7 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
 TRUE, FALSE, BYTE, DOUBLE, BINARY, LIST, SET, STRUCT = 1, 2, 3, 7, 8, 9, 10, 12
 NUMBERS = (4, 5, 6)
 """Types of Thrift's compact protocol; the last are integers of 16, 32 and 64 bits."""
-DEPTH = 13
-"""Structs and lists within each other; the end of a file has eight."""
+DEPTH = 13  # structs and lists within each other; the end of a file has eight
 MAGIC = b"PAR1"
 LARGEST_END = 32 * 2**20
 """Most bytes of the end of a file, which has some hundred for each column of a row group."""
@@ -223,10 +199,7 @@ def unpacked_size(path: Path, columns: Collection[str]) -> tuple[int, int]:
     Besides, the most numbers that they hold in a row.
     """
     stated = held = width = 0
-    with (
-        path.open("rb") as stream,
-        mmap(stream.fileno(), 0, access=ACCESS_READ) as data,
-    ):
+    with path.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as data:
         length = int.from_bytes(data[-8:-4], "little")
         if data[-4:] != MAGIC or length > min(LARGEST_END, len(data) - 8):
             raise ValueError("its end is no table of columns")
@@ -373,11 +346,7 @@ def _names(features: dict[str, Any], name: str) -> list[str]:
 
 
 def _episode(
-    path: Path,
-    info: dict[str, Any],
-    files: Sequence[Path],
-    episode: str,
-    options: ReadOptions,
+    path: Path, info: dict[str, Any], files: Sequence[Path], episode: str, options: ReadOptions
 ) -> Log:
     features, present = info["features"], _schema(files[0]).names
     mapped = {entry.part()[0] for entry in options.entries}
@@ -406,10 +375,7 @@ def _episode(
             f" --map position_desired={ACTION}[0:6] takes some"
         )
     ends = [each.rpartition(".")[1:] for name in sources for each in _names(features, name)]
-    meta = {
-        "robot_type": info.get("robot_type"),
-        "dataset": info.get("codebase_version"),
-    }
+    meta = {"robot_type": info.get("robot_type"), "dataset": info.get("codebase_version")}
     return Log(
         path,
         tuple(fields),
@@ -489,4 +455,5 @@ def _stamps(path: Path, info: dict[str, Any], table: Any, options: ReadOptions) 
         return Stamps.of_nanoseconds(np.round(logged * 1e9).astype(np.int64))
     if not rate:
         raise LogError(path, "meta/info.json has no fps; specify the rate (--rate)")
-    return Stamps.every(1 / rate, len(table))
+    stamps = Stamps.counted(len(table))
+    return replace(stamps, time=stamps.time * (1 / rate), unit="seconds")
