@@ -257,7 +257,7 @@ class Noise:
         """Fail with the findings, and leave a recording and a picture."""
         __tracebackhide__ = True
         from inspector.recording.run import write
-        from inspector.report.findings import brief, sentence
+        from inspector.report.findings import told
 
         recording, picture = self._artefacts()
         write(analysis, recording, overwrite=True)
@@ -271,11 +271,11 @@ class Noise:
             picture.write_bytes(drawn(analysis))
         number = len(events) + len(verdict.missing)
         by = f", {verdict.beside.words}" if verdict.beside else f", by model {analysis.model}"
-        first = brief(verdict, events[0]) if events else str(verdict.missing[0])
+        first = told(verdict, events[0], short=True) if events else str(verdict.missing[0])
         self._node.user_properties.append((FINDING, f"{verdict.path}: {first}"))
         lines = [f"noise: {first} ({verdict.path})"]
         lines += [f"{number} finding{'s' * (number != 1)} in {shown}{by}"]
-        lines += [f"  {sentence(verdict, event)}" for event in events]
+        lines += [f"  {told(verdict, event)}" for event in events]
         lines += [f"  {each}" for each in verdict.missing]
         left = {"recording": recording, **({"picture": picture} if picture else {})}
         for what, path in left.items():

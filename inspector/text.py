@@ -36,6 +36,12 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
 
 
+def natural(text: str) -> list[tuple[int, str]]:
+    """Sorts texts by the numbers in them: pick-9 before pick-10."""
+    parts = re.split(r"(\d+)", text)
+    return [(int(each), "") if each.isdecimal() else (-1, each) for each in parts]
+
+
 def plain(value: float, digits: int = 3) -> str:
     """A number rounded to significant digits, without an exponent up to a million: "3540"."""
     return f"{float(f'{value:.{digits}g}'):g}"

@@ -19,7 +19,7 @@ from inspector.audit.audit import audit
 from inspector.audit.signals import without_placeholder
 from inspector.errors import Status, Unknown
 from inspector.library import demo_run, load_library, model_files
-from inspector.report import html, markdown
+from inspector.report import findings, html
 from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
 from inspector.verdict import Verdict, classify_file, exit_status
@@ -77,7 +77,7 @@ def test_the_status_is_the_same_in_every_output(tmp_path):
         github = FORMATS["github"]([verdict])
         counted = github.startswith("::notice title=noise-inspector::1 run: 1 ok")
         assert (f"{status}: " in github) if outcome else counted
-        assert markdown.report(found).startswith(f"### {status}")
+        assert findings.report(found).startswith(f"### {status}")
         assert f"<title>run: {status}" in html.page(found)
         assert exit_status([verdict]) == {"ok": 0, "findings": 1, "cannot-tell": 4}[status]
 
@@ -335,7 +335,7 @@ def test_a_run_is_labelled_and_audited_once(monkeypatch):
     for name in counts:
         monkeypatch.setattr(module, name, counted(name))
     found = module.analyse_file(demo_run(), LIBRARY)
-    markdown.report(found)
+    findings.report(found)
     html.page(found)
     assert found.localisations
     assert counts == {"audit": 1, "label_run": 1}

@@ -16,7 +16,7 @@ from inspector.audit.audit import Observability, audit
 from inspector.errors import Status
 from inspector.library import CannotTellError, label_run, signals_of
 from inspector.logs.clocks import without_hold
-from inspector.report.markdown import report
+from inspector.report.findings import report
 from inspector.training.train import classified
 
 LIBRARY = {"general": trained()}

@@ -19,7 +19,7 @@ from inspector.live import LiveError
 from inspector.live.session import BATCH
 from inspector.live.sink import Sink
 from inspector.recording import unstable
-from inspector.report.markdown import spoken
+from inspector.report.findings import spoken
 from noiseclassifier.signals import JOINTS, MOTION, NOISE
 from noisemodel import UnknownJointError
 

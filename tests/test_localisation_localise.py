@@ -7,9 +7,8 @@ from inspector.analysis import analyse_file
 from inspector.library import demo_run, load_library, model_files
 from inspector.localisation.localise import Localisation, band, localise
 from inspector.localisation.stage import quiet_stretches
-from inspector.report.findings import words
+from inspector.report.findings import report, sentence, words
 from inspector.report.html import found as tables
-from inspector.report.markdown import report, sentence
 from inspector.verdict import classify_file
 from noisemodel import Block, Run
 

@@ -11,9 +11,9 @@ from inspector.analysis import Analysis
 from inspector.audit.audit import audit
 from inspector.errors import Status
 from inspector.localisation.order import Order, best_lines, order
+from inspector.report.findings import report, sentence
 from inspector.report.formats import FORMATS, as_json, text
 from inspector.report.html import found
-from inspector.report.markdown import report, sentence
 from inspector.report.picture import picture
 from inspector.verdict import Verdict
 from noiseclassifier import Event

@@ -11,7 +11,7 @@ from inspector.analysis import analyse_file
 from inspector.library import demo_run, load_library, model_files
 from inspector.recording.run import write
 from inspector.report import html
-from inspector.report.markdown import LOCALISATION, finding_of
+from inspector.report.findings import LOCALISATION, finding_of
 
 
 @pytest.fixture(scope="module")

@@ -101,7 +101,7 @@ def diff(
     """
     from inspector.library import load_library
     from inspector.reference.difference import Gate, difference
-    from inspector.report.difference import FORMATS
+    from inspector.report.formats import DIFF_FORMATS as FORMATS
     from inspector.report.formats import published
 
     files = files_of(write or [], list(Format), overwrite=overwrite)
@@ -156,7 +156,7 @@ def _report(
     """Write the worst scenario as recording and picture, and all numbers."""
     from inspector.compare.pair import compare
     from inspector.compare.recording import write
-    from inspector.report.difference import as_json
+    from inspector.report.formats import diff_json as as_json
     from inspector.report.picture import over_reference
     from noisemodel.files import replacing
 

@@ -289,7 +289,7 @@ def _one(runs: list["Opened"], target: Path, request: Request) -> float:
     """Write the recording of a run; returns the time of its worst moment, in [s]."""
     from inspector.export.sound import of_recording, worst_time
     from inspector.recording.run import write
-    from inspector.report import findings, markdown
+    from inspector.report import findings
 
     (run,) = runs
     found, verdict, beside = _analysed(run, request)
@@ -297,7 +297,7 @@ def _one(runs: list["Opened"], target: Path, request: Request) -> float:
     write(found, target, overwrite=overwrite, sound=sound, floor=floor, beside=beside)
     typer.echo(f"{run.source.shown}: {found.headline}")
     if verdict is None:
-        lines = [markdown.sentence(found, event) for event in found.findings]
+        lines = [findings.sentence(found, event) for event in found.findings]
     else:
         lines = [*findings.failing(verdict), *findings.excused(verdict)]
         lines += [f"beside {verdict.beside.path}: {verdict.beside.words}"] if verdict.beside else []

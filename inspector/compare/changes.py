@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from inspector.analysis import Analysis, worst_signal
 from inspector.compare.pair import Pair
 from inspector.levels import Spectrogram, spectrogram
-from inspector.report.markdown import spoken
+from inspector.report.findings import spoken
 from noiseclassifier import Event
 from noisemodel import Block
 from noisemodel.noise import REFERENCE_POWER, decibel

@@ -22,7 +22,7 @@ from inspector.recording.axes import Label, Panel, Timed
 from inspector.recording.panels import HIGH_DB, LOW_DB
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
-from inspector.report.markdown import spoken
+from inspector.report.findings import spoken
 from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array

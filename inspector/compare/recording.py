@@ -56,7 +56,7 @@ from inspector.recording.panels import (
 )
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
-from inspector.report.markdown import classes_of, spoken
+from inspector.report.findings import classes_of, spoken
 from noisemodel.run import part
 
 SIDE_COLORS = {"before": BEFORE, "after": AFTER}

@@ -26,7 +26,7 @@ from inspector.recording.panels import (
     style_bands,
 )
 from inspector.recording.unstable import TIMELINE, Camera, Part
-from inspector.report.markdown import spoken
+from inspector.report.findings import spoken
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
 from noisemodel.noise import decibel

@@ -22,7 +22,7 @@ from inspector.recording.axes import Label, Panel, Timed, at
 from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
-from inspector.report.markdown import brief, classes_of, finding_of, spoken
+from inspector.report.findings import brief, classes_of, finding_of, spoken
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating

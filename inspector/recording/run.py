@@ -17,7 +17,7 @@ from inspector.levels import spectrogram
 from inspector.recording import axes, camera, panels, robot, unstable
 from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
-from inspector.report.markdown import report, spoken
+from inspector.report.findings import report, spoken
 from noisemodel import Run
 from noisemodel.files import replacing
 

@@ -177,6 +177,12 @@ class Difference:
             (row.outcome for row in self.rows), key=order.index, default=Outcome.INCONCLUSIVE
         )
 
+    @property
+    def alone(self) -> tuple[Row, ...]:
+        """Scenarios that one side lacks."""
+        outcomes = (Outcome.MISSING, Outcome.ADDED)
+        return tuple(row for row in self.rows if row.outcome in outcomes)
+
     def status(self, row: Row) -> Status:
         """Whether a scenario fails."""
         failing = (row.outcome in BROKEN and self.gate.broken) or (

@@ -1,4 +1,8 @@
-"""Findings in a line, alike in all formats, and runs of one scenario folded into a row."""
+"""Findings in words, alike in all outputs, and runs of one scenario folded into a row.
+
+An analysis has findings and annotations, which recordings and pages show; a verdict has findings
+of which some may not count. Both are localised by the same words.
+"""
 
 import re
 from collections import Counter
@@ -6,12 +10,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from inspector.analysis import Analysis
 from inspector.errors import Status
+from inspector.localisation.localise import fault_links, has_stages
 from inspector.localisation.stage import Localisation
 from inspector.text import counted
 from inspector.verdict import Verdict
-from noiseclassifier import Event
+from noiseclassifier import UNKNOWN, Event
 from noiseclassifier.labels import interval
+from noisemodel import Block
 
 REPETITION = re.compile(r"(?P<name>.+?)[-_.](?:run|rep|take|seed)?[-_.]?\d+")
 """Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
@@ -28,24 +35,30 @@ WORDS = {
 """How people read a status."""
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}
 """How people count them."""
+UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
 LEAST = 0.05
 """Joints with a smaller share are left out."""
 PRECISE = 10.0
 """A lag is given to a tenth of a millisecond up to this, in [ms]."""
+LOCALISATION = ("shows first in", "by joints", "band", "links, shares of the excess")
+"""Names of the columns of a localisation."""
+SPOKEN = {"highaccelerations": "high accelerations"}
+"""Classes of NoisyTest whose names people read as two words."""
 Item = TypeVar("Item")
-Row = tuple[str, str, str, str, str]
-"""Time, class, joints, band, and what else is known of a finding."""
+
+
+def spoken(text: str) -> str:
+    """A class as people read it, or a text with classes in it."""
+    for name, said in SPOKEN.items():
+        text = text.replace(name, said)
+    return text
 
 
 def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
-    """A localisation in words.
+    """Stage with its lead over the next, joints with their shares, and band; empty if not known.
 
     Args:
         quote: Mark around the names of stages, say a backtick in Markdown.
-
-    Returns:
-        Stage and its lead over the next, joints and their shares, and frequency band; each is
-        empty if it is not known.
     """
     stage = f"{quote}{found.stage}{quote}" if found.stage else ""
     if found.lag > 0.0:
@@ -58,54 +71,190 @@ def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
     return stage, joints, band if found.band else ""
 
 
-def row(verdict: Verdict, event: Event, runs: str = "") -> Row:
-    """A finding as cells of a table; `runs` says in how many repetitions it is."""
-    known = verdict.localisations.get(event)
+# --- of an analysis
+
+
+def report(analysis: Analysis) -> str:
+    """The report of an analysed run, in Markdown."""
+    run, remark = analysis.run, note(analysis)
+    facts = [
+        f"{run.duration:.2f} s at {run.rate:g} Hz",
+        counted(len(run.joint_names), "joint"),
+        run.robot or "robot not named",
+        f"model {analysis.model or 'none'}",
+        *(f"{key} {run.meta[key]}" for key in ("scenario", "seed") if key in run.meta),
+    ]
+    parts = [
+        f"### {spoken(analysis.headline)}",
+        "\n".join(f"- {sentence(analysis, event, bold='**')}" for event in analysis.findings),
+        f"{analysis.name}: {', '.join(facts)}",
+    ]
+    if run.blocks:
+        lines = [f"- {_annotation(analysis, each)}" for each in run.blocks if each.label != "ok"]
+        parts += ["**Annotated**", "\n".join(lines) or "- no failure"]
+    parts += [remark]
+    if analysis.remarks:
+        parts += ["**Remarks**", "\n".join(f"- {spoken(each)}" for each in analysis.remarks)]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "") -> str:
+    """Class, time, score, novelty and localisation of an event, in a line of Markdown."""
+    stage, joints, band, links = localised(analysis, event, quote="`")
+    named = {"joints": joints, "loudest links": links, "": band, "first in": stage}
+    where = "; ".join(f"{name} {part}".strip() for name, part in named.items() if part)
+    sure = ""
+    if isinstance(event, Event):
+        measured = analysis.labels is not None and analysis.labels.novel is not None
+        sure = f", score {event.score:.2f}"
+        sure += event.novelty or (", in distribution" if measured else "")
+    when = f"{interval(event.start, event.stop)}{sure}"
+    return f"{bold}{spoken(event.label)}{bold}, {when}{where and f': {where}'}"
+
+
+def brief(analysis: Analysis, event: Event | Block) -> str:
+    """Class, time and first joint of an event, in a few words."""
+    first = localised(analysis, event)[1].partition(",")[0]
+    when = interval(event.start, event.stop)
+    return ", ".join(filter(None, [f"{spoken(event.label)} {when}", first]))
+
+
+def _annotation(analysis: Analysis, block: Block) -> str:
+    """An annotated failure and what became of it; where it was found, that says the rest."""
+    when, became = interval(block.start, block.stop), matched(analysis, block)
+    if finding_of(analysis, block) is not None:
+        return f"**{spoken(block.label)}**, {when}: found, {became}"
+    found = f", found {became}" if became not in ("", "no") else ", not found" if became else ""
+    return sentence(analysis, block, bold="**").replace(when, f"{when}{found}", 1)
+
+
+def finding_of(analysis: Analysis, block: Block) -> Event | None:
+    """The finding of an annotated class that overlaps it longest; None if it was missed."""
+    shared = {
+        event: min(event.stop, block.stop) - max(event.start, block.start)
+        for event in analysis.findings
+        if event.label == block.label
+    }
+    longest = max(shared, key=shared.__getitem__, default=None)
+    return longest if longest is not None and shared[longest] > 0.0 else None
+
+
+def matched(analysis: Analysis, block: Block) -> str:
+    """What became of an annotated failure: when it was found, in words; nothing of `ok`."""
+    if block.label == "ok" or analysis.labels is None:
+        return ""
+    event = finding_of(analysis, block)
+    if event is not None:
+        return f"{event.start:.2f} s to {event.stop:.2f} s"
+    others = {e.label for e in analysis.findings if e.start < block.stop and block.start < e.stop}
+    return f"as {', '.join(map(spoken, sorted(others)))}" if others else "no"
+
+
+def classes_of(analysis: Analysis) -> tuple[str, ...]:
+    """The classes that a run's pictures have a row for: failures first, `unknown` and `ok` last."""
+    known = () if analysis.labels is None else analysis.labels.classes
+    others = {label for *_, label in analysis.lane}
+    others |= {event.label for event in analysis.findings}
+    others |= {block.label for block in analysis.run.blocks}
+    every = [*known, *sorted(others - set(known))]
+    last = [name for name in (UNKNOWN, "ok") if name in every]
+    return (*(name for name in every if name not in last), *last)
+
+
+def localised(
+    analysis: Analysis, failure: Event | Block, *, quote: str = ""
+) -> tuple[str, str, str, str]:
+    """Localisation of a failure in words: stage, joints, band (with its order), and links."""
+    if failure.label == "ok":
+        return "", "", "", ""
+    if isinstance(failure, Block):  # what was found is localised once
+        failure = finding_of(analysis, failure) or failure
+    known, links = analysis.localisations[failure], ""
+    if analysis.links is not None:
+        annotated = [block for block in analysis.run.blocks if block.label != "ok"]
+        failures: list[Event | Block] = [*analysis.findings, *annotated]
+        named = fault_links(analysis.links, failure, failures, known=known)
+        links = ", ".join(f"{link} {share:.0%}" for link, share in named)
+    stage, joints, band = words(known, quote=quote)
+    order = analysis.orders.get(failure) if isinstance(failure, Event) else None
+    return stage, joints, "; ".join(str(part) for part in (band, order) if part), links
+
+
+def note(analysis: Analysis) -> str:
+    """Why no failure has a stage; empty if the run has stages."""
+    if not analysis.localisations or has_stages(analysis.run):
+        return ""
+    return "No stages: the run has neither desired velocities nor named stages of the control flow."
+
+
+# --- of verdicts
+
+
+def row(verdict: Verdict, event: Event, runs: str = "") -> tuple[str, str, str, str, str]:
+    """A finding as cells: time, class, joints, band, and the rest.
+
+    Args:
+        runs: In how many repetitions it is.
+    """
+    known, by = verdict.localisations.get(event), verdict.evidence.get(event)
     _, joints, band = words(known) if known else ("", "", "")
-    evidence, order = verdict.evidence.get(event), verdict.orders.get(event)
     over = ""
-    if evidence is not None and not evidence.excused:
+    if by is not None and not by.excused:
         over = "by the general model"
-    if evidence is not None and evidence.db is not None and not evidence.excused:
-        over = f"{evidence.db:+.0f} dB over {_compared(verdict, evidence.kind)}"
-        joints = joints or evidence.joint
-        if evidence.octave and not band:
-            band = f"{evidence.octave[0]:.0f}-{evidence.octave[1]:.0f} Hz"
-    ruled = f"({verdict.ruled(event)})" if str(verdict.ruled(event)) else ""
-    rest = (event.novelty.removeprefix(", "), str(order or ""), over, runs, ruled)
+    if by is not None and by.db is not None and not by.excused:
+        number = verdict.beside.repetitions if verdict.beside else 0
+        several = number and by.kind == "repetitions"
+        over = f"{by.db:+.0f} dB over {counted(number, 'repetition') if several else by.kind}"
+        joints = joints or by.joint
+        if by.octave and not band:
+            band = f"{by.octave[0]:.0f}-{by.octave[1]:.0f} Hz"
+    ruled, order = str(verdict.ruled(event)), str(verdict.orders.get(event, ""))
+    rest = (event.novelty.removeprefix(", "), order, over, runs, ruled and f"({ruled})")
     when = f"{event.start:6.2f} - {event.stop:6.2f} s"
-    return when, event.label, joints, band, ", ".join(filter(None, rest)).replace(", (", " (")
+    return when, event.label, joints, band, _listed(*rest)
 
 
-def _compared(verdict: Verdict, kind: str) -> str:
-    """What a finding is louder than, with the number of repetitions where that is known."""
-    number = verdict.beside.repetitions if verdict.beside else 0
-    return counted(number, "repetition") if number and kind == "repetitions" else kind
+def told(verdict: Verdict, event: Event, runs: str = "", *, short: bool = False) -> str:
+    """The same as a sentence, or short, for lines that are cut."""
+    _, label, *rest = row(verdict, event, runs)
+    when = f"from {interval(event.start, event.stop)}"
+    return _listed(f"{label} {f'{event.start:.2f}-{event.stop:.2f} s' if short else when}", *rest)
 
 
-def sentence(verdict: Verdict, event: Event, runs: str = "") -> str:
-    """The same as a sentence."""
-    _, label, joints, band, rest = row(verdict, event, runs)
-    parts = [f"{label} from {interval(event.start, event.stop)}", joints, band, rest]
-    return ", ".join(filter(None, parts)).replace(", (", " (")
-
-
-def brief(verdict: Verdict, event: Event) -> str:
-    """The same with nothing before what, when and where, for lines that are cut."""
-    _, label, joints, band, rest = row(verdict, event)
-    parts = [f"{label} {event.start:.2f}-{event.stop:.2f} s", joints, band, rest]
+def _listed(*parts: str) -> str:
+    """What there is of several parts; a ruling in brackets follows without a comma."""
     return ", ".join(filter(None, parts)).replace(", (", " (")
 
 
 def failing(verdict: Verdict) -> list[str]:
     """Sentences on what fails a run."""
-    found = [sentence(verdict, event) for event in verdict.failing]
-    return [*found, *map(str, verdict.missing)]
+    return [*(told(verdict, event) for event in verdict.failing), *map(str, verdict.missing)]
 
 
 def excused(verdict: Verdict) -> list[str]:
     """Sentences on findings that do not."""
-    return [sentence(verdict, event) for event in verdict.excused]
+    return [told(verdict, event) for event in verdict.excused]
+
+
+def timeline(verdict: Verdict, width: int = 60) -> str:
+    """The findings that fail a run over time as text, a line for each class and joint."""
+    if not verdict.duration:
+        return ""
+    lines: dict[tuple[str, str], list[str]] = {}
+    for event in verdict.failing:
+        known, where = verdict.evidence.get(event), verdict.localisations.get(event)
+        joint = known.joint if known else ""
+        if where is not None and where.joints:
+            joint = where.joints[0][0]
+        marks = lines.setdefault((event.label, joint), ["."] * width)
+        times = (event.start - verdict.begin, event.stop - verdict.begin)
+        first, last = (int(width * time / verdict.duration) for time in times)
+        marks[max(first, 0) : last + 1] = "#" * (min(last + 1, width) - max(first, 0))
+    rows = [(*of, f"|{''.join(marks)}| {verdict.duration:.1f} s") for of, marks in lines.items()]
+    return "\n".join(table(rows, gap="  "))
+
+
+# --- of several runs
 
 
 @dataclass(frozen=True)
@@ -149,15 +298,18 @@ class Group:
         """Required findings that were not found."""
         return list(dict.fromkeys(each.told for one in self.verdicts for each in one.missing))
 
-    @property
-    def sentences(self) -> list[str]:
-        """Sentences on what fails its runs."""
-        return [*(sentence(*each) for each in self.found(fails=True)), *self.missing]
 
-    @property
-    def notes(self) -> list[str]:
-        """Sentences on findings that do not."""
-        return [sentence(*each) for each in self.found(fails=False)]
+def _alike(one: tuple[Verdict, Event], other: tuple[Verdict, Event]) -> bool:
+    """Whether two findings of repetitions are one."""
+    (first, event), (second, same) = one, other
+    known, other_known = first.evidence.get(event), second.evidence.get(same)
+    joint = known.joint if known and other_known and known.joint == other_known.joint else ""
+    return (
+        (event.label == same.label or bool(joint))
+        and abs(event.start - same.start) <= TOGETHER
+        and first.ruled(event) == second.ruled(same)
+        and (first is not second or event is same)
+    )
 
 
 def folded(items: Sequence[Item], alike: Callable[[Item, Item], bool]) -> list[list[Item]]:
@@ -189,59 +341,18 @@ def groups(verdicts: Sequence[Verdict]) -> list[Group]:
     found: dict[tuple[str, str], list[Verdict]] = {}
     absent = []
     for verdict in sorted(each_missing(verdicts), key=lambda each: each.severity):
-        if verdict.of_run:
-            found.setdefault(_key(verdict), []).append(verdict)
-        else:
+        path, repeated = verdict.path, REPETITION.fullmatch(verdict.path.stem)
+        if not verdict.of_run:
             absent.append(Group(verdict.missing[0].scenario, [verdict]))
+        elif verdict.status in UNREAD:
+            found.setdefault((str(path), ""), []).append(verdict)
+        else:
+            name = verdict.scenario or str(path.with_name(repeated["name"]) if repeated else path)
+            found.setdefault((str(path.parent), name), []).append(verdict)
     return absent + [
         Group(name if len(each) > 1 else str(each[0].path), each)
         for (_, name), each in found.items()
     ]
-
-
-def _key(verdict: Verdict) -> tuple[str, str]:
-    """Folder and scenario of a run."""
-    path, alone = verdict.path, verdict.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR)
-    if alone:
-        return str(path), ""
-    repeated = REPETITION.fullmatch(path.stem)
-    name = verdict.scenario or (str(path.with_name(repeated["name"])) if repeated else str(path))
-    return str(path.parent), name
-
-
-def _alike(one: tuple[Verdict, Event], other: tuple[Verdict, Event]) -> bool:
-    """Whether two findings of repetitions are one."""
-    (first, event), (second, same) = one, other
-    known, other_known = first.evidence.get(event), second.evidence.get(same)
-    joint = known.joint if known and other_known and known.joint == other_known.joint else ""
-    return (
-        (event.label == same.label or bool(joint))
-        and abs(event.start - same.start) <= TOGETHER
-        and first.ruled(event) == second.ruled(same)
-        and (first is not second or event is same)
-    )
-
-
-def timeline(verdict: Verdict, width: int = 60) -> str:
-    """The findings that fail a run over time as text, a line for each class and joint."""
-    if not verdict.duration:
-        return ""
-    lines: dict[tuple[str, str], list[str]] = {}
-    for event in verdict.failing:
-        marks = lines.setdefault((event.label, _joint(verdict, event)), ["."] * width)
-        times = (event.start - verdict.begin, event.stop - verdict.begin)
-        first, last = (int(width * time / verdict.duration) for time in times)
-        marks[max(first, 0) : last + 1] = "#" * (min(last + 1, width) - max(first, 0))
-    rows = [(*of, f"|{''.join(marks)}| {verdict.duration:.1f} s") for of, marks in lines.items()]
-    return "\n".join(table(rows, gap="  "))
-
-
-def _joint(verdict: Verdict, event: Event) -> str:
-    """The joint of a finding; empty if it is not known."""
-    known, where = verdict.evidence.get(event), verdict.localisations.get(event)
-    if where is not None and where.joints:
-        return where.joints[0][0]
-    return known.joint if known else ""
 
 
 def table(rows: Sequence[Sequence[str]], gap: str = "   ") -> list[str]:

@@ -1,10 +1,12 @@
-"""Verdicts as text, JSON, JUnit XML, GitHub annotations, SARIF and Markdown.
+"""Verdicts and differences as text, JSON, JUnit XML, GitHub annotations, SARIF and Markdown.
 
-Three formats are written from a job of cases, which a difference is, too.
+JUnit, GitHub and Markdown are written from a job of cases: a run, a scenario, or a file that cannot
+be read, of verdicts and of differences alike.
 """
 
 import hashlib
 import json
+import math
 import re
 import shlex
 from collections import Counter
@@ -18,19 +20,24 @@ from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 from inspector.analysis import NOTHING
-from inspector.errors import IGNORED, Status, Unknown
+from inspector.errors import EXIT, IGNORED, Status, Unknown
+from inspector.reference import difference as diff
+from inspector.reference.difference import LOUDER, NEW, RESOLVED, Difference
 from inspector.report.findings import (
     COUNTED,
+    TOGETHER,
+    UNREAD,
     WORDS,
     Group,
     each_missing,
     excused,
     failing,
+    folded,
     groups,
     row,
-    sentence,
     table,
     timeline,
+    told,
 )
 from inspector.text import counted, program_version
 from inspector.verdict import Verdict, counts, exit_status
@@ -39,8 +46,24 @@ ANNOTATIONS = 10
 """GitHub silently drops what goes beyond ten of a kind per step."""
 COMMENT = 60_000
 """Most characters of the Markdown: GitHub refuses comments of more than 65,536."""
-MARKER = "<!-- noise-inspector -->"
-"""First line of the Markdown, by which a script finds its own comment to replace it."""
+MARKER, DIFF_MARKER = "<!-- noise-inspector -->", "<!-- noise-inspector diff -->"
+"""First line of the Markdown, by which a script finds its own comment to replace it: a job may have
+one of verdicts and one of a difference."""
+RESULTS = 5000
+"""GitHub shows no more results of one SARIF file."""
+SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+RULES = {
+    "missing-log": "A scenario that was accepted has no log.",
+    "louder": "A joint is louder than in accepted runs.",
+}
+MOST, MOST_OF_KIND = 20, 5
+"""Findings of a scenario that are listed, and of a difference those of each kind."""
+REPEATED = r"\d+% by \d+ repetitions? of "
+"""What the line on the reference says for all runs."""
+AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
+"""By what else remarks of runs differ that say the same."""
+SHORT = 0.5
+"""Up to this, in [s], the onset tells when a finding is."""
 
 
 class Outcome(StrEnum):
@@ -50,6 +73,15 @@ class Outcome(StrEnum):
     FAILURE = "failure"
     ERROR = "error"
     SKIPPED = "skipped"
+
+
+OUTCOMES = {
+    Status.FINDINGS: Outcome.FAILURE,
+    Status.BAD_INPUT: Outcome.ERROR,
+    Status.INTERNAL_ERROR: Outcome.ERROR,
+    Status.CANNOT_TELL: Outcome.SKIPPED,
+    Status.OK: Outcome.PASSED,
+}
 
 
 @dataclass(frozen=True)
@@ -76,8 +108,8 @@ class Case:
     status: str
     words: str
     outcome: Outcome
-    rank: tuple[float, ...] = ()
-    kind: str = ""
+    rank: tuple[float, ...]
+    kind: str
     sentences: tuple[str, ...] = ()
     message: str = ""
     notes: tuple[str, ...] = ()
@@ -111,6 +143,9 @@ class Job:
         return sorted(self.cases, key=lambda case: case.rank)
 
 
+# --- what continuous integration reads
+
+
 def junit(job: Job) -> str:
     """Write a job as JUnit XML: a test case each.
 
@@ -118,7 +153,9 @@ def junit(job: Job) -> str:
     picture is attached by a line ``[[ATTACHMENT|path]]``, which GitLab, Jenkins and Azure read.
     """
     outcomes = Counter(case.outcome for case in job.cases)
-    suite = ET.Element(
+    root = ET.Element("testsuites")
+    suite = ET.SubElement(
+        root,
         "testsuite",
         name="inspector",
         tests=str(len(job.cases)),
@@ -138,92 +175,46 @@ def junit(job: Job) -> str:
         name = name if seen[name] == 1 else f"{name} ({seen[name]})"
         time = f"{case.seconds:.3f}"
         node = ET.SubElement(suite, "testcase", classname="inspector", name=name, time=time)
-        lines = [*case.notes]
+        lines = [case.message] if case.message and (case.sentences or not case.outcome) else []
+        lines += case.notes
         if case.outcome:
             sentences = case.sentences or (case.message,)
-            told = ET.SubElement(node, case.outcome, message=_plain("; ".join(sentences)))
+            element = ET.SubElement(node, case.outcome, message=_plain("; ".join(sentences)))
             if case.outcome is not Outcome.SKIPPED:
-                told.set("type", _plain(case.kind))
-            told.text = _plain("\n".join([*sentences, *filter(None, [case.trace])]))
-        if case.message and (case.sentences or not case.outcome):
-            lines.insert(0, case.message)
+                element.set("type", _plain(case.kind))
+            element.text = _plain("\n".join([*sentences, *filter(None, [case.trace])]))
         if case.picture is not None:
             lines.append(f"[[ATTACHMENT|{case.picture}]]")
         if lines:
             ET.SubElement(node, "system-out").text = _plain("\n".join(lines))
-    root = ET.Element("testsuites")
-    root.append(suite)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def _plain(value: object) -> str:
+    """Drop the control characters that XML forbids."""
+    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "", str(value))
 
 
 def github(job: Job) -> str:
     """Write a job as GitHub workflow commands: the ten worst, and the counts.
 
-    One case that is annotated needs no counts.
-
-    Of ten errors, those that cannot be read take five at most where others fail, so that they hide
-    none. Cases that are skipped are warnings.
+    One case that is annotated needs no counts. Of ten errors, those that cannot be read take five
+    at most where others fail, so that they hide none. Cases that are skipped are warnings.
     """
-    ranked = job.ranked
-    bad = [case for case in ranked if case.outcome is Outcome.ERROR]
-    failed = [case for case in ranked if case.outcome is Outcome.FAILURE]
+    bad, failed, skipped = (
+        [case for case in job.ranked if case.outcome is outcome]
+        for outcome in (Outcome.ERROR, Outcome.FAILURE, Outcome.SKIPPED)
+    )
     shown = [*bad[: max(ANNOTATIONS // 2, ANNOTATIONS - len(failed))], *failed][:ANNOTATIONS]
-    skipped = [case for case in ranked if case.outcome is Outcome.SKIPPED][:ANNOTATIONS]
     lines = [_annotation("error", case) for case in shown]
-    lines += [_annotation("warning", case) for case in skipped]
+    lines += [_annotation("warning", case) for case in skipped[:ANNOTATIONS]]
     lines += [f"::notice::{_escaped(remark)}" for remark in job.remarks]
     left = len(bad) + len(failed) - len(shown)
     more = f"; {left} more are not shown here" if left else ""
     if len(job.cases) > 1 or not lines:
         lines += [f"::notice title=noise-inspector::{_escaped(job.summary)}{more}"]
     return "\n".join(lines)
-
-
-def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
-    """Write a job for its summary or a comment: a table, the worst first, and a picture.
-
-    GitHub takes no pictures inside the text: the worst case's is linked if its address is
-    known, and else its file is named.
-
-    Args:
-        notes: Title of what does not fail its case.
-    """
-    ranked = job.ranked
-    shown = [case for case in ranked if case.outcome or not case.quiet]
-    lines = [marker, f"### {job.title}: {job.summary}", ""]
-    tail = [""]
-    for remark in job.remarks:
-        tail += [f"{_cell(remark[:1].upper() + remark[1:])}.", ""]
-    worst = next((case for case in ranked if case.picture is not None), None)
-    if worst is not None and shown:
-        told = f"Picture of {_code(worst.name)}: {_code(worst.picture)}."
-        drawn = f"![{_cell(worst.name)} over time]({worst.picture_url})"
-        tail += [drawn if worst.picture_url else told]
-    sketched = next((case for case in ranked if case.timeline), None)
-    if sketched is not None and (worst is None or not worst.picture_url):
-        tail += ["", f"{_code(sketched.name)} over time:", "```", sketched.timeline, "```"]
-    rows = [f"| {_code(case.name)} | {case.words} | {_cell(case.told)} |" for case in shown]
-    left = [f"- {_code(case.name)}: {_cell(note)}" for case in ranked for note in case.notes]
-    if rows:
-        lines += _cut([head, "|---|---|---|"], rows, COMMENT * 2 // 3)
-    lines += tail
-    if left:
-        opened = ["", f"<details><summary>{notes}: {len(left)}</summary>", ""]
-        lines += [*_cut(opened, left, COMMENT // 4), "", "</details>"]
-    return "\n".join(lines).rstrip()
-
-
-def published(picture: Path | None, folder: Path | None, address: str) -> str:
-    """Address of a picture; empty if it will not be published, or there is none.
-
-    Args:
-        folder: The folder of the report that it lies in, however deep.
-        address: Where that folder is published; empty if it is not.
-    """
-    if picture is None or folder is None or not address:
-        return ""
-    return f"{address.rstrip('/')}/{quote(picture.relative_to(folder).as_posix())}"
 
 
 def _annotation(kind: str, case: Case) -> str:
@@ -243,9 +234,37 @@ def _escaped(value: str) -> str:
     return value.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
-def _plain(value: object) -> str:
-    """Drop the control characters that XML forbids."""
-    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "", str(value))
+def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
+    """Write a job for its summary or a comment: a table, the worst first, and a picture.
+
+    GitHub takes no pictures inside the text: the worst case's is linked if its address is
+    known, and else its file is named.
+
+    Args:
+        notes: Title of what does not fail its case.
+    """
+    ranked = job.ranked
+    shown = [case for case in ranked if case.outcome or not case.quiet]
+    lines, tail = [marker, f"### {job.title}: {job.summary}", ""], [""]
+    for remark in job.remarks:
+        tail += [f"{_cell(remark[:1].upper() + remark[1:])}.", ""]
+    worst = next((case for case in ranked if case.picture is not None), None)
+    if worst is not None and shown:
+        named = f"Picture of {_code(worst.name)}: {_code(worst.picture)}."
+        drawn = f"![{_cell(worst.name)} over time]({worst.picture_url})"
+        tail += [drawn if worst.picture_url else named]
+    sketched = next((case for case in ranked if case.timeline), None)
+    if sketched is not None and (worst is None or not worst.picture_url):
+        tail += ["", f"{_code(sketched.name)} over time:", "```", sketched.timeline, "```"]
+    rows = [f"| {_code(case.name)} | {case.words} | {_cell(case.told)} |" for case in shown]
+    left = [f"- {_code(case.name)}: {_cell(note)}" for case in ranked for note in case.notes]
+    if rows:
+        lines += _cut([head, "|---|---|---|"], rows, COMMENT * 2 // 3)
+    lines += tail
+    if left:
+        opened = ["", f"<details><summary>{notes}: {len(left)}</summary>", ""]
+        lines += [*_cut(opened, left, COMMENT // 4), "", "</details>"]
+    return "\n".join(lines).rstrip()
 
 
 def _cell(value: object) -> str:
@@ -269,16 +288,19 @@ def _cut(head: list[str], lines: list[str], room: int) -> list[str]:
     return [*head, *kept, *(["", f"{left} more are left out here."] if left else [])]
 
 
-SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
-UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
-MOST = 20
-"""Findings of a scenario that are listed."""
-REPEATED = r"\d+% by \d+ repetitions? of "
-"""What the line on the reference says for all runs."""
-AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
-"""By what else remarks of runs differ that say the same."""
-RESULTS = 5000
-"""GitHub shows no more results of one SARIF file."""
+def published(picture: Path | None, folder: Path | None, address: str) -> str:
+    """Address of a picture; empty if it will not be published, or there is none.
+
+    Args:
+        folder: The folder of the report that it lies in, however deep.
+        address: Where that folder is published; empty if it is not.
+    """
+    if picture is None or folder is None or not address:
+        return ""
+    return f"{address.rstrip('/')}/{quote(picture.relative_to(folder).as_posix())}"
+
+
+# --- verdicts
 
 
 def summary(verdicts: Sequence[Verdict]) -> str:
@@ -289,10 +311,14 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     runs += [f"{ignored} of the bad input ignored"] if ignored else []
     absent = sum(len(verdict.missing) for verdict in verdicts if not verdict.of_run)
     logs = f"; no log for {counted(absent, 'required finding')}" if absent else ""
-    found = [f"{n} {name.replace('-', ' ')}" for name, n in number["findings"].items() if n]
+    findings = _listed(number["findings"])
     total = counted(sum(verdict.of_run for verdict in verdicts), "run")
-    findings = f"; findings: {', '.join(found)}" if found else ""
-    return f"{total}: {', '.join(runs) or 'none'}{logs}{findings}"
+    found = f"; findings: {findings}" if findings else ""
+    return f"{total}: {', '.join(runs) or 'none'}{logs}{found}"
+
+
+def _listed(numbers: Mapping[str, int]) -> str:
+    return ", ".join(f"{n} {name.replace('-', ' ')}" for name, n in numbers.items() if n)
 
 
 def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
@@ -334,13 +360,14 @@ def _one(verdict: Verdict) -> list[str]:
 
 def _rows(group: Group) -> Iterator[tuple[str, ...]]:
     """Rows of a scenario: its first finding beside its name, the others below."""
-    name, status = group.name, group.words
-    number = len(group.verdicts)
-    found = [row(*each) for fails in (True, False) for each in group.found(fails=fails)]
-    others = group.missing or ([counted(number, "run")] if number > 1 and not found else [])
+    name, status, number = group.name, group.words, len(group.verdicts)
+    cells: list[tuple[str, ...]] = [
+        row(*each) for fails in (True, False) for each in group.found(fails=fails)
+    ]
+    others = group.missing or ([counted(number, "run")] if number > 1 and not cells else [])
     if group.worst.status is Status.CANNOT_TELL:
         others = [*others, group.worst.message]
-    cells: list[tuple[str, ...]] = [*found, *((each,) for each in others)]
+    cells += [(each,) for each in others]
     for each in cells[:MOST] or [("",)]:
         yield (name, status, *each)
         name = status = ""
@@ -365,34 +392,26 @@ def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
     for message, number in runs.items():
         several = f" ({number} of {len(verdicts)} runs)" if 1 < len(verdicts) != number else ""
         yield f"note:    {message}{several}"
-    if not verbose:
-        yield from _compared(verdicts)
-
-
-def _compared(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """The repetitions that runs were compared with, in a line for all scenarios."""
     known = [each.beside for each in verdicts if each.beside and each.beside.repetitions]
-    if not known:
-        return
-    number = len({each.scenarios for each in known})
-    fewest, most = (of(each.repetitions for each in known) for of in (min, max))
-    margins = [each.margins.get("repetitions", 0.0) for each in known]
-    many = counted(most, "repetition") if fewest == most else f"{fewest} to {most} repetitions"
-    each_of = f"each of {number} scenarios" if number > 1 else " and ".join(known[0].scenarios)
-    low, high = f"{min(margins):.1f}", f"{max(margins):.1f}"
-    margin = low if low == high else f"{low} to {high}"
-    yield f"reference: {many} of {each_of}, margin {margin} dB"
+    if known and not verbose:
+        number = len({each.scenarios for each in known})
+        fewest, most = (of(each.repetitions for each in known) for of in (min, max))
+        margins = [each.margins.get("repetitions", 0.0) for each in known]
+        many = counted(most, "repetition") if fewest == most else f"{fewest} to {most} repetitions"
+        each_of = f"each of {number} scenarios" if number > 1 else " and ".join(known[0].scenarios)
+        low, high = f"{min(margins):.1f}", f"{max(margins):.1f}"
+        margin = low if low == high else f"{low} to {high}"
+        yield f"reference: {many} of {each_of}, margin {margin} dB"
 
 
 def as_json(verdicts: Sequence[Verdict]) -> str:
     """Verdicts as JSON, ``noise-verdict/3``; its schema is docs/noise-verdict-3.schema.json."""
-    runs = [verdict.as_dict() for verdict in verdicts]
     whole = {
         "format": "noise-verdict/3",
         "version": program_version(),
         "exit_status": exit_status(verdicts),
         "counts": counts(verdicts),
-        "runs": runs,
+        "runs": [verdict.as_dict() for verdict in verdicts],
     }
     return json.dumps(whole, indent=2)
 
@@ -404,95 +423,105 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
     first line where there is no other. Expected findings are counted, but no results: GitHub would
     show them. Bad input is a notification of the tool, and so is what cannot be told.
     """
+    job = _of_verdicts(verdicts, ())
     ranked = sorted(each_missing(verdicts), key=lambda verdict: verdict.severity)
-    results = [result for verdict in ranked for result in _results(verdict)]
-    rules = dict.fromkeys(result["ruleId"] for result in results)
+    cases = [(verdict, _case(verdict)) for verdict in ranked]
+    results = [
+        result
+        for verdict, case in cases
+        if case.outcome is Outcome.FAILURE
+        for result in _results(verdict, case)
+    ]
+    rules = [
+        {
+            "id": rule,
+            "shortDescription": {"text": RULES.get(rule) or _described(rule)},
+            "defaultConfiguration": {"level": "error"},
+        }
+        for rule in dict.fromkeys(result["ruleId"] for result in results)
+    ]
     notes = [
         {
-            "level": "error" if _outcome(verdict) is Outcome.ERROR else "warning",
-            "message": {"text": f"{verdict.status}: {verdict.message}"},
-            "locations": [_location(verdict.path)],
+            "level": "error" if case.outcome is Outcome.ERROR else "warning",
+            "message": {"text": f"{case.status}: {case.message}"},
+            "locations": [_location(case.path)],
         }
-        for verdict in ranked
-        if _outcome(verdict) in (Outcome.ERROR, Outcome.SKIPPED)
+        for _, case in cases
+        if case.outcome in (Outcome.ERROR, Outcome.SKIPPED)
     ]
+    driver = {"name": "noise-inspector", "version": program_version(), "rules": rules}
+    invocation = {
+        "executionSuccessful": all(case.outcome is not Outcome.ERROR for _, case in cases),
+        "exitCode": exit_status(verdicts),
+        "toolExecutionNotifications": notes,
+    }
     run = {
-        "tool": {
-            "driver": {
-                "name": "noise-inspector",
-                "version": program_version(),
-                "rules": [
-                    {
-                        "id": rule,
-                        "shortDescription": {"text": _described(rule)},
-                        "defaultConfiguration": {"level": "error"},
-                    }
-                    for rule in rules
-                ],
-            }
-        },
-        "invocations": [
-            {
-                "executionSuccessful": not any(
-                    _outcome(each) is Outcome.ERROR for each in verdicts
-                ),
-                "exitCode": exit_status(verdicts),
-                "toolExecutionNotifications": notes,
-            }
-        ],
+        "tool": {"driver": driver},
+        "invocations": [invocation],
         "results": results[:RESULTS],
-        "properties": {
-            "counts": counts(verdicts),
-            **({"remark": IGNORED} if _ignoring(verdicts) else {}),
-        },
+        "properties": {"counts": job.counts, **({"remark": IGNORED} if job.remarks else {})},
     }
     return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
 
 
-def _ignoring(verdicts: Sequence[Verdict]) -> bool:
-    return any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
-
-
-def _job(verdicts: Sequence[Verdict], found: Sequence[Case]) -> Job:
-    remarks = (IGNORED,) if _ignoring(verdicts) else ()
-    return Job("Noise", summary(verdicts), counts(verdicts), found, remarks)
-
-
-def _by_run(verdicts: Sequence[Verdict]) -> Job:
-    """All runs as cases, for programs that count runs."""
-    return _job(verdicts, [_case(each) for each in each_missing(verdicts)])
-
-
-def _by_scenario(verdicts: Sequence[Verdict]) -> Job:
-    """All scenarios as cases, for people."""
-    found = []
-    for group in groups(verdicts):
-        drawn = next((each for each in group.verdicts if each.picture), group.worst)
-        case = replace(
-            _case(group.worst),
-            name=group.name,
-            words=group.words,
-            sentences=tuple(group.sentences),
-            notes=tuple(group.notes),
-            timeline=timeline(group.worst),
-            picture=drawn.picture,
-            picture_url=drawn.picture_url,
+def _results(verdict: Verdict, case: Case) -> Iterator[dict[str, Any]]:
+    """What fails a run, as results of SARIF."""
+    known, number = _uri(verdict.path) if verdict.of_run else case.name, Counter[str]()
+    facts: list[tuple[str, str, dict[str, float]]] = [
+        (
+            each.label,
+            told(verdict, each),
+            {"start": round(each.start, 6), "stop": round(each.stop, 6)},
         )
-        found.append(case)
-    return _job(verdicts, found)
+        for each in verdict.failing
+    ]
+    facts += [(each.rule, str(each), {}) for each in verdict.missing]
+    for rule, sentence, span in facts:
+        number[rule] += 1
+        same = hashlib.sha256(f"{known}:{rule}:{number[rule]}".encode()).hexdigest()[:16]
+        yield {
+            "ruleId": rule,
+            "level": "error",
+            "message": {"text": f"{case.name}: {sentence}"},
+            "locations": [_location(verdict.path, case.line or 1)],
+            "partialFingerprints": {"primaryLocationLineHash": same},
+            "properties": span,
+        }
+
+
+def _location(path: Path, line: int = 1) -> dict[str, object]:
+    place = {"artifactLocation": {"uri": _uri(path)}, "region": {"startLine": line}}
+    return {"physicalLocation": place}
+
+
+def _uri(path: Path) -> str:
+    """Address of a file, relative to the folder of the job if it lies there."""
+    full, here = path.absolute(), Path.cwd()
+    return quote(full.relative_to(here).as_posix()) if full.is_relative_to(here) else full.as_uri()
+
+
+def _described(rule: str) -> str:
+    label = rule.removeprefix("missing-")
+    if label != rule:
+        return f"A required finding of class {label.replace('-', ' ')} was not found."
+    return f"The noise of the joints shows a failure of class {label}."
 
 
 def _case(verdict: Verdict) -> Case:
+    """A run as a case, or a scenario that has no log."""
     absent = None if verdict.of_run else verdict.missing[0]
+    kind = "missing" if verdict.missing else verdict.status.value
+    if verdict.failing:
+        kind = max(verdict.failing, key=lambda event: event.score).label
     return Case(
         name=str(verdict.path) if absent is None else absent.scenario,
         path=verdict.path,
         line=0 if absent is None else absent.line,
         status=verdict.status,
         words=WORDS[verdict.status],
-        outcome=_outcome(verdict),
+        outcome=Outcome.SKIPPED if verdict.ignored else OUTCOMES[verdict.status],
         rank=verdict.severity,
-        kind=_kind(verdict),
+        kind=kind,
         sentences=tuple(failing(verdict)),
         message=verdict.message,
         notes=tuple(excused(verdict)),
@@ -504,86 +533,34 @@ def _case(verdict: Verdict) -> Case:
     )
 
 
-def _outcome(verdict: Verdict) -> Outcome:
-    """What a run is as a test."""
-    if verdict.ignored:
-        return Outcome.SKIPPED
-    return {
-        Status.FINDINGS: Outcome.FAILURE,
-        Status.BAD_INPUT: Outcome.ERROR,
-        Status.INTERNAL_ERROR: Outcome.ERROR,
-        Status.CANNOT_TELL: Outcome.SKIPPED,
-        Status.OK: Outcome.PASSED,
-    }[verdict.status]
+def _of_group(group: Group) -> Case:
+    """All runs of a scenario as one case."""
+    drawn = next((each for each in group.verdicts if each.picture), group.worst)
+    return replace(
+        _case(group.worst),
+        name=group.name,
+        words=group.words,
+        sentences=(*(told(*each) for each in group.found(fails=True)), *group.missing),
+        notes=tuple(told(*each) for each in group.found(fails=False)),
+        timeline=timeline(group.worst),
+        picture=drawn.picture,
+        picture_url=drawn.picture_url,
+    )
 
 
-def _kind(verdict: Verdict) -> str:
-    """Type of a failure: class of the best score, else `missing`, else the status."""
-    if verdict.failing:
-        return max(verdict.failing, key=lambda event: event.score).label
-    return "missing" if verdict.missing else verdict.status.value
+def _of_verdicts(verdicts: Sequence[Verdict], cases: Sequence[Case]) -> Job:
+    ignoring = any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
+    return Job("Noise", summary(verdicts), counts(verdicts), cases, (IGNORED,) if ignoring else ())
 
 
-def _results(verdict: Verdict) -> list[dict[str, Any]]:
-    case = _case(verdict)
-    if case.outcome is not Outcome.FAILURE:
-        return []
-    number: Counter[str] = Counter()
-    results = []
-    facts = [
-        (
-            event.label,
-            sentence(verdict, event),
-            {"start": round(event.start, 6), "stop": round(event.stop, 6)},
-        )
-        for event in verdict.failing
-    ]
-    facts += [(each.rule, str(each), {}) for each in verdict.missing]
-    known = _uri(verdict.path) if verdict.of_run else case.name
-    for rule, told, span in facts:
-        number[rule] += 1
-        same = f"{known}:{rule}:{number[rule]}"
-        results.append(
-            {
-                "ruleId": rule,
-                "level": "error",
-                "message": {"text": f"{case.name}: {told}"},
-                "locations": [_location(verdict.path, case.line or 1)],
-                "partialFingerprints": {
-                    "primaryLocationLineHash": hashlib.sha256(same.encode()).hexdigest()[:16]
-                },
-                "properties": span,
-            }
-        )
-    return results
+def _by_run(verdicts: Sequence[Verdict]) -> Job:
+    """All runs as cases, for programs that count runs."""
+    return _of_verdicts(verdicts, [_case(each) for each in each_missing(verdicts)])
 
 
-def _location(path: Path, line: int = 1) -> dict[str, object]:
-    return {
-        "physicalLocation": {
-            "artifactLocation": {"uri": _uri(path)},
-            "region": {"startLine": line},
-        }
-    }
-
-
-def _uri(path: Path) -> str:
-    """Address of a file, relative to the folder of the job if it lies there."""
-    full, here = path.absolute(), Path.cwd()
-    return quote(full.relative_to(here).as_posix()) if full.is_relative_to(here) else full.as_uri()
-
-
-def _described(rule: str) -> str:
-    known = {
-        "missing-log": "A scenario that was accepted has no log.",
-        "louder": "A joint is louder than in accepted runs.",
-    }
-    if rule in known:
-        return known[rule]
-    label = rule.removeprefix("missing-")
-    if label != rule:
-        return f"A required finding of class {label.replace('-', ' ')} was not found."
-    return f"The noise of the joints shows a failure of class {label}."
+def _by_scenario(verdicts: Sequence[Verdict]) -> Job:
+    """All scenarios as cases, for people."""
+    return _of_verdicts(verdicts, [_of_group(group) for group in groups(verdicts)])
 
 
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
@@ -596,5 +573,227 @@ FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
         _by_scenario(verdicts),
         head="| scenario | status | findings |",
         notes="Findings that do not count",
+    ),
+}
+
+
+# --- differences
+
+
+def diff_text(found: Difference) -> str:
+    """A row for each scenario, the worst first, with a line for each new finding; remarks last."""
+    rows = []
+    for each in found.rows:
+        fails = found.status(each) is Status.FINDINGS
+        name, word = each.name, each.outcome.upper() if fails else each.outcome.value
+        for line in [*_told(each), *_folded(each, RESOLVED)] or [""]:
+            rows.append((name, word, line))
+            name = word = ""
+    lines = [_diff_summary(found), "", *table(rows)]
+    remarks = dict.fromkeys(remark for each in found.rows for remark in each.remarks)
+    lines += [f"note:    {remark}" for remark in remarks]
+    worse = [each for each in found.rows if each.outcome is diff.Outcome.WORSE]
+    for before, worst in [(each.before[0], each.worst) for each in worse if each.worst][:1]:
+        lines.append(f"next:    inspector view {before} {worst.run.run}")
+    return "\n".join(lines).rstrip()
+
+
+def _told(of: diff.Row) -> list[str]:
+    """What is new in a scenario, a line each; without levels there, what became of it first."""
+    found = [*_folded(of, NEW), *_folded(of, LOUDER)]
+    worse = of.outcome is diff.Outcome.WORSE
+    if worse and any(each.over is not None for each in of.new):
+        return found
+    return [of.reason, *(str(each) for each in of.changes[:1] if worse), *found]
+
+
+def _folded(of: diff.Row, kind: str) -> list[str]:
+    """Findings of a kind, one line for what repetitions share: the loudest of them.
+
+    A line has the class that most of them have, time, joint, octave, and how much louder it is.
+    """
+
+    def alike(one: diff.Finding, other: diff.Finding) -> bool:
+        same = one.event.label == other.event.label or one.evidence.joint != ""
+        near = abs(one.event.start - other.event.start) <= TOGETHER
+        return same and near and one.evidence.joint == other.evidence.joint and one.run != other.run
+
+    runs = len(of.before if kind == RESOLVED else of.after)
+    groups = folded([each for each in of.findings if each.kind == kind], alike)
+    lines = []
+    for group in groups[:MOST_OF_KIND]:
+        (label, _), *_ = Counter(each.event.label for each in group).most_common(1)
+        worst = max(group, key=lambda each: -math.inf if each.over is None else each.over)
+        start, stop, known = worst.event.start, worst.event.stop, worst.evidence
+        when = f"{start:.2f} s" if stop - start < SHORT else f"{start:.2f}-{stop:.2f} s"
+        band = f"{known.octave[0]:.0f}-{known.octave[1]:.0f} Hz" if known.octave else ""
+        over = "" if worst.over is None else f"{worst.over:+.0f} dB"
+        several = f"{len({each.run for each in group})} of {runs} runs" if runs > 1 else ""
+        parts = [f"{label} {when}", known.joint, band, over, several]
+        lines.append(f"{kind}: {', '.join(filter(None, parts))}")
+    left = len(groups) - MOST_OF_KIND
+    return lines + ([f"and {left} more {kind} (--format json)"] if left > 0 else [])
+
+
+def diff_json(found: Difference) -> str:
+    """The difference as JSON, ``noise-diff/1``; its schema is docs/noise-diff-1.schema.json."""
+    alone = [(each, path) for each in found.alone for path in (*each.before, *each.after)]
+    whole = {
+        "format": "noise-diff/1",
+        "version": program_version(),
+        "exit_status": found.exit_status,
+        "counts": _diff_counts(found),
+        "verdict": found.outcome,
+        "alpha": None,
+        "confidence": None,
+        "margin_db": found.margin,
+        "paired_by": "name and motion",
+        "scenarios": [_row_as_dict(each) for each in found.rows],
+        "together": None,
+        "picture": None if found.picture is None else str(found.picture),
+        "not_paired": [str(path) for _, path in alone],
+        "unpaired": [
+            {
+                "run": str(path),
+                "side": "candidate" if of.after else "reference",
+                "findings": [_finding_as_dict(each) for each in of.findings if each.run == path],
+            }
+            for of, path in alone
+        ],
+        "failed": {str(each.path): each.problem for each in found.failed},
+    }
+    return json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _row_as_dict(of: diff.Row) -> dict[str, Any]:
+    return {
+        "name": of.name,
+        "verdict": of.outcome,
+        "reason": of.reason,
+        "testable": bool(of.changes),
+        "paired": False,
+        "reference": [str(path) for path in of.before],
+        "candidate": [str(path) for path in of.after],
+        "confidence": None,
+        "margin_db": round(of.margin, 3),
+        "over_db": None if of.score is None else round(of.score, 3),
+        "findings": [_finding_as_dict(each) for each in of.findings],
+        "changes": [
+            {
+                "kind": "joint and band" if each.signal == "velocity" else "tracking error",
+                "joint": each.joint,
+                "link": None,
+                "band_hz": list(each.band),
+                "label": None,
+                "unit": "dB",
+                "change": round(each.change, 3),
+                "low": round(each.low, 3),
+                "high": round(each.high, 3),
+                "p_louder": None,
+                "p_quieter": None,
+            }
+            for each in of.changes
+        ],
+        "remarks": list(of.remarks),
+    }
+
+
+def _finding_as_dict(each: diff.Finding) -> dict[str, Any]:
+    return {
+        "kind": each.kind,
+        "run": str(each.run),
+        "label": each.event.label,
+        "start": round(each.event.start, 6),
+        "stop": round(each.event.stop, 6),
+        "level_db": each.level,
+        "change_db": each.over,
+    }
+
+
+def _diff_counts(found: Difference) -> dict[str, dict[str, int]]:
+    """Count scenarios by what became of them, findings by kind, and files."""
+    outcomes = Counter(each.outcome for each in found.rows)
+    kinds = Counter(each.kind for of in found.rows for each in of.findings)
+    every, unpaired = (
+        sum(len(each.before) + len(each.after) for each in rows)
+        for rows in (found.rows, found.alone)
+    )
+    bugs = sum(each.status is Status.INTERNAL_ERROR for each in found.failed)
+    return {
+        "scenarios": {each.value: outcomes[each] for each in diff.Outcome},
+        "findings": {kind: kinds[kind] for kind in (NEW, LOUDER, RESOLVED)},
+        "files": {
+            "compared": every - unpaired,
+            "not-paired": unpaired,
+            "bad-input": len(found.failed) - bugs,
+            "internal-error": bugs,
+        },
+    }
+
+
+def _diff_summary(found: Difference) -> str:
+    """The counts in a line, new findings first."""
+    number = _diff_counts(found)
+    findings = _listed(number["findings"])
+    left = _listed({name: n for name, n in number["files"].items() if name != "compared"})
+    total = counted(len(found.rows), "scenario")
+    parts = [f"{found.outcome}: {total} ({_listed(number['scenarios'])})" if found.rows else ""]
+    parts += [f"findings: {findings}" if findings else "", f"files: {left}" if left else ""]
+    return "; ".join(filter(None, parts)) or "nothing is compared"
+
+
+def _of_difference(found: Difference) -> Job:
+    """All scenarios as cases, and the files that cannot be compared."""
+    cases = [_of_row(found, each, place) for place, each in enumerate(found.rows)]
+    cases += [
+        Case(
+            name=str(each.path),
+            path=each.path,
+            status=each.status,
+            words=each.status.replace("-", " "),
+            outcome=Outcome.ERROR if found.gate.failed else Outcome.SKIPPED,
+            rank=(list(EXIT).index(each.status),),
+            kind=each.status,
+            message=each.problem,
+            trace=each.trace,
+        )
+        for each in found.failed
+    ]
+    return Job("Noise beside the runs before", _diff_summary(found), _diff_counts(found), cases)
+
+
+def _of_row(found: Difference, of: diff.Row, place: int) -> Case:
+    status, lines = found.status(of), _told(of)
+    fails = status is Status.FINDINGS
+    worst = [path for path in of.after if of.worst and str(path) == of.worst.run.run]
+    others = [] if fails else [line for line in lines if line != of.reason]
+    broken = of.outcome in (*diff.BROKEN, diff.Outcome.WORSE)
+    return Case(
+        name=of.name,
+        path=(worst or of.after or of.before)[0],
+        status=of.outcome,
+        words=of.outcome,
+        outcome=OUTCOMES[status],
+        rank=(list(EXIT).index(status), place),
+        kind=of.outcome if broken else "new finding",
+        sentences=tuple(lines) if fails else (),
+        message="" if fails else of.reason,
+        notes=(*others, *_folded(of, RESOLVED), *of.remarks),
+        quiet=of.outcome is diff.Outcome.SAME,
+        picture=found.picture if not place else None,
+        picture_url=found.picture_url,
+    )
+
+
+DIFF_FORMATS: dict[str, Callable[[Difference], str]] = {
+    "text": diff_text,
+    "json": diff_json,
+    "junit": lambda found: junit(_of_difference(found)),
+    "github": lambda found: github(_of_difference(found)),
+    "markdown": lambda found: markdown(
+        _of_difference(found),
+        head="| scenario | verdict | what changed |",
+        notes="Changes that do not count",
+        marker=DIFF_MARKER,
     ),
 }

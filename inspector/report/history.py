@@ -5,7 +5,7 @@ their value. A name that is a number, a dash and the rest is of that number, and
 ``0061-3f2a1c9.json``. Levels are those over a reference: results without one have findings only.
 """
 
-import re
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -17,7 +17,7 @@ import numpy as np
 from inspector.errors import InspectorError
 from inspector.report.findings import groups
 from inspector.report.html import STYLE, add_text, document, written
-from inspector.text import counted
+from inspector.text import counted, natural
 from inspector.verdict import Verdict, read_results
 from noisemodel.types import Array
 
@@ -68,8 +68,7 @@ class History:
 
     def lines(self) -> Iterator[str]:
         """The changes, a line each."""
-        number = len(self.commits)
-        yield f"{counted(number, 'commit')}, {self.commits[0]} to {self.commits[-1]}"
+        yield f"{counted(len(self.commits), 'commit')}, {self.commits[0]} to {self.commits[-1]}"
         yield from self.notes
         quiet = 0
         for series in self.series:
@@ -82,12 +81,10 @@ class History:
 
     def told(self, series: Series, change: Change) -> str:
         """A change in words."""
-        by = f"{change.by:+.1f} {series.unit}"
-        if change.first == change.last:
-            return (
-                f"{by} at {self.commits[change.first]} ({change.first + 1} of {len(self.commits)})"
-            )
+        by, number = f"{change.by:+.1f} {series.unit}", len(self.commits)
         first, last = self.commits[change.first], self.commits[change.last]
+        if change.first == change.last:
+            return f"{by} at {first} ({change.first + 1} of {number})"
         return f"drift of {by} from {first} to {last}"
 
 
@@ -98,13 +95,12 @@ def read(folder: Path) -> History:
     """
     commits, results, problems, notes = [], [], [], []
     last: dict[str, Path] = {}
-    paths = sorted(folder.glob("*.json"), key=lambda path: (path.stat().st_mtime, path))
-    for path in paths:
+    for path in sorted(folder.glob("*.json"), key=lambda path: (path.stat().st_mtime, path)):
         number = _named(path)[0]
         if number in last:
             notes.append(f"{last[number].name}: replaced by {path.name}")
         last[number] = path
-    for path in sorted(last.values(), key=_natural):
+    for path in sorted(last.values(), key=lambda path: natural(path.stem)):
         try:
             results.append(read_results(path))
             commits.append(_named(path)[1])
@@ -113,7 +109,11 @@ def read(folder: Path) -> History:
     if not commits:
         why = f"; {problems[0]}" if problems else ""
         raise InspectorError(f"{folder}: no result of `classify --write json=FILE`{why}")
-    series = sorted(_series(results), key=lambda each: -_largest(each))
+
+    def most(series: Series) -> float:
+        return max((abs(change.by) for change in changes(series)), default=0.0)
+
+    series = sorted(_series(results), key=most, reverse=True)
     return History(tuple(commits), tuple(series), tuple(problems), tuple(notes))
 
 
@@ -123,44 +123,31 @@ def _named(path: Path) -> tuple[str, str]:
     return (number, name) if number.isdigit() else (path.stem, path.stem)
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """A name with its numbers as numbers."""
-    parts = re.split(r"(\d+)", path.stem)
-    return [(int(each), "") if each.isdigit() else (-1, each) for each in parts]
-
-
 def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
     """The series of each scenario, and of its joints."""
-    runs: dict[str, Array] = {}
-    over: dict[tuple[str, str], Array] = {}
-    found: dict[tuple[str, str], Array] = {}
+    count = len(results)
+    runs: dict[str, Array] = defaultdict(lambda: np.full(count, np.nan))
+    over: dict[tuple[str, str], Array] = defaultdict(lambda: np.full(count, np.nan))
+    found: dict[tuple[str, str], Array] = defaultdict(lambda: np.zeros(count))
     for commit, verdicts in enumerate(results):
         for group in groups(verdicts):
             name = group.worst.scenario or str(Path(group.name).with_suffix(""))
-            number = runs.setdefault(name, np.full(len(results), np.nan))
-            number[commit] = np.nansum((number[commit], len(group.verdicts)))
+            runs[name][commit] = np.nansum((runs[name][commit], len(group.verdicts)))
             for verdict in group.verdicts:
                 known = verdict.beside
                 levels = {} if known is None or known.worst is None else {"": known.worst}
                 for joint, worst in (levels | dict(known.joints if known else {})).items():
-                    level = over.setdefault((name, joint), np.full(len(results), np.nan))
-                    level[commit] = np.fmax(level[commit], worst)
+                    over[name, joint][commit] = np.fmax(over[name, joint][commit], worst)
                 for event in verdict.failing:
                     where = verdict.localisations.get(event)
                     joint = where.joints[0][0] if where and where.joints else ""
-                    for key in {(name, ""), (name, joint)}:
-                        found.setdefault(key, np.zeros(len(results)))[commit] += 1
+                    for key in dict.fromkeys([(name, ""), (name, joint)]):
+                        found[key][commit] += 1
     yield from (Series(*of, "dB", level) for of, level in over.items())
     for name in runs:
-        found.setdefault((name, ""), np.zeros(len(results)))
-    yield from (
-        Series(name, joint, "findings", number / runs[name])
-        for (name, joint), number in found.items()
-    )
-
-
-def _largest(series: Series) -> float:
-    return max((abs(change.by) for change in changes(series)), default=0.0)
+        found.setdefault((name, ""), np.zeros(count))
+    for (name, joint), number in found.items():
+        yield Series(name, joint, "findings", number / runs[name])
 
 
 def changes(series: Series) -> list[Change]:
@@ -168,15 +155,14 @@ def changes(series: Series) -> list[Change]:
     there = np.flatnonzero(~np.isnan(series.value))
     value = series.value[there]
     least = LEAST_DB if series.unit == "dB" else LEAST_FINDINGS
-    ends = [*_stretches(value), len(value)]
-    lines = [_line(value[first:last]) for first, last in pairwise(ends)]
-    found = []
-    for place, (first, last) in enumerate(pairwise(ends)):
-        start, stop = lines[place]
-        if place and abs(by := start - lines[place - 1][1]) >= least:
+    found, before = [], None
+    for first, last in pairwise([*_stretches(value), len(value)]):
+        start, stop = _line(value[first:last])
+        if before is not None and abs(by := start - before) >= least:
             found.append(Change(int(there[first]), int(there[first]), float(by)))
         if abs(stop - start) >= least:
             found.append(Change(int(there[first]), int(there[last - 1]), float(stop - start)))
+        before = stop
     return found
 
 
@@ -188,27 +174,27 @@ def _stretches(value: Array) -> list[int]:
     n = len(value)
     places = range(SHORTEST, n - SHORTEST + 1)
     errors = {k: _error(value[:k]) + _error(value[k:]) for k in places}
-    if not errors:
+    best = min(errors, key=errors.__getitem__, default=0)
+    # Three more numbers: two of a line, and the place, found among n.
+    if not best or _gain(n, _error(value), errors[best]) < 4 * np.log(n):
         return [0]
-    best = min(errors, key=errors.__getitem__)
-    floor = 1e-4 * n  # of values without any noise
-    gain = n * np.log((_error(value) + floor) / (errors[best] + floor))
-    if gain < 4 * np.log(n):  # three more numbers: two of a line, and the place, found among n
-        return [0]
-    later = _stretches(value[best:])
-    return [*_stretches(value[:best]), *(best + place for place in later)]
+    return [*_stretches(value[:best]), *(best + place for place in _stretches(value[best:]))]
 
 
 def _line(value: Array) -> tuple[float, float]:
     """Values at both ends of the line through a stretch; its mean if it is no better."""
-    n = len(value)
-    if n < 2 * SHORTEST:
-        return float(value.mean()), float(value.mean())
+    n, mean = len(value), float(value.mean())
+    constant = float(np.square(value - mean).sum())
+    if n < 2 * SHORTEST or _gain(n, constant, _error(value)) < 2 * np.log(n):
+        return mean, mean
     slope, begin = np.polyfit(np.arange(n), value, 1)
-    constant = float(np.square(value - value.mean()).sum())
-    if n * np.log((constant + 1e-4 * n) / (_error(value) + 1e-4 * n)) < 2 * np.log(n):
-        return float(value.mean()), float(value.mean())
     return float(begin), float(begin + slope * (n - 1))
+
+
+def _gain(n: int, error: float, better: float) -> float:
+    """Twice the logarithm of the likelihood that smaller errors gain."""
+    floor = 1e-4 * n  # of values without any noise
+    return float(n * np.log((error + floor) / (better + floor)))
 
 
 def _error(value: Array) -> float:

@@ -5,6 +5,7 @@ from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -12,8 +13,7 @@ import numpy as np
 from inspector.analysis import Analysis
 from inspector.export.sound import clip, worst_time
 from inspector.reference.judging import Comparison
-from inspector.report.findings import excused
-from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
+from inspector.report.findings import LOCALISATION, excused, localised, matched, note, spoken
 from inspector.report.picture import picture, require
 from inspector.verdict import Verdict
 from noisemodel.files import replacing
@@ -40,21 +40,25 @@ th { font-weight: 600; }
 td.number, th.number { text-align: right; }
 li { margin: .2rem 0; }
 """
+MOST = 20
+"""Links and joints that are listed, the loudest first."""
 
 
-def write(
-    analysis: Analysis,
-    path: Path,
-    *,
-    audit: str = "",
-    verdict: Verdict | None = None,
-    beside: Comparison | None = None,
-    overwrite: bool = False,
-    floor: float | None = None,
-) -> None:
+@dataclass(frozen=True)
+class Table:
+    """A table: title, head and the note below may be empty; `numbers` are columns of numbers."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    numbers: tuple[int, ...] = ()
+    note: str = ""
+
+
+def write(analysis: Analysis, path: Path, *, overwrite: bool = False, **shown: Any) -> None:
     """Write the page of an inspected run, whole or not at all; see `page`."""
     require("a report")
-    text = page(analysis, audit=audit, verdict=verdict, beside=beside, floor=floor)
+    text = page(analysis, **shown)
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -80,8 +84,7 @@ def page(
     add_text(body, "p", spoken(analysis.headline), "verdict")
     if verdict is not None and verdict.beside is not None:
         add_text(body, "p", f"Reference: {verdict.beside.path}, {verdict.beside.words}.", "note")
-    _add_table(body, facts(analysis))
-    for table in found(analysis, verdict):
+    for table in (facts(analysis), *found(analysis, verdict)):
         _add_table(body, table)
     if verdict is not None:
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
@@ -94,62 +97,15 @@ def page(
         _add_table(body, table)
     _add_list(body, "What the log can show", audit.splitlines())
     _add_list(body, "Remarks", [spoken(remark) for remark in analysis.remarks])
-    add_text(
-        body,
-        "p",
+    made = (
         f"Made by noise-inspector of an input with SHA-256 {analysis.sha256}. The noise is an"
-        " estimate from the velocities of rigid links: compare it, do not quote it.",
-        "note",
+        " estimate from the velocities of rigid links: compare it, do not quote it."
     )
+    add_text(body, "p", made, "note")
     return written(html)
 
 
-def _add_sound(body: ET.Element, analysis: Analysis) -> None:
-    sound = clip(analysis.run, around=worst_time(analysis))
-    add_text(body, "h2", "Sound")
-    if sound is None:
-        add_text(body, "p", "The log's rate is too low for audible frequencies.", "note")
-        return
-    source = f"data:audio/wav;base64,{_encoded(sound.data)}"
-    ET.SubElement(body, "audio", controls="controls", src=source)
-    span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.description}."
-    add_text(body, "p", f"{span} {AUDIBLE}", "note")
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table: title, head and the note below may be empty; `numbers` are columns of numbers."""
-
-    title: str
-    head: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-    numbers: tuple[int, ...] = ()
-    note: str = ""
-
-
-def _add_table(body: ET.Element, table: Table) -> None:
-    if table.title:
-        add_text(body, "h2", table.title)
-    frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
-    if any(table.head):
-        row = ET.SubElement(ET.SubElement(frame, "thead"), "tr")
-        for place, name in enumerate(table.head):
-            add_text(row, "th", name, "number" if place in table.numbers else "")
-    rows = ET.SubElement(frame, "tbody")
-    for cells in table.rows:
-        row = ET.SubElement(rows, "tr")
-        for place, cell in enumerate(cells):
-            add_text(row, "td", cell, "number" if place in table.numbers else "")
-    if table.note:
-        add_text(body, "p", table.note, "note")
-
-
-def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
-    if lines:
-        add_text(body, "h2", title)
-        items = ET.SubElement(body, "ul")
-        for line in lines:
-            add_text(items, "li", line.strip())
+# --- elements of pages
 
 
 def document(title: str, style: str, policy: str) -> tuple[ET.Element, ET.Element]:
@@ -164,16 +120,60 @@ def document(title: str, style: str, policy: str) -> tuple[ET.Element, ET.Elemen
     return html, ET.SubElement(html, "body")
 
 
-def add_text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
+def add_text(parent: ET.Element, tag: str, text: str, kind: str = "", **more: str) -> ET.Element:
     """Add an element with a text, of a class in the style, to another one."""
-    element = ET.SubElement(parent, tag, {"class": kind} if kind else {})
+    element = ET.SubElement(parent, tag, {"class": kind} if kind else {}, **more)
     # HTML has no way to write these characters.
     element.text = re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]", "\ufffd", text)
+    return element
 
 
 def written(html: ET.Element) -> str:
     """A page as text."""
     return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
+
+
+def _add_table(body: ET.Element, table: Table) -> None:
+    if table.title:
+        add_text(body, "h2", table.title)
+    frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
+
+    def add_row(parent: ET.Element, tag: str, cells: Sequence[str]) -> None:
+        row = ET.SubElement(parent, "tr")
+        for place, cell in enumerate(cells):
+            add_text(row, tag, cell, "number" if place in table.numbers else "")
+
+    if any(table.head):
+        add_row(ET.SubElement(frame, "thead"), "th", table.head)
+    rows = ET.SubElement(frame, "tbody")
+    for cells in table.rows:
+        add_row(rows, "td", cells)
+    if table.note:
+        add_text(body, "p", table.note, "note")
+
+
+def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
+    if lines:
+        add_text(body, "h2", title)
+        items = ET.SubElement(body, "ul")
+        for line in lines:
+            add_text(items, "li", line.strip())
+
+
+def _add_sound(body: ET.Element, analysis: Analysis) -> None:
+    sound = clip(analysis.run, around=worst_time(analysis))
+    add_text(body, "h2", "Sound")
+    if sound is None:
+        add_text(body, "p", "The log's rate is too low for audible frequencies.", "note")
+        return
+    source = f"data:audio/wav;base64,{_encoded(sound.data)}"
+    ET.SubElement(body, "audio", controls="controls", src=source)
+    span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.description}."
+    add_text(body, "p", f"{span} {AUDIBLE}", "note")
+
+
+def _encoded(data: bytes) -> str:
+    return b64encode(data).decode("ascii")
 
 
 def _described(analysis: Analysis, beside: Comparison | None) -> str:
@@ -186,33 +186,23 @@ def _described(analysis: Analysis, beside: Comparison | None) -> str:
     return f"Over {analysis.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"
 
 
-def _encoded(data: bytes) -> str:
-    return b64encode(data).decode("ascii")
-
-
-MOST = 20
-"""Links and joints that are listed, the loudest first."""
+# --- tables
 
 
 def facts(analysis: Analysis) -> Table:
     """List what the run is."""
-    run = analysis.run
-    rows = [
+    run, rows = analysis.run, list[tuple[str, str]]()
+    for key in ("scenario", "seed", "source"):
+        if key in run.meta:
+            value = run.meta[key]
+            rows.append((key, ", ".join(map(str, value if isinstance(value, list) else [value]))))
+    rows[:0] = [
         ("robot", run.robot or "not named"),
         ("duration", f"{run.duration:.2f} s at {run.rate:g} Hz"),
         ("joints", str(len(run.joint_names))),
         ("model", analysis.model or "none"),
-        *(
-            (key, _in_words(run.meta[key]))
-            for key in ("scenario", "seed", "source")
-            if key in run.meta
-        ),
     ]
     return Table("", ("", ""), rows)
-
-
-def _in_words(value: object) -> str:
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def found(analysis: Analysis, verdict: Verdict | None = None) -> Iterator[Table]:
@@ -220,7 +210,7 @@ def found(analysis: Analysis, verdict: Verdict | None = None) -> Iterator[Table]
     remark = note(analysis)
     known = {} if verdict is None else verdict.evidence
     if analysis.findings:
-        rows = [
+        findings = [
             (
                 f"{spoken(event.label)}{event.novelty}",
                 f"{event.start:.2f}",
@@ -231,15 +221,9 @@ def found(analysis: Analysis, verdict: Verdict | None = None) -> Iterator[Table]
             )
             for event in analysis.findings
         ]
-        head = (
-            "class",
-            "from [s]",
-            "to [s]",
-            "score",
-            *LOCALISATION,
-            *(["evidence"] if known else []),
-        )
-        yield Table("Findings", head, rows, (1, 2, 3), remark)
+        evidence = ("evidence",) if known else ()
+        head = ("class", "from [s]", "to [s]", "score", *LOCALISATION, *evidence)
+        yield Table("Findings", head, findings, (1, 2, 3), remark)
     if analysis.run.blocks:
         annotated = [
             (
@@ -251,14 +235,8 @@ def found(analysis: Analysis, verdict: Verdict | None = None) -> Iterator[Table]
             )
             for block in analysis.run.blocks
         ]
-        remark = "" if analysis.findings else remark
-        yield Table(
-            "Annotated",
-            ("class", "from [s]", "to [s]", "found", *LOCALISATION),
-            annotated,
-            (1, 2),
-            remark,
-        )
+        head = ("class", "from [s]", "to [s]", "found", *LOCALISATION)
+        yield Table("Annotated", head, annotated, (1, 2), "" if analysis.findings else remark)
 
 
 def parts(analysis: Analysis) -> Iterator[Table]:
@@ -284,16 +262,18 @@ def parts(analysis: Analysis) -> Iterator[Table]:
         louder = power.max(axis=0) > highest
         places = np.where(louder, rows.start + power.argmax(axis=0), places)
         highest = np.maximum(highest, power.max(axis=0))
-    peaks, when = np.sqrt(highest), run.time[places.astype(int)]
+    each = zip(
+        np.sqrt(energy / len(run.time)),
+        np.sqrt(highest),
+        run.time[places.astype(int)],
+        strict=True,
+    )
     yield _ranked(
         "Joints",
         ("joint", "share", "rms [rad/s]", "peak [rad/s]", "at [s]"),
         run.joint_names,
         energy,
-        [
-            (f"{rms:.3g}", f"{peak:.3g}", f"{time:.3f}")
-            for rms, peak, time in zip(np.sqrt(energy / len(run.time)), peaks, when, strict=True)
-        ],
+        [(f"{rms:.3g}", f"{peak:.3g}", f"{time:.3f}") for rms, peak, time in each],
         "Measured velocity above 10 Hz; of joints that slide in [m/s].",
     )
 

@@ -116,7 +116,9 @@ def page(verdicts: Sequence[Verdict]) -> str:
     add_text(body, "p", summary(verdicts), "verdict")
     ranked = sorted(verdicts, key=lambda each: each.severity)
     _add_counts(body, ranked)
-    shared = _shared_facts(ranked)
+    # What is so of all runs that a model could label, if they are several, is said once.
+    first, *others = [_facts(each) for each in ranked if each.model] or [[]]
+    shared = [fact for fact in first if others and all(fact in facts for facts in others)]
     for fact in shared:
         add_text(body, "p", fact, "note")
     table = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
@@ -135,34 +137,23 @@ def page(verdicts: Sequence[Verdict]) -> str:
 def _add_counts(body: ET.Element, ranked: Sequence[Verdict]) -> None:
     """Add the number of runs of each status, a link to the first of them."""
     line = ET.SubElement(body, "p", {"class": "counts"})
-    runs = [(number, each) for number, each in enumerate(ranked, 1) if each.of_run]
-    first = {each.status: number for number, each in reversed(runs)}
+    runs = [(number, each.status) for number, each in enumerate(ranked, 1) if each.of_run]
+    first = {status: number for number, status in reversed(runs)}
     for status, number in sorted(first.items(), key=lambda item: item[1]):
         link = ET.SubElement(line, "a", href=f"#run-{number}")
         badge = ET.SubElement(link, "span", {"class": f"status {status}"})
-        add_text(badge, "strong", str(sum(each.status is status for _, each in runs)))
-        badge[-1].tail = COUNTED[status]
-
-
-def _shared_facts(verdicts: Sequence[Verdict]) -> list[str]:
-    """What is so of all runs that it is of, if they are several: said once."""
-    every = [_facts(each) for each in verdicts if each.model]
-    if len(every) < 2:
-        return []
-    return [fact for fact in every[0] if all(fact in facts for facts in every)]
+        number_of = str(sum(each is status for _, each in runs))
+        add_text(badge, "strong", number_of).tail = COUNTED[status]
 
 
 def _facts(verdict: Verdict) -> list[str]:
-    facts = (
-        f"model {verdict.model}" if verdict.model else "",
-        judged_by(verdict),
-        verdict.message if verdict.model else "",
-        verdict.assumed,
-    )
-    return [fact for fact in facts if fact]
+    """By which model and reference a run was judged, and what limits that."""
+    model = f"model {verdict.model}" if verdict.model else ""
+    message = verdict.message if verdict.model else ""
+    return list(filter(None, [model, _judged_by(verdict), message, verdict.assumed]))
 
 
-def judged_by(verdict: Verdict) -> str:
+def _judged_by(verdict: Verdict) -> str:
     """By which reference a run was judged, in a line; empty without one."""
     if verdict.beside is None:
         return f"reference: {verdict.expectations}" if verdict.expectations else ""
@@ -173,16 +164,15 @@ def _add_row(rows: ET.Element, verdict: Verdict, number: int) -> None:
     row = ET.SubElement(rows, "tr")
     _add_status(ET.SubElement(row, "td"), verdict)
     name = ET.SubElement(row, "td", {"class": "run"})
-    add_text(name, "a", str(verdict.path))
-    name[0].set("href", f"#run-{number}")
+    add_text(name, "a", str(verdict.path), href=f"#run-{number}")
     counts = Counter(event.label for event in verdict.failing)
-    told = [f"{label} {f'({n})' * (n > 1)}".strip() for label, n in counts.items()]
+    told = [f"{label} ({n})" if n > 1 else label for label, n in counts.items()]
     told += [f"missing: {each.label}" for each in verdict.missing]
     told += [f"{len(verdict.excused)} that do not count"] if verdict.excused else []
     failed = verdict.status not in (Status.OK, Status.FINDINGS)
-    add_text(row, "td", verdict.message if failed else ", ".join(told), "told")
+    cell = add_text(row, "td", verdict.message if failed else ", ".join(told), "told")
     if verdict.beside is not None:
-        add_text(row[-1], "p", judged_by(verdict), "note")
+        add_text(cell, "p", _judged_by(verdict), "note")
     _add_timeline(ET.SubElement(row, "td", {"class": "line"}), verdict)
 
 
@@ -191,9 +181,8 @@ def _add_timeline(cell: ET.Element, verdict: Verdict) -> None:
     if not verdict.duration or not verdict.model:
         return
     shades = of_classes(tuple(dict.fromkeys(event.label for event in verdict.events)))
-    drawn = ET.SubElement(
-        cell, "svg", viewBox=f"0 0 {WIDTH} 10", preserveAspectRatio="none", role="img"
-    )
+    box = {"viewBox": f"0 0 {WIDTH} 10", "preserveAspectRatio": "none", "role": "img"}
+    drawn = ET.SubElement(cell, "svg", box)
     sentences = [*failing(verdict), *excused(verdict)]
     told = f"{verdict.duration:.2f} s: {'; '.join(sentences) or 'no finding'}"
     ET.SubElement(drawn, "title").text = told
@@ -208,15 +197,11 @@ def _add_timeline(cell: ET.Element, verdict: Verdict) -> None:
         if each.start is not None
     ]
     for start, stop, kind, label in spans:
-        place = {
-            "x": f"{(start - verdict.begin) * scale:.1f}",
-            "width": f"{max((stop - start) * scale, 4.0):.1f}",
-        }
-        rect = ET.SubElement(drawn, "rect", place | {"y": "0", "height": "10"})
-        if kind:
-            rect.set("class", kind)
-        if label:
-            rect.set("fill", "#{:02x}{:02x}{:02x}".format(*shades[label][:3]))
+        left, width = (start - verdict.begin) * scale, max((stop - start) * scale, 4.0)
+        place = {"x": f"{left:.1f}", "width": f"{width:.1f}", "y": "0", "height": "10"}
+        place |= {"class": kind} if kind else {}
+        place |= {"fill": "#{:02x}{:02x}{:02x}".format(*shades[label][:3])} if label else {}
+        ET.SubElement(drawn, "rect", place)
 
 
 def _add_run(body: ET.Element, verdict: Verdict, number: int, shared: Sequence[str]) -> None:
