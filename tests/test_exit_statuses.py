@@ -42,7 +42,7 @@ COMMANDS = {
 """A call of each command that prints something."""
 
 BUGS = {
-    "live": "inspector.live.input.reader_of",
+    "live": "inspector.live.pipe.reader_of",
     "robots": "noisemodel.robot.menagerie_names",
     "merge": "inspector.verdict.from_json",
     "history": "inspector.verdict.from_json",

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.levels import SPECTRUM
-from inspector.live.drawing import SpectrogramStream
+from inspector.live.drawing import LinkLevels, LiveRobot, Messages, SpectrogramStream
 from inspector.live.labels import Decimator, Labeller, noise_signal
-from inspector.live.robot import LinkLevels, LiveRobot
 from inspector.live.samples import Clock, Warnings
 from inspector.recording import robot as scene
 from inspector.recording.camera import FIELD_OF_VIEW, sight
@@ -143,7 +142,7 @@ def test_a_lower_rate_is_that_of_the_whole_run_but_at_its_ends(ratio, data):
     run = nm.Run(
         time=np.arange(samples) / (1000.0 * ratio), velocity=velocity, joint_names=("a", "b", "c")
     )
-    decimator = Decimator(ratio, 3)
+    decimator = Decimator(ratio)
     cuts = sorted(data.draw(st.lists(st.integers(0, samples), max_size=8)))
     pieces = np.split(velocity, cuts)
     parts = [decimator.push(piece, np.ones(len(piece), dtype=bool)) for piece in pieces]
@@ -159,9 +158,9 @@ def test_a_lower_rate_is_that_of_the_whole_run_but_at_its_ends(ratio, data):
 def test_what_is_too_fast_for_the_lower_rate_is_gone():
     time = np.arange(10_000)[:, None] / 10_000
     ones = np.ones(10_000, dtype=bool)
-    lower, valid = Decimator(10, 1).push(np.sin(2 * np.pi * 1000 * time), ones)
+    lower, valid = Decimator(10).push(np.sin(2 * np.pi * 1000 * time), ones)
     assert np.abs(lower[valid]).max() < 1e-3
-    steady, valid = Decimator(10, 1).push(np.full((10_000, 1), 0.7), ones)
+    steady, valid = Decimator(10).push(np.full((10_000, 1), 0.7), ones)
     np.testing.assert_allclose(steady[valid], 0.7, rtol=1e-12)
 
 
@@ -297,9 +296,9 @@ def test_levels_of_links_begin_anew_after_a_sample_that_is_not_known():
 
 @pytest.mark.parametrize("robot", ["panda", "talos", "tiago", "hyq"])
 def test_joints_stand_where_rerun_would_put_them(robot, tmp_path):
-    recording = rr.RecordingStream("test")
+    messages = Messages(rr.RecordingStream("test"))
     names = nm.Robot.load(robot).joint_names
-    drawn = LiveRobot(recording, robot, names, floating=False)
+    drawn = LiveRobot(messages, robot, names, floating=False)
     position = np.random.default_rng(1).uniform(-1.0, 1.0, len(names))
     places, turns = drawn.transforms(position)
     joints = {joint.child_link: joint for joint in scene.load(robot, tmp_path).joints()}
@@ -323,7 +322,7 @@ def test_joints_stand_where_rerun_would_put_them(robot, tmp_path):
 @pytest.mark.parametrize("robot", ["panda", "talos"])
 def test_an_arm_is_in_the_picture_wherever_its_joints_take_it(robot):
     names = nm.Robot.load(robot).joint_names[:7]
-    drawn = LiveRobot(rr.RecordingStream("test"), robot, names, floating=False)
+    drawn = LiveRobot(Messages(rr.RecordingStream("test")), robot, names, floating=False)
     position = np.zeros(7)
     camera = drawn.camera(position, None)
     right, up, ahead = sight()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from inspector.live import LiveError
-from inspector.live.input import (
+from inspector.live.pipe import (
     CHUNK_BYTES,
     MAX_LINE_BYTES,
     SMALL_CHUNK_BYTES,
@@ -180,8 +180,8 @@ def test_lines_are_whole_and_numbered(size):
 
 def test_little_waits_for_more_and_much_is_read_at_once(monkeypatch):
     naps = []
-    monkeypatch.setattr("inspector.live.input.sleep", naps.append)
-    monkeypatch.setattr("inspector.live.input.perf_counter", lambda: 7.0)
+    monkeypatch.setattr("inspector.live.pipe.sleep", naps.append)
+    monkeypatch.setattr("inspector.live.pipe.perf_counter", lambda: 7.0)
     content = b"1\n" * SMALL_CHUNK_BYTES
     assert [
         received for *_, received in chunks(Trickle(content, SMALL_CHUNK_BYTES), gather=0.5)

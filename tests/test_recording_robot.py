@@ -115,8 +115,8 @@ def test_collada_that_rerun_cannot_draw_is_drawn_by_our_own_triangles(
 
 def test_a_robot_of_such_meshes_is_in_its_recording(tmp_path):
     tree = scene.load("romeo", tmp_path)
-    drawn = scene.shapes(tree)
-    assert set(drawn.values()) == {"Asset3D"}
+    drawn = [shape for shapes in scene.shapes_by_link(tree).values() for shape in shapes]
+    assert {kind for _, kind in drawn} == {"Asset3D"}
     assert len(drawn) == sum(
         len(tree.get_visual_geometry_paths(link))
         for members in scene.moving_links(tree).values()

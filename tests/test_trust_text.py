@@ -11,7 +11,7 @@ from inspector import verdict
 from inspector.errors import InspectorError, Status
 from inspector.export.labels import read_labels
 from inspector.live import LiveError, LiveSession
-from inspector.live.input import reader_of
+from inspector.live.pipe import reader_of
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import column_signal, time_column
 from inspector.logs.read import read_log

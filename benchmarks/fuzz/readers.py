@@ -28,7 +28,7 @@ from inspector.analysis import analyse
 from inspector.errors import InspectorError
 from inspector.export.labels import read_labels
 from inspector.library import load_library, model_files
-from inspector.live import input as feeding
+from inspector.live import pipe
 from inspector.live.samples import Clock, Warnings
 from inspector.logs.clocks import ordered, stamps_of
 from inspector.logs.log import Track
@@ -397,8 +397,8 @@ def _read_mesh(path: Path) -> None:
 def _read_rows(path: Path) -> None:
     """Read rows as `inspector live` does, without a viewer."""
     head, _, rest = path.read_bytes().partition(b"\n")
-    reader, is_header = feeding.reader_of(head, ())
-    for chunk, number, _ in feeding.chunks(BytesIO(rest if is_header else head + b"\n" + rest)):
+    reader, is_header = pipe.reader_of(head, ())
+    for chunk, number, _ in pipe.chunks(BytesIO(rest if is_header else head + b"\n" + rest)):
         times = [
             rows["time"]
             for rows in reader.read(chunk, number, lambda kind, line, count=1: None)

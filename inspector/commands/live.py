@@ -76,8 +76,7 @@ def live(
 
     from inspector.library import load_library
     from inspector.live import LiveError, LiveSession
-    from inspector.live.gate import Gate
-    from inspector.live.input import follow
+    from inspector.live.pipe import Gate, follow
     from inspector.reference.store import Reference
 
     del package_root, limit  # have been set

@@ -1,19 +1,26 @@
-"""What a live session draws and how it is laid out; in columns, thinned."""
+"""What a live session draws, the robot included, and how it is laid out; in columns, thinned."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 from rerun.blueprint import Blueprint
 
+import noisemodel as nm
 from inspector import colors
-from inspector.levels import SPECTRUM, amplitudes, extremes, in_bands, window_length
-from inspector.live.robot import KEY
+from inspector.levels import LINKS, SPECTRUM, amplitudes, extremes, in_bands, window_length
+from inspector.live.labels import Labeller, Windows
+from inspector.live.sink import Sink
 from inspector.recording import axes, unstable
+from inspector.recording import camera as cameras
+from inspector.recording import robot as scene
 from inspector.recording.axes import Label, Panel, log_events, scalars, style_lines
 from inspector.recording.panels import (
     BANDS,
@@ -29,59 +36,86 @@ from inspector.recording.unstable import TIMELINE, Camera, Part
 from inspector.report.findings import spoken
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
-from noisemodel.noise import decibel
+from noisemodel.noise import FAST, REFERENCE_POWER, by_moments, decibel, second_moments, vibrating
+from noisemodel.robot import Limits, joint_limits
 from noisemodel.types import Array, Mask
 
-Change: TypeAlias = tuple[float, str]
-"""When a class begins, in [s], or until when it lasts so far; it is empty where none is known."""
+SEND_INTERVAL = 0.1
+"""Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
+FILE_INTERVAL, FILE_LONGEST, FILE_SHARE = 2.0, 20.0, 0.05
+"""The same for a file without a viewer: a twentieth of the time so far, within these ends, in [s].
+For each message, rerun keeps some hundred bytes until the file is closed; longer messages take more
+memory while they are written."""
 
 
-class Lane:
-    """Gives each frame the time around its centre, as the recording of a whole run does.
+class Messages:
+    """Holds rows of entities back until a message has enough of them.
 
     Args:
-        hop: Time from one frame to the next, in [s].
-        length: Duration of a frame, in [s].
+        watched: Whether there is a viewer: what is urgent is sent at once then.
     """
 
-    def __init__(self, hop: float, length: float) -> None:
-        self._hop, self._length = hop, length
-        self._state, self._end = "", 0.0
+    def __init__(self, recording: rr.RecordingStream, *, watched: bool = True) -> None:
+        self.recording, self._watched = recording, watched
+        self._interval = SEND_INTERVAL if watched else FILE_INTERVAL
+        self._held = self._drawn = 0.0  # time that waits, and time so far, in [s]
+        self._makers: dict[str, Callable[[Any], Iterable[Any]]] = {}
+        self._waiting: dict[str, list[tuple[NDArray[np.int64], Any]]] = {}
 
-    def take(self, labels: Labels) -> list[Change]:
-        """Where the class changes, and the end of the last frame."""
-        changes = []
-        for index, label in enumerate(labels.label.tolist()):
-            begin = float(labels.start[index] + labels.stop[index]) / 2 - self._hop / 2
-            if begin > self._end + self._hop / 2:
-                changes += self.end()
-            if label != self._state:
-                changes.append((begin, label))
-            self._state, self._end = label, begin + self._hop
-        return [*changes, (self._end, self._state)] if len(labels) else changes
-
-    def expire(self, now: float) -> list[Change]:
-        """End the lane if its next frame is overdue.
+    def add(
+        self,
+        path: str,
+        time: NDArray[np.int64],
+        values: Any,
+        columns: Callable[[Any], Iterable[Any]] = scalars,
+        *,
+        urgent: bool = False,
+    ) -> None:
+        """Let rows of an entity wait.
 
         Args:
-            now: Time of the latest sample, in [s].
+            time: Shape (rows,), in [ns].
+            values: Shape (rows, …).
+            columns: Makes rerun's columns of the values of all rows that waited.
         """
-        return self.end() if now > self._end + self._length + self._hop else []
+        if len(time):
+            self._makers[path] = columns
+            self._waiting.setdefault(path, []).append((time, values))
+        if urgent and self._watched:
+            self._send(path)
 
-    def end(self) -> list[Change]:
-        """End what the lane shows."""
-        changes = [(self._end, "")] if self._state else []
-        self._state = ""
-        return changes
+    def passed(self, seconds: float) -> None:
+        """Send what waits if enough time has passed."""
+        self._held += seconds
+        if self._held >= self._interval:
+            self._drawn += self._held
+            if not self._watched:
+                self._interval = min(max(FILE_SHARE * self._drawn, FILE_INTERVAL), FILE_LONGEST)
+            self.flush()
+
+    def flush(self) -> None:
+        """Send what waits."""
+        for path in list(self._waiting):
+            self._send(path)
+        self._held = 0.0
+
+    def _send(self, path: str) -> None:
+        if pieces := self._waiting.pop(path, None):
+            time, values = (np.concatenate(each) for each in zip(*pieces, strict=True))
+            index = rr.TimeColumn(TIMELINE, duration=time.astype("timedelta64[ns]"))
+            columns = self._makers[path](values)
+            self.recording.send_columns(path, indexes=[index], columns=columns)
+
+
+def nanoseconds(time: Array) -> NDArray[np.int64]:
+    """Times in [s] as rerun counts them."""
+    return np.round(1e9 * time).astype(np.int64)
 
 
 class SpectrogramStream:
     """Levels of the loudest joint in each band of a logarithmic axis, on a fixed scale.
 
     Which joint will be the worst is not known while samples come in.
-
-    Args:
-        rate: Samples per second, in [Hz].
 
     Attributes:
         edges: Of the bands, shape (bands + 1,), in [Hz].
@@ -93,9 +127,7 @@ class SpectrogramStream:
         self._hop = max(1, self._length // 4)
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
         self.edges = np.geomspace(self._frequency[0], self._frequency[-1], BANDS + 1)
-        self._samples = np.empty((0, 0))
-        self._valid = np.empty(0, dtype=bool)
-        self._gap = False
+        self._windows, self._gap = Windows(self._length, self._hop), False
 
     def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
         """Take samples.
@@ -109,47 +141,255 @@ class SpectrogramStream:
             Centres of the windows that are complete now, shape (columns,), in [s], and levels from
             0 to 1, shape (columns, bands).
         """
-        samples = np.concatenate((self._samples.reshape(-1, velocity.shape[1]), velocity))
-        valid = np.concatenate((self._valid, valid))
-        count = max(0, (len(samples) - self._length) // self._hop + 1)
-        self._samples, self._valid = samples[count * self._hop :], valid[count * self._hop :]
-        if not count:
+        windows, whole, since = self._windows.push(velocity, valid)
+        if not len(windows):
             return np.empty(0), np.empty((0, BANDS))
-        starts = self._hop * np.arange(-1 if self._gap else 0, count)  # a dark one ends a gap
-        time = np.asarray(end - (len(samples) - starts - self._length / 2) / self._rate)
-        level = np.zeros((len(starts), BANDS))
-        level[-count:] = self._levels(samples, valid, count)
-        self._gap = False
-        return time, level
-
-    def skip(self) -> None:
-        """Begin anew after a gap, and leave it dark."""
-        self._samples, self._valid = self._samples[:0], self._valid[:0]
-        self._gap = True
-
-    def _levels(self, samples: Array, valid: Mask, count: int) -> Array:
-        view = np.lib.stride_tricks.sliding_window_view
-        windows = view(samples, self._length, axis=0)[:: self._hop][:count]
-        whole = np.asarray(view(valid, self._length)[:: self._hop][:count].all(axis=1))
         # In a window, slow motion is a line all but: what is left of it is below 10 Hz.
         ramp = np.arange(self._length) - (self._length - 1) / 2
         slope = windows @ ramp / (ramp @ ramp)
         level_windows = (windows - slope[..., None] * ramp).reshape(-1, self._length)
-        every = amplitudes(level_windows).reshape(count, windows.shape[1], -1)
+        every = amplitudes(level_windows).reshape(*windows.shape[:2], -1)
         amplitude = every.max(axis=1).T * whole
         level = 2 * decibel(in_bands(self._frequency, amplitude, self.edges))
-        return np.clip(SPECTRUM.place(level), 0.0, 1.0).T
+        level = np.clip(SPECTRUM.place(level), 0.0, 1.0).T
+        starts = self._hop * np.arange(-1 if self._gap else 0, len(windows))
+        if self._gap:  # a dark one ends it
+            level = np.concatenate((np.zeros((1, BANDS)), level))
+        self._gap = False
+        return np.asarray(end - (since - starts - self._length / 2) / self._rate), level
+
+    def skip(self) -> None:
+        """Begin anew after a gap, and leave it dark."""
+        self._windows.clear()
+        self._gap = True
+
+
+STEP = 0.2
+"""Time over which a level of a link is taken, in [s]."""
+
+
+class LinkLevels:
+    """Levels above 10 Hz of a robot's links, every 0.2 s, half a period of 10 Hz late.
+
+    Attributes:
+        links: Names of the links.
+    """
+
+    def __init__(
+        self, robot: str, joint_names: Sequence[str], rate: float, *, floating: bool
+    ) -> None:
+        self._robot = nm.Robot.load(robot, floating_base=True if floating else None)
+        self._surface = nm.Surface.of(self._robot, "auto")
+        self.links = self._surface.names
+        self._names, self._rate = tuple(joint_names), rate
+        self._size, self._half = max(1, round(STEP * rate)), max(1, round(rate / FAST / 2))
+        self.skip()
+
+    def skip(self) -> None:
+        """Begin anew after a gap."""
+        self._held: dict[str, Array] = {}
+        self._before = 0  # samples before the step that comes next
+
+    def push(self, time: Array, signals: Mapping[str, Array]) -> list[tuple[float, Array]]:
+        """Take samples that follow each other.
+
+        Args:
+            time: Shape (samples,), in [s].
+            signals: Velocities and positions, shape (samples, joints), and a base's velocity, shape
+                (samples, 6), if there is one. A sample that is not finite begins anew.
+
+        Returns:
+            Start of each step that is complete now, in [s], and the levels of all links, shape
+            (links,), in [dB re 1 pW]; silence is at -inf.
+        """
+        floats = self._robot.floating_base and "base_velocity" in signals
+        names = ["velocity", "position", *(["base_velocity"] if floats else [])]
+        known = np.all([np.isfinite(signals[name]).all(axis=1) for name in names], axis=0)
+        first = 0
+        if not known.all():
+            self.skip()
+            first = int(np.flatnonzero(~known)[-1]) + 1
+        new = {"time": time[first:], **{name: signals[name][first:] for name in names}}
+        if self._held:
+            new = {name: np.concatenate((self._held[name], new[name])) for name in new}
+        self._held = new
+        steps = []
+        while len(self._held["time"]) >= self._before + self._size + self._half:
+            steps.append(self._step())
+        return steps
+
+    def _step(self) -> tuple[float, Array]:
+        first, stop = self._before, self._before + self._size
+        window: dict[str, Any] = {
+            name: values[: stop + self._half] for name, values in self._held.items()
+        }
+        start = float(window["time"][first])
+        window["time"] = np.arange(len(window["time"])) / self._rate
+        run = nm.Run(joint_names=self._names, **window)
+        position, velocity = self._robot.configuration(run)
+        fast = vibrating(velocity, run.mask, self._rate)[first:stop]
+        moments = second_moments(fast, run.mask[first:stop], size=self._size)
+        pose = position[(first + stop) // 2][None]
+        (power,) = by_moments(self._robot, self._surface, pose, [("normal", moments)])
+        used = max(stop - self._half, 0)
+        self._before = stop - used
+        self._held = {name: values[used:] for name, values in self._held.items()}
+        return start, decibel(power[0] / REFERENCE_POWER)
+
+
+SHADES = 16
+KEY = Panel("key", 360.0)
+"""The scale beside the robot."""
+ROOM = 1.3
+"""What the camera sees of a robot that moves its base, by its size as it stands at first."""
+POSES = 200
+"""Random poses within the limits of the joints, of which the camera sees all."""
+AROUND = np.array([[-20.0, -20.0], [20.0, 20.0]])
+"""How far the floor reaches from the first pose, in [m]."""
+UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+class LiveRobot:
+    """A robot in a live recording.
+
+    Attributes:
+        children: Links that move, in the order of `transforms`; the base, if it moves, and the
+            frame of the camera are last.
+    """
+
+    def __init__(
+        self, messages: Messages, robot: str, joint_names: Sequence[str], *, floating: bool
+    ) -> None:
+        from scipy.spatial.transform import Rotation
+
+        self._messages, self._rotation = messages, Rotation
+        with TemporaryDirectory() as folder:
+            tree = scene.load(robot, Path(folder), joint_names)
+            self._outermost = cameras.outermost(scene.drawn_file(robot, Path(folder)))
+            scene.log_shapes(messages.recording, tree)
+            self._shapes = scene.shapes_by_link(tree)
+        self._tree = tree
+        self._shades: dict[str, bytes] = {}
+        movable = {joint.name: joint for joint in tree.joints() if joint.joint_type != "fixed"}
+        leaders = {
+            name: joint.mimic.joint if joint.mimic else name for name, joint in movable.items()
+        }
+        joints = [joint for name, joint in movable.items() if leaders[name] in joint_names]
+        mimics = [joint.mimic for joint in joints]
+        self._columns = [joint_names.index(leaders[joint.name]) for joint in joints]
+        self._factor = np.array([mimic.multiplier if mimic else 1.0 for mimic in mimics])
+        self._offset = np.array([mimic.offset if mimic else 0.0 for mimic in mimics])
+        slides = np.array([joint.joint_type == "prismatic" for joint in joints])[:, None]
+        axis = np.array([joint.axis for joint in joints])
+        self._slide, self._spin = np.where(slides, axis, 0.0), np.where(slides, 0.0, axis)
+        self._place = np.array([joint.origin_xyz for joint in joints])
+        self._turn = Rotation.from_euler("xyz", [joint.origin_rpy for joint in joints])
+        base = [str(tree.root_link().name), cameras.VIEW] if floating else []
+        self.children = [joint.child_link for joint in joints] + base
+        self._carriers = [joint.parent_link for joint in joints] + len(base) * [scene.WORLD]
+        self._names = [joint.name for joint in joints]
+        axes.log_scale(messages.recording, KEY, LINKS, "dB re\n1 pW")
+        limits = joint_limits(robot)
+        ranges = [_range(limits.get(name, Limits())) for name in joint_names]
+        self._low, self._high = np.array(ranges).T
+
+    def camera(self, position: Array, base_pose: Array | None) -> Camera:
+        """Place the camera, before it is known what will come.
+
+        A robot on a base is seen wherever its joints can take it; one that moves its base as it
+        stands at first, with room to move.
+
+        Args:
+            position: Of the named joints, shape (joints,), in [rad] or [m].
+            base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (7,).
+        """
+        first = np.nan_to_num(position)[None]
+        if base_pose is not None:
+            unknown = np.concatenate((np.zeros(3), UPRIGHT))
+            pose = (base_pose if np.isfinite(base_pose).all() else unknown)[None]
+            seen = cameras.fitted(self._reached(first, pose), room=ROOM)
+            seen = cameras.standing(seen, self._tree, moves=True)
+            floor = pose[:, :2] + AROUND
+            cameras.log_floor(self._messages.recording, self._tree, seen, floor)
+            return seen
+        floor = cameras.fitted(self._reached(first, None)).floor
+        random = np.random.default_rng(0)
+        everywhere = random.uniform(self._low, self._high, (POSES, len(position)))
+        seen = cameras.fitted(self._reached(np.concatenate((first, everywhere)), None))
+        return cameras.standing(replace(seen, floor=floor), self._tree, moves=False)
+
+    def _reached(self, position: Array, pose: Array | None) -> Iterator[Array]:
+        angle = self._factor * position[:, self._columns] + self._offset
+        angles = dict(zip(self._names, angle.T, strict=True))
+        return cameras.reached(self._tree, self._outermost, angles, pose)
+
+    def colour(self, time: float, links: Sequence[str], level: Array) -> None:
+        """Colour the links from a time on, in [s], those whose colour changes.
+
+        Args:
+            level: Shape (links,), in [dB re 1 pW]; what is not among the links is silent.
+        """
+        levels = dict(zip(links, level.tolist(), strict=True))
+        each = np.array([levels.get(link, -np.inf) for link in self._shapes])
+        index = nanoseconds(np.array([time]))
+        for link, own in zip(self._shapes, LINKS.colours(each, shades=SHADES), strict=True):
+            if self._shades.get(link) != own.tobytes():
+                self._shades[link] = own.tobytes()
+                for path, kind in self._shapes[link]:
+                    columns = partial(scene.coloured, kind)
+                    self._messages.add(path, index, own[None], columns, urgent=True)
+
+    def show(self, time: float, position: Array, base_pose: Array | None) -> None:
+        """Move the robot, if its pose is known.
+
+        Args:
+            time: In [s].
+            position: Of the named joints, shape (joints,), in [rad] or [m].
+            base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (7,).
+        """
+        if not all(np.isfinite(each).all() for each in (position, base_pose) if each is not None):
+            return
+        poses = np.hstack(self.transforms(position))
+        if base_pose is not None:
+            below = np.concatenate((base_pose[:3] * cameras.ON_FLOOR, UPRIGHT))
+            poses = np.vstack((poses, base_pose, below))
+        index = nanoseconds(np.full(len(poses), time))
+        self._messages.add("/robot/motion", index, poses, self._moved, urgent=True)
+
+    def _moved(self, poses: Array) -> Iterable[Any]:
+        count = len(poses) // len(self.children)
+        return rr.Transform3D.columns(
+            translation=poses[:, :3],
+            quaternion=poses[:, 3:],
+            parent_frame=count * self._carriers,
+            child_frame=count * self.children,
+        )
+
+    def transforms(self, position: Array) -> tuple[Array, Array]:
+        """The pose of each joint's link relative to the link that carries it.
+
+        Args:
+            position: Of the named joints, shape (joints,), in [rad] or [m].
+
+        Returns:
+            Translations, shape (moving, 3), and quaternions x, y, z, w, shape (moving, 4), of all
+            joints that move: the named ones, and those that mimic one of them.
+        """
+        angle = (self._factor * position[self._columns] + self._offset)[:, None]
+        turned = self._turn * self._rotation.from_rotvec(angle * self._spin)
+        return self._place + self._turn.apply(angle * self._slide), turned.as_quat()
+
+
+def _range(limits: Limits) -> tuple[float, float]:
+    """Where a joint may be, in [rad] or [m]: a turn at most; one that slides without end rests."""
+    if limits.turns:
+        return max(limits.lower, -np.pi), min(limits.upper, np.pi)
+    return (limits.lower, limits.upper) if limits.upper - limits.lower < np.inf else (0.0, 0.0)
 
 
 JOINT_POINTS = 400.0
 """Points of a joint's line in a second, as a recording of ten seconds has."""
 NOISE_POINTS = 4000.0
-SEND_INTERVAL = 0.1
-"""Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
-FILE_INTERVAL, FILE_LONGEST, FILE_SHARE = 2.0, 20.0, 0.05
-"""The same for a file without a viewer: a twentieth of the time so far, within these ends, in [s].
-For each message, rerun keeps some hundred bytes until the file is closed; longer messages take more
-memory while they are written."""
 SHOWN = 10.0
 """Time that plots reach back, in [s]."""
 NOISE, BANDS_PATH, SCORES, FOUND_PATH = (
@@ -165,47 +405,59 @@ NEWEST = 8
 
 
 class Drawing:
-    """Draws into a recording: what is to be drawn waits until a message has enough of it.
+    """Draws into a recording.
 
     Args:
-        signals: Names of the signals that there are.
-        classes: What can be predicted; empty without a model.
-        edges: Of the spectrogram's bands, shape (bands + 1,), in [Hz].
-        watched: Whether there is a viewer: labels are drawn at once then.
+        robot: The robot to draw; None draws none.
+        widths: Columns of each signal that there is.
+        warn: Called with a line about what cannot be drawn.
     """
 
     def __init__(
         self,
-        recording: rr.RecordingStream,
+        sink: Sink,
+        rate: float,
+        robot: str | None,
         joint_names: Sequence[str],
-        signals: Sequence[str],
-        classes: tuple[str, ...],
-        edges: Array,
-        *,
-        watched: bool = True,
+        widths: Mapping[str, int],
+        labeller: Labeller,
+        warn: Callable[[str], None],
     ) -> None:
-        self._recording, self._watched = recording, watched
-        self._interval = SEND_INTERVAL if watched else FILE_INTERVAL
+        self._sink, self._recording, self._rate = sink, sink.recording, rate
+        self._messages = Messages(sink.recording, watched=sink.watched)
+        self._spectrogram = SpectrogramStream(rate)
+        self._robot: LiveRobot | None = None
+        self._links: LinkLevels | None = None
+        if robot is not None:
+            floating = "base_pose" in widths
+            self._robot = LiveRobot(self._messages, robot, joint_names, floating=floating)
+            try:
+                self._links = LinkLevels(robot, joint_names, rate, floating=floating)
+            except nm.NoiseModelError as error:  # its surface cannot be had
+                warn(f"The links are not coloured: {error}.")
+        self._hop, self._length, classes = labeller.hop, labeller.length, labeller.classes
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
         self._classes = Panel("class", ROW * len(self._rows) + axes.AXIS) if classes else None
-        self._state, self._told = "", ""
-        self._waiting: dict[str, list[tuple[NDArray[np.int64], Array]]] = {}
-        self._held = self._drawn = 0.0  # time that waits, and time so far, in [s]
-        self._entities = {
+        self._lane, self._lane_end = "", 0.0  # class of the latest frame, and until when it lasts
+        self._drawn, self._told = "", ""  # class and findings that are drawn
+        self._start: float | None = None  # time of the first sample
+        self._camera: Camera | None = None
+        self._full = False  # whether plots show the last ten seconds, not the first
+        self._plots = {
             kind: _plots(kind, len(joint_names))
-            for kind in signals
+            for kind in widths
             if kind.removesuffix("_desired") in UNITS
         }
-        for kind, plots in self._entities.items():
+        for kind, plots in self._plots.items():
             desired = kind.endswith("_desired")
             for path, columns in plots.items():
                 names = [f"{name} desired" if desired else name for name in joint_names[columns]]
                 shades = colors.of_series(len(names), dim=desired)
-                style_lines(recording, path, names=names, colours=shades)
-        self._style(classes, edges)
+                style_lines(self._recording, path, names=names, colours=shades)
+        self._style(classes)
 
-    def _style(self, classes: tuple[str, ...], edges: Array) -> None:
+    def _style(self, classes: tuple[str, ...]) -> None:
         """Log how everything but the joints' signals is drawn, and what stands beside it."""
         recording, nothing = self._recording, [Label(0.5, "")]  # else the viewer says: no data
         style_lines(recording, NOISE, names=["simplified [rad/s]"], colours=[colors.NOISE])
@@ -214,129 +466,144 @@ class Drawing:
         axes.log_left(recording, SIGNALS_PANEL, nothing)
         axes.log_right(recording, SIGNALS_PANEL, nothing)
         # A line of one entity each: an entity each would cost a message each.
+        edges = self._spectrogram.edges
         style_bands(recording, BANDS_PATH, np.sqrt(edges[:-1] * edges[1:]).tolist())
         title = Label(0.5, "spectrum,\nloudest\njoint", -22.0)
-        ends = float(edges[0]), float(edges[-1])
-        log_axis(recording, SPECTROGRAM_PANEL, *ends, title, axes.hertz)
+        log_axis(recording, SPECTROGRAM_PANEL, float(edges[0]), float(edges[-1]), title, axes.hertz)
         axes.log_scale(recording, SPECTROGRAM_PANEL, SPECTRUM)
         if self._classes is None:
             return
-        style_lines(
-            recording, SCORES, names=classes, colours=[self._colours[name] for name in classes]
-        )
+        own = [self._colours[name] for name in classes]
+        style_lines(recording, SCORES, names=classes, colours=own)
         shades = [self._colours[name] for name in self._rows]
         names = [spoken(name) for name in self._rows]
-        copies = unstable.COPIES
-        unstable.style_bands(
-            recording,
-            FOUND_PATH,
-            [name for name in names for _ in range(copies)],
-            [shade for shade in shades for _ in range(copies)],
-        )
+        bands = [
+            (name, shade)
+            for name, shade in zip(names, shades, strict=True)
+            for _ in range(unstable.COPIES)
+        ]
+        unstable.style_bands(recording, FOUND_PATH, *zip(*bands, strict=True))
         rows = zip(axes.row_labels(names), shades, strict=True)
         named = [replace(row, color=readable(shade)) for row, shade in rows]
         axes.log_left(recording, self._classes, named)
         axes.log_right(recording, self._classes, nothing)
 
-    def lines(
-        self, time: Array, noise: Array, signals: Mapping[str, Array], seconds: float
-    ) -> None:
-        """Draw the next stretch of noise and joint signals, as soon as there are 0.1 s of them.
+    def begin(self, time: float, signals: Mapping[str, Array]) -> None:
+        """Send the layout with the first sample, whose pose places the camera, and at 10 s."""
+        if self._start is None:
+            self._start = time
+            if self._robot is not None:
+                pose = signals.get("base_pose")
+                first = None if pose is None else pose[0]
+                self._camera = self._robot.camera(signals["position"][0], first)
+                self._robot.colour(time, (), np.empty(0))
+            self.findings(time, ())
+        elif not self._full and time >= self._start + SHOWN:
+            self._full = True
+        else:
+            return
+        self._recording.send_blueprint(self._layout(self._start))
+
+    def piece(self, time: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
+        """Draw the spectrogram and the levels of links of a stretch without missing samples."""
+        velocity = np.where(valid[:, None], signals["velocity"], 0.0)
+        end = float(time[-1]) + 1.0 / self._rate
+        centres, level = self._spectrogram.push(velocity, valid, end)
+        if self._sink.open:
+            self._messages.add(BANDS_PATH, nanoseconds(centres), level, _heat_map)
+            if self._links is not None and self._robot is not None:
+                for start, each in self._links.push(time, signals):
+                    self._robot.colour(start, self._links.links, each)
+
+    def skip(self) -> None:
+        """Begin anew after a gap."""
+        self._spectrogram.skip()
+        if self._links is not None:
+            self._links.skip()
+
+    def batch(self, time: Array, motion: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
+        """Draw the noise, the joints' signals and the robot of the next stretch.
 
         Args:
             time: Shape (samples,), in [s].
-            noise: Shape (samples,), in [rad/s].
-            signals: Each of shape (samples, joints); rows that are not finite are left out.
-            seconds: That the stretch lasts, in [s].
+            motion: Velocities that make noise, shape (samples, columns).
+            valid: False for samples without noise, which are left out, shape (samples,).
+            signals: Each of shape (samples, columns); rows that are not finite are left out.
         """
-        self._thin(time, noise[:, None], {NOISE: slice(None)}, seconds * NOISE_POINTS)
-        for kind, plots in self._entities.items():
-            finite = np.isfinite(signals[kind]).all(axis=1)
-            self._thin(time[finite], signals[kind][finite], plots, seconds * JOINT_POINTS)
-        self._held += seconds
-        if self._held >= self._interval:
-            self._drawn += self._held
-            if not self._watched:
-                longer = max(FILE_SHARE * self._drawn, FILE_INTERVAL)
-                self._interval = min(longer, FILE_LONGEST)
-            self.flush()
+        now, seconds = float(time[-1]), len(valid) / self._rate
+        if now > self._lane_end + self._length + self._hop:  # the next frame is overdue
+            self.end_lane()
+        rows = dict(signals)
+        if not valid.all():
+            time, motion = time[valid], motion[valid]
+            rows = {name: signal[valid] for name, signal in signals.items()}
+        plots = {NOISE: slice(None)}
+        self._lines(time, nm.simplified(motion)[:, None], plots, seconds * NOISE_POINTS)
+        for kind, plots in self._plots.items():
+            finite = np.isfinite(rows[kind]).all(axis=1)
+            self._lines(time[finite], rows[kind][finite], plots, seconds * JOINT_POINTS)
+        if self._robot is not None:
+            pose = signals.get("base_pose")
+            self._robot.show(now, signals["position"][-1], None if pose is None else pose[-1])
+        self._messages.passed(seconds)
 
-    def _thin(self, time: Array, values: Array, plots: Mapping[str, slice], points: float) -> None:
+    def _lines(self, time: Array, values: Array, plots: Mapping[str, slice], points: float) -> None:
         shown, thin = extremes(time, values, points=max(2, round(points)))
         for path, columns in plots.items():
-            self._wait(path, shown, thin[:, columns].copy())  # the array will be used again
-
-    def spectrogram(self, time: Array, level: Array) -> None:
-        """Draw columns of the spectrogram, see `SpectrogramStream.push`."""
-        self._wait(BANDS_PATH, time, level)
+            self._messages.add(path, nanoseconds(shown), thin[:, columns])
 
     def labels(self, labels: Labels) -> None:
-        """Draw the scores of frames, at their centres, at once if they are watched."""
-        self._wait(SCORES, (labels.start + labels.stop) / 2, labels.scores)
-        if self._watched:
-            self._send(SCORES)
+        """Draw the scores of frames at their centres, and their raw classes around these.
 
-    def changes(self, changes: Sequence[Change]) -> None:
-        """Draw the class where it changes and until when it lasts, at once if it is watched."""
+        Each frame has the time around its centre, as in the recording of a whole run.
+        """
+        centres = (labels.start + labels.stop) / 2
+        self._messages.add(SCORES, nanoseconds(centres), labels.scores, urgent=True)
+        changes: list[tuple[float, str]] = []
+        for centre, label in zip(centres.tolist(), labels.raw.tolist(), strict=True):
+            begin = centre - self._hop / 2
+            if self._lane and begin > self._lane_end + self._hop / 2:
+                changes.append((self._lane_end, ""))
+                self._lane = ""
+            if label != self._lane:
+                changes.append((begin, label))
+            self._lane, self._lane_end = label, begin + self._hop
+        self._change([*changes, (self._lane_end, self._lane)] if len(labels) else changes)
+
+    def end_lane(self) -> None:
+        """End the class that is drawn."""
+        if self._lane:
+            self._lane = ""
+            self._change([(self._lane_end, "")])
+
+    def _change(self, changes: Sequence[tuple[float, str]]) -> None:
+        """Draw classes from when on they hold, or until when so far, in [s]; empty is none."""
         points: list[tuple[int, str]] = []
         for time, state in changes:
             begin = round(1e9 * time)
-            if self._state not in ("", state):
-                points.append((begin - 1, self._state))
+            if self._drawn not in ("", state):
+                points.append((begin - 1, self._drawn))
             points.append((begin, state))
-            self._state = state
-        shown = [[state == name for name in self._rows] for _, state in points]
+            self._drawn = state
+        shown = np.array([[state == name for name in self._rows] for _, state in points])
         times = np.array([time for time, _ in points], dtype=np.int64)
-        self._wait_at(FOUND_PATH, times, np.array(shown, dtype=np.float64))
-        if self._watched:
-            self._send(FOUND_PATH)
+        self._messages.add(FOUND_PATH, times, shown, _found, urgent=True)
 
-    def _wait(self, path: str, time: Array, values: Array) -> None:
-        """Let values wait, at times in [s]."""
-        self._wait_at(path, np.round(1e9 * time).astype(np.int64), values)
-
-    def _wait_at(self, path: str, time: NDArray[np.int64], values: Array) -> None:
-        """Let values wait, at times in [ns]."""
-        if len(time):
-            self._waiting.setdefault(path, []).append((time, values))
-
-    def flush(self) -> None:
-        """Draw what waits."""
-        for path in list(self._waiting):
-            self._send(path)
-        self._held = 0.0
-
-    def _send(self, path: str) -> None:
-        """Draw what waits of an entity in one message."""
-        pieces = self._waiting.pop(path, None)
-        if pieces is None:
-            return
-        time, values = (np.concatenate(each) for each in zip(*pieces, strict=True))
-        count, width = values.shape
-        columns: Any = scalars(values)
-        if path == BANDS_PATH:
-            shades = colors.heat(values).reshape(-1, 4)
-            columns = [
-                *scalars(np.tile(axes.middles(width)[::-1], (count, 1))),
-                *rr.SeriesLines.columns(colors=shades).partition([width] * count),
-            ]
-        elif path == FOUND_PATH:
-            upper, lower = FOUND
-            middles = axes.TOP * (1.0 - (np.arange(width) + (upper + lower) / 2) / width)
-            bands = np.where(values > 0.0, middles, np.nan).repeat(unstable.COPIES, axis=1)
-            half = axes.TOP * (lower - upper) / 2 / width
-            unstable.send_bands(self._recording, path, time, bands, half)
-            return
-        index = rr.TimeColumn(TIMELINE, duration=time.astype("timedelta64[ns]"))
-        self._recording.send_columns(path, indexes=[index], columns=columns)
-
-    def findings(self, time: float, found: Sequence[Event], lasting: Sequence[Event]) -> None:
-        """Show the findings so far in a document.
+    def findings(self, time: float, found: Sequence[Event], latest: float = np.inf) -> None:
+        """Show the findings so far in a document; nothing without a model.
 
         Args:
             time: Of the latest sample, in [s].
+            latest: A finding that reaches this time lasts, in [s].
         """
-        lines = [_line(event, lasts=event in lasting) for event in reversed(found)]
+        if self._classes is None:
+            return
+        lines = []
+        for event in reversed(found):
+            lasts = event.stop >= latest
+            when = f"since {event.start:.2f} s" if lasts else interval(event.start, event.stop)
+            name = spoken(event.label)
+            lines.append(f"- **{name}**, {when}, score {event.score:.2f}{event.novelty}")
         count = Counter(spoken(event.label) for event in found)
         title = ", ".join(f"{number} {label}" for label, number in count.items())
         head = f"### findings: {title}" if title else "### ok so far"
@@ -359,23 +626,26 @@ class Drawing:
         """Add a line to the list of events."""
         log_events(self._recording, [time], [text], [colour])
 
-    def layout(self, start: float, camera: Camera | None, *, links: bool, full: bool) -> Blueprint:
+    def finish(self, time: float, found: Sequence[Event]) -> None:
+        """Show what waits, and the findings of the whole stream."""
+        self.end_lane()
+        if self._start is not None:
+            self.findings(time, found)
+        self._messages.flush()
+
+    def _layout(self, start: float) -> Blueprint:
         """Lay the recording out; every plot shows ten seconds: the first, and then the last.
 
-        Args:
-            start: Time of the first sample, in [s].
-            camera: From where the robot is seen; None without one.
-            links: Whether the links are coloured.
-            full: Whether the last ten seconds all lie after the start; until then, plots show the
-                first ten, so that no time is negative.
+        Until the last ten seconds all lie after the start, no time is negative.
         """
-        shown: dict[str, Any] = {"last": SHOWN} if full else {"during": (start, start + SHOWN)}
+        shown: dict[str, Any] = {"during": (start, start + SHOWN)}
+        if self._full:
+            shown = {"last": SHOWN}
         shown |= {"fixed": True, "titled": False}
         rows = shown | {"between": (0.0, axes.TOP)}
         over_time = [
             (NOISE_PANEL, unstable.plot("Noise", "/noise", **shown)),
             (SPECTROGRAM_PANEL, unstable.plot("Spectrum", "/spectrogram", **rows)),
-            (SIGNALS_PANEL, self._signals(shown)),
         ]
         left = [
             (unstable.text("Findings", "/report", titled=False), 2.0),
@@ -384,24 +654,22 @@ class Drawing:
         if self._classes is not None:  # otherwise there is no verdict
             over_time.insert(0, (self._classes, unstable.plot("Classes", "/class", **rows)))
             left.insert(0, (unstable.drawing("/verdict"), 0.32))
-        if camera is not None:
-            title = "Robot, links coloured by level above 10 Hz" if links else "Robot"
-            robot = unstable.robot(title, "/robot", camera)
-            if links:
+        if self._camera is not None:
+            title = "Robot, links coloured by level above 10 Hz" if self._links else "Robot"
+            robot = unstable.robot(title, "/robot", self._camera)
+            if self._links is not None:
                 key = unstable.drawing(f"/axis/{KEY.name}/right")
                 robot = unstable.beside((robot, 88.0), (key, 12.0))
             left.insert(len(left) - 1, (robot, 3.4))
-        right = [
-            (part if panel is SIGNALS_PANEL else axes.part(panel, part), panel.height)
-            for panel, part in over_time
-        ]
+        right = [(axes.part(panel, plot), panel.height) for panel, plot in over_time]
+        right.append((self._signals(shown), SIGNALS_PANEL.height))
         whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*right), 64.0))
         return unstable.blueprint(whole, following=True)
 
     def _signals(self, shown: Mapping[str, Any]) -> Part:
         """Plots of joint signals and of scores, behind each other."""
         paths: dict[str, list[str]] = {}
-        for kind, plots in self._entities.items():
+        for kind, plots in self._plots.items():
             measured = kind.removesuffix("_desired")
             for number, path in enumerate(plots, start=1):
                 which = f" {number}" if len(plots) > 1 else ""
@@ -417,10 +685,22 @@ class Drawing:
         )
 
 
-def _line(event: Event, *, lasts: bool) -> str:
-    """A finding in a line of Markdown."""
-    when = f"since {event.start:.2f} s" if lasts else interval(event.start, event.stop)
-    return f"- **{spoken(event.label)}**, {when}, score {event.score:.2f}{event.novelty}"
+def _heat_map(level: Array) -> list[Any]:
+    """Columns of lines that are bands, in colours of their levels, shape (columns, bands)."""
+    count, width = level.shape
+    shades = colors.heat(level).reshape(-1, 4)
+    return [
+        *scalars(np.tile(axes.middles(width)[::-1], (count, 1))),
+        *rr.SeriesLines.columns(colors=shades).partition([width] * count),
+    ]
+
+
+def _found(shown: Mask) -> Iterable[Any]:
+    """Columns of bands in rows of classes, drawn where a class is shown, shape (points, rows)."""
+    count, (upper, lower) = shown.shape[1], FOUND
+    middles = axes.TOP * (1.0 - (np.arange(count) + (upper + lower) / 2) / count)
+    bands = np.where(shown, middles, np.nan).repeat(unstable.COPIES, axis=1)
+    return unstable.band_columns(bands, axes.TOP * (lower - upper) / 2 / count)
 
 
 def _plots(kind: str, joints: int) -> dict[str, slice]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import ceil
+from math import ceil, inf
 
 import numpy as np
 
@@ -20,6 +20,40 @@ BETA = 5.0
 """Shape of the Kaiser window, as in SciPy's polyphase resampling."""
 
 
+class Windows:
+    """Cuts samples into windows that overlap, whatever the pieces in which they come."""
+
+    def __init__(self, length: int, hop: int, before: int = 0) -> None:
+        self._length, self._hop = length, hop
+        self.clear(before)
+
+    def clear(self, before: int = 0) -> None:
+        """Begin anew, after so many samples that are not valid."""
+        self._samples, self._valid = np.zeros((before, 1)), np.zeros(before, dtype=bool)
+
+    def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask, int]:
+        """Take samples.
+
+        Args:
+            valid: False in gaps, shape (samples,).
+
+        Returns:
+            The windows that are complete now, shape (windows, columns, length); which of them touch
+            no gap; and how many samples came since the first of them began.
+        """
+        held = np.broadcast_to(self._samples, (len(self._valid), samples.shape[1]))
+        samples = np.concatenate((held, samples))
+        valid = np.concatenate((self._valid, valid))
+        length, hop = self._length, self._hop
+        count = max(0, (len(samples) - length) // hop + 1)
+        self._samples, self._valid = samples[count * hop :], valid[count * hop :]
+        if not count:
+            return np.empty((0, samples.shape[1], length)), valid[:0], len(samples)
+        view = np.lib.stride_tricks.sliding_window_view
+        whole = view(valid, length)[::hop][:count].all(axis=1)
+        return view(samples, length, axis=0)[::hop][:count], np.asarray(whole), len(samples)
+
+
 class Decimator:
     """Low-passes and decimates signals, and marks the samples for which it cannot.
 
@@ -28,35 +62,17 @@ class Decimator:
     valid, and the last ten are missing.
     """
 
-    def __init__(self, ratio: int, columns: int) -> None:
-        self._ratio, self.columns = ratio, columns
+    def __init__(self, ratio: int) -> None:
         reach = EDGE * ratio
         cutoff = np.sinc(np.arange(-reach, reach + 1) / ratio)
         taps = cutoff * np.kaiser(2 * reach + 1, BETA)
         self._taps = taps / taps.sum()  # a constant stays what it is
-        self._samples = np.zeros((reach, columns))
-        self._valid = np.zeros(reach, dtype=bool)
+        self._windows = Windows(len(taps), ratio, before=reach)
 
     def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask]:
-        """Take samples.
-
-        Args:
-            valid: False in gaps, shape (samples,).
-
-        Returns:
-            What is complete now, shape (lower, columns), and which of it touches no gap.
-        """
-        samples = np.concatenate((self._samples, samples))
-        valid = np.concatenate((self._valid, valid))
-        length = len(self._taps)
-        count = max(0, (len(samples) - length) // self._ratio + 1)
-        used = count * self._ratio
-        self._samples, self._valid = samples[used:], valid[used:]
-        if not count:
-            return samples[:0], valid[:0]
-        view = np.lib.stride_tricks.sliding_window_view
-        lower: Array = view(samples, length, axis=0)[:: self._ratio][:count] @ self._taps
-        return lower, np.asarray(view(valid, length)[:: self._ratio][:count].all(axis=1))
+        """Take samples; what is complete now, shape (lower, columns), and what touches no gap."""
+        windows, whole, _ = self._windows.push(samples, valid)
+        return windows @ self._taps, whole
 
 
 NOISY = ("base_velocity", "velocity", "velocity_desired")
@@ -89,9 +105,6 @@ def noise_signal(name: str, motion: Array, base: int, joints: int) -> Array:
 class Labeller:
     """Labels frames as they become complete, or gives the reason why it does not.
 
-    Args:
-        rate: Samples per second, in [Hz].
-
     Attributes:
         model: Name of the model that labels; empty without one.
         remark: Why there are no labels, or at which other rate; empty if neither.
@@ -105,39 +118,38 @@ class Labeller:
         self.classes, self.length, self.hop = tuple[str, ...](), 0.0, 0.0
         self._stream: nc.Stream | None = None
         self._decimator: Decimator | None = None
-        self._lasting: nc.Lasting | None = None
         self._ratio, self._samples = 1, 0
         self._base, self._joints, desired = (widths.get(name, 0) for name in NOISY)
+        self._columns = self._base + self._joints + desired
         kinds = ("desired", "measured", "error") if desired else ("measured",)
         there = (NOISE, *kinds, *(f"{kind}_joints" for kind in kinds))
         self._followed = [name for name in there if name in (MEASURED, ERROR)]
-        self._names: tuple[str, ...] = ()
         try:
-            self.model, chosen = nc.nearest(library, rate, there)
+            model, chosen = nc.nearest(library, rate, there)
         except nc.ModelsError as error:
             self.remark = f"No labels: {error}."
             return
         ratio = round(rate / chosen.rate)
-        if rate > chosen.rate and isinstance(model := library[self.model], nc.General):
+        if rate > chosen.rate and isinstance(general := library[model], nc.General):
             ratio = ceil(rate / chosen.rate * (1.0 - TOLERANCE))
-            chosen = model.at(rate / ratio, there)
+            chosen = general.at(rate / ratio, there)
         if abs(rate / ratio / chosen.rate - 1.0) > NOMINAL:
-            self.model = ""
             self.remark = (
                 f"No labels: {rate:g} Hz is no multiple of the {chosen.rate:g} Hz of the nearest"
                 " model, as is needed while samples come in."
             )
             return
-        self._ratio, self._names = ratio, chosen.profile.signals
+        self.model, self._ratio, lower = model, ratio, rate / ratio
         self.classes, self.length = chosen.classes, chosen.profile.duration
         self.hop = chosen.profile.hop / rate * ratio
-        self._stream = nc.Stream(chosen, rate=rate / ratio, joints=self._joints)
-        self._lasting = nc.Lasting(rate / ratio)
+        self._names = chosen.profile.signals
+        self._stream = nc.Stream(chosen, rate=lower, joints=self._joints)
+        self._lasting = nc.Lasting(lower)
         if ratio > 1:
-            self._decimator = Decimator(ratio, self._base + self._joints + desired)
+            self._decimator = Decimator(ratio)
             self.remark = (
-                f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}: nothing above"
-                f" {rate / ratio / 2:g} Hz is left."
+                f"Labelled at {lower:g} Hz, the rate of model {model}: nothing above"
+                f" {lower / 2:g} Hz is left."
             )
 
     @property
@@ -145,7 +157,7 @@ class Labeller:
         """Time since the first sample, lost ones counted, in [s]: the clock of the labels."""
         return self._samples / self.rate
 
-    def push(self, motion: Array, valid: Mask) -> nc.Labels | None:
+    def push(self, motion: Array, valid: Mask) -> Labels | None:
         """Take samples.
 
         Args:
@@ -159,37 +171,38 @@ class Labeller:
         self._samples += len(motion)
         return self._take(motion, valid)
 
-    def _take(self, motion: Array, valid: Mask) -> nc.Labels | None:
+    def _take(self, motion: Array, valid: Mask) -> Labels | None:
         """Take samples that the clock has counted."""
-        if self._stream is None or self._lasting is None:
+        if self._stream is None:
             return None
         if self._decimator is not None:
             motion, valid = self._decimator.push(motion, valid)
-        self._lasting.push(self._signals(motion, self._followed), valid)
-        return self._stream.push(self._signals(motion, self._names), valid)
-
-    def _signals(self, motion: Array, names: Sequence[str]) -> dict[str, Array]:
-        return {name: noise_signal(name, motion, self._base, self._joints) for name in names}
+        followed, signals = (
+            {name: noise_signal(name, motion, self._base, self._joints) for name in names}
+            for names in (self._followed, self._names)
+        )
+        self._lasting.push(followed, valid)
+        return self._stream.push(signals, valid)
 
     @property
     def lasting(self) -> tuple[Event, ...]:
         """What lasts so far, on the clock of the labels."""
-        return () if self._lasting is None else self._lasting.events
+        return () if self._stream is None else self._lasting.events
 
     @property
     def decided(self) -> float:
         """Time before which nothing begins any more that lasts, on the clock of the labels."""
-        return float("inf") if self._lasting is None else self._lasting.decided
+        return inf if self._stream is None else self._lasting.decided
 
     def finish(self) -> None:
         """End the signal."""
-        if self._lasting is not None:
+        if self._stream is not None:
             self._lasting.finish()
 
     def skip(self, samples: int) -> None:
         """Pass over samples that were lost."""
         self._samples += samples
-        if self._stream is None or self._lasting is None:
+        if self._stream is None:
             return
         whole = samples
         if self._decimator is not None:
@@ -199,7 +212,7 @@ class Labeller:
         self._lasting.skip(whole)
         if self._decimator is not None:
             rest = samples - whole * self._ratio
-            self._take(np.zeros((rest, self._decimator.columns)), np.zeros(rest, dtype=bool))
+            self._take(np.zeros((rest, self._columns)), np.zeros(rest, dtype=bool))
 
 
 SETTLED = 3
@@ -222,13 +235,10 @@ class Findings:
         waiting = labels if self._open is None else Labels.concatenated((self._open, labels))
         quiet = waiting.label == "ok"
         # How far the frames reach that are not `ok`; those that it touches join them.
-        reached = np.maximum.accumulate(np.where(quiet, -np.inf, waiting.stop))
-        apart = np.flatnonzero(quiet & (waiting.start > np.append(-np.inf, reached[:-1])))
-        if not len(apart):
-            self._open = waiting
-            return
+        reached = np.maximum.accumulate(np.where(quiet, -inf, waiting.stop))
+        apart = np.flatnonzero(quiet & (waiting.start > np.append(-inf, reached[:-1])))
         # The frame that is `ok` belongs to both parts: neither ends where the signal goes on.
-        last = int(apart[-1])
+        last = int(apart[-1]) if len(apart) else 0
         if not quiet[:last].all():  # most often all of it is `ok`, and a label must not wait
             self._closed += waiting.part(slice(last + 1)).events()
         self._open = waiting.part(slice(last, None))
@@ -236,7 +246,7 @@ class Findings:
     @property
     def decided(self) -> float:
         """Time at which the earliest frame starts whose event may still change, in [s]."""
-        return -float("inf") if self._open is None else float(self._open.start[0])
+        return -inf if self._open is None else float(self._open.start[0])
 
     @property
     def confirmed(self) -> tuple[Event, ...]:
@@ -272,10 +282,10 @@ class News:
 
     def __init__(self, tell: Callable[[Event, bool], None], wait: float = 0.0) -> None:
         self._tell, self._wait = tell, wait
-        self._begun: dict[str, float] = {}
+        self._begun: dict[str, float] = {}  # stop of the latest event of each class
         self._ended: dict[str, float] = {}
 
-    def update(self, events: Sequence[Event], decided: float, now: float = float("inf")) -> None:
+    def update(self, events: Sequence[Event], decided: float, now: float = inf) -> None:
         """Tell of what is new.
 
         Args:
@@ -283,19 +293,15 @@ class News:
             decided: Time up to which nothing changes any more, in [s]: an event that stops earlier
                 is over, since what continues it would begin before its end.
         """
-        never = -float("inf")
         for event in events:
-            if event.stop <= self._ended.get(event.label, never):
+            begun, over = self._begun.get(event.label, -inf), event.stop < decided
+            if event.stop <= self._ended.get(event.label, -inf):
                 continue
-            if event.start + self._wait > now and event.stop >= decided:
+            if event.start + self._wait > now and not over:
                 continue
-            if event.stop > self._begun.get(event.label, never) and not self._lasts(event):
+            if begun < event.start:  # otherwise it continues one of its class
                 self._tell(event, False)
-            self._begun[event.label] = max(event.stop, self._begun.get(event.label, never))
-            if event.stop < decided:
+            self._begun[event.label] = max(event.stop, begun)
+            if over:
                 self._ended[event.label] = event.stop
                 self._tell(event, True)
-
-    def _lasts(self, event: Event) -> bool:
-        """Whether an event has been told of before: it continues one of its class."""
-        return self._begun.get(event.label, -float("inf")) >= event.start

@@ -21,24 +21,18 @@ class SinkError(InspectorError):
 
 
 class Warnings:
-    """Warnings by kind."""
+    """Counts warnings by kind, and emits the first of each."""
 
     def __init__(self, emit: Callable[[str], None]) -> None:
         self.emit = emit
-        self._counts: Counter[str] = Counter()
+        self.counts: Counter[str] = Counter()
 
     def note(self, kind: str, line: str, count: int = 1) -> None:
         """Count a warning, and emit it if it is the first of its kind."""
-        if count <= 0:
-            return
-        if kind not in self._counts:
-            self.emit(line)
-        self._counts[kind] += count
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """How many there were of each kind."""
-        return dict(self._counts)
+        if count > 0:
+            if kind not in self.counts:
+                self.emit(line)
+            self.counts[kind] += count
 
 
 SIGNALS = ("velocity", "velocity_desired", "position", "base_velocity", "base_pose")
@@ -66,27 +60,33 @@ class SampleBuffer:
         return self._time[: self.held]
 
     def put(self, rows: Mapping[str, Array], time: Array, received: float) -> int:
-        """Take as many samples as fit in.
+        """Take as many samples as fit in; signals that are missing or of other widths are unknown.
 
         Args:
-            rows: Signals, each of shape (samples, columns); those that are missing or of another
-                width are unknown in these samples.
+            rows: Signals, each of shape (samples, columns).
             time: Timestamps, shape (samples,).
             received: When they were, in [s] on the clock that delays are measured by.
         """
         count = min(len(time), self._size + self._waiting - self.held)
         place = slice(self.held, self.held + count)
         self._time[place], self._received[place] = time[:count], received
+        since = f"from {time[0]:.3f} s on"
         for name, values in self._signals.items():
-            given = rows.get(name)
-            fits = given is not None and given.shape[1] == values.shape[1]
-            values[place] = given[:count] if given is not None and fits else np.nan
-            if not fits:
-                self._note(name, given, values.shape[1], time[0], count)
-        for name in rows:
-            if name not in self._signals:
-                line = f"{name} from {time[0]:.3f} s on was not there at first: not shown"
-                self._warnings.note(f"samples with a new {name}", line, count)
+            given, width, kind = rows.get(name), values.shape[1], ""
+            if given is None:
+                kind, line = f"samples without {name}", f"no {name} {since}: it was there at first"
+            elif given.shape[1] != width:
+                kind = f"samples with another width of {name}"
+                line = (
+                    f"{name} of {given.shape[1]} columns {since}, where it had {width}: not shown,"
+                    " and not labelled where it makes noise"
+                )
+            values[place] = np.nan if given is None or kind else given[:count]
+            if kind:
+                self._warnings.note(kind, line, count)
+        for name in (name for name in rows if name not in self._signals):
+            line = f"{name} {since} was not there at first: not shown"
+            self._warnings.note(f"samples with a new {name}", line, count)
         self.held += count
         return count
 
@@ -96,37 +96,23 @@ class SampleBuffer:
         Args:
             kept: Which of those that do not wait, shape (held - waiting,).
         """
-        decided, rest = len(kept), slice(len(kept), len(kept) + waiting)
+        decided = len(kept)
         received = self._received[:decided][kept]
         signals = {name: values[:decided][kept] for name, values in self._signals.items()}
         for values in signals.values():
             values[~(np.abs(values) < LARGEST)] = np.nan  # the square of others would overflow
         for held in (self._time, self._received, *self._signals.values()):
-            held[:waiting] = held[rest].copy()
+            held[:waiting] = held[decided : decided + waiting].copy()
         self.held = self._waiting = waiting
         return received, signals
 
-    def _note(self, name: str, given: Array | None, width: int, time: float, count: int) -> None:
-        if given is None:
-            line = f"no {name} from {time:.3f} s on: it was there at first"
-            self._warnings.note(f"samples without {name}", line, count)
-        else:
-            line = (
-                f"{name} of {given.shape[1]} columns from {time:.3f} s on, where it had {width}:"
-                " not shown, and not labelled where it makes noise"
-            )
-            self._warnings.note(f"samples with another width of {name}", line, count)
-
 
 def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
-    """Bring one sample or a chunk of them into rows.
+    """Bring one sample or a chunk of them into rows, each of shape (samples, columns).
 
     Args:
         given: Signals by name, the velocity first: of shape (columns,) for one sample, or
             (samples, columns).
-
-    Returns:
-        Each of shape (samples, columns).
     """
     rows: dict[str, Array] = {}
     for name, values in given.items():
@@ -134,12 +120,12 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
             array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise LiveError(f"{name}: holds no numbers ({error})") from error
-        rows[name] = array if array.ndim == 2 else array.reshape(1, -1)
         if array.ndim not in (1, 2):
             raise LiveError(
                 f"{name}: shape {array.shape}, expected (joints,) for one sample or"
                 " (samples, joints)"
             )
+        rows[name] = np.atleast_2d(array)
         if len(rows[name]) != len(rows["velocity"]):
             listed = ", ".join(f"{len(array)} of {name}" for name, array in rows.items())
             raise LiveError(f"samples differ in number: {listed}")
@@ -147,15 +133,10 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
 
 
 def widths_of(rows: Mapping[str, Array], joint_names: Sequence[str]) -> dict[str, int]:
-    """Fix the signals of a session by its first samples.
-
-    Args:
-        rows: Signals, each of shape (samples, columns).
-    """
+    """Fix the signals of a session, and their columns, by its first samples."""
     joints = len(joint_names) or rows["velocity"].shape[1]
-    wanted = {"base_velocity": 6, "base_pose": 7}
     for name, array in rows.items():
-        width = wanted.get(name, joints)
+        width = {"base_velocity": 6, "base_pose": 7}.get(name, joints)
         if array.shape[1] != width:
             raise LiveError(
                 f"{name}: {array.shape[1]} columns in the first sample, expected {width}"
@@ -190,9 +171,6 @@ class Clock:
     is an outlier, unless the next ones agree with it: then the clock has jumped. Up to an hour
     ahead that is a gap; anything else is a new segment, whose times go on from the last one. The
     cost does not depend on how far the clock jumps.
-
-    Args:
-        rate: Nominal samples per second, in [Hz].
     """
 
     def __init__(self, rate: float, warnings: Warnings) -> None:
@@ -219,27 +197,26 @@ class Clock:
             return np.zeros(0, dtype=bool), np.empty(0), np.empty(0), len(stamps)
         known = stamps * self._unit
         kept, time = np.zeros(len(known), dtype=bool), np.empty(len(known))
-        place, waiting = 0, 0
-        while place < len(known):
-            run = self._run(known[place:])
+        place, decided = 0, len(known)
+        while place < decided:
+            follows = self._follows(np.append(self._last, known[place:-1]), known[place:])
+            run = decided - place if follows.all() else int(follows.argmin())
             part = slice(place, place + run)
             kept[part], time[part] = True, known[part] + self._shift
             place += run
             if run:
                 self._last = float(known[place - 1])
-            if place < len(known):
+            if place < decided:
                 stop, found = self._ahead(known, place)
-                stop = len(known) if ended and found == "open" else stop
+                if found == "open" and not ended:
+                    decided = stop
+                stop = decided if found == "open" else stop
                 self._note_dropped(known[place:stop])
                 if found == "jump":
                     self._jump(float(known[stop]))
                 place = stop
-                if found == "open":
-                    waiting = len(known) - stop
-                    break
-        decided = len(known) - waiting
-        kept, time = kept[:decided], time[:decided][kept[:decided]]
-        return kept, self._lost(time), time, waiting
+        time = time[:decided][kept[:decided]]
+        return kept[:decided], self._lost(time), time, len(known) - decided
 
     def _begin(self, stamps: Array, *, ended: bool) -> bool:
         """Take the unit of timestamps from the first ones, if there are enough."""
@@ -247,14 +224,13 @@ class Clock:
         if len(finite) < AGREE and len(stamps) < 2 * AGREE and not ended:
             return False
         steps = np.diff(finite[:RATE_STEPS])
-        rising = steps[steps > 0.0]
-        step = float(np.median(rising)) if len(rising) else 1.0 / self._rate
+        step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0 / self._rate
         power = 3 * round(np.log10(step * self._rate) / 3)
-        near = power in UNITS and 0.5 < step * self._rate / 10.0**power < 2.0
-        unit = UNITS[power] if near else ""
-        self._unit = 10.0**-power if unit else 1.0
-        if unit:
-            self._warnings.emit(f"timestamps count {unit} at {self._rate:g} Hz: read as such")
+        self._unit = 1.0
+        if power in UNITS and 0.5 < step * self._rate / 10.0**power < 2.0:
+            self._unit = 10.0**-power
+            line = f"timestamps count {UNITS[power]} at {self._rate:g} Hz: read as such"
+            self._warnings.emit(line)
         first = float(finite[0]) * self._unit if len(finite) else 0.0
         self._last = first - 1.0 / self._rate
         self._shift = -first if abs(first) > FARTHEST else 0.0
@@ -264,11 +240,6 @@ class Clock:
         # Of times, not of stamps: tiny steps vanish in the sum, and times have to increase.
         steps = self._rate * ((after + self._shift) - (before + self._shift))
         return np.asarray((steps > 0.0) & (steps <= JUMP_STEPS))
-
-    def _run(self, stamps: Array) -> int:
-        """How many samples follow the last one and each other."""
-        follows = self._follows(np.append(self._last, stamps[:-1]), stamps)
-        return len(stamps) if follows.all() else int(follows.argmin())
 
     def _ahead(self, stamps: Array, place: int) -> tuple[int, str]:
         """Where to go on after a sample that does not follow the last one, and why.
@@ -303,41 +274,35 @@ class Clock:
         self._last = stamp - 1.0 / self._rate
 
     def _lost(self, time: Array) -> Array:
-        """Samples that are missing before each time."""
+        """Samples that are missing before each time; warns of them, and once of a wrong rate."""
         if not len(time):
             return np.empty(0)
-        steps = self._rate * np.diff(
-            time, prepend=time[0] if self._before is None else self._before
-        )
+        before = time[0] if self._before is None else self._before
+        steps = self._rate * np.diff(time, prepend=before)
         self._before = float(time[-1])
         lost = np.where(steps >= GAP_STEPS, np.round(steps) - 1.0, 0.0)
         if lost.any():
             first = int(np.argmax(lost > 0))
             line = f"gap at {time[first]:.3f} s: {lost[first]:.0f} samples are missing"
             self._warnings.note("missing samples", line, int(lost.sum()))
-        self._check_rate(steps)
+        if not self._checked and len(steps) > RATE_STEPS:
+            self._checked = True
+            step = float(np.median(steps))
+            if abs(step - 1.0) > RATE_TOLERANCE:
+                line = (
+                    f"timestamps have {self._rate / step:.4g} Hz, the nominal rate is"
+                    f" {self._rate:g} Hz: labels and spectrogram are wrong, set --rate"
+                )
+                self._warnings.note("wrong rate", line)
         return lost
 
     def _note_dropped(self, stamps: Array) -> None:
-        finite = stamps[np.isfinite(stamps)]
-        before, after = finite[finite <= self._last], finite[finite > self._last]
+        before, after = stamps[stamps <= self._last], stamps[stamps > self._last]
         if len(before):
             line = f"time stands still or runs backwards at {before[0]:.6g} s: left out"
             self._warnings.note(BACKWARDS, line, len(before))
         if len(after):
             line = f"a timestamp of {after[0]:.6g} s after {self._last:.6g} s: left out"
             self._warnings.note(OUTLYING, line, len(after))
-        unknown = len(stamps) - len(finite)
+        unknown = len(stamps) - len(before) - len(after)
         self._warnings.note(TIMELESS, "a time is no number: left out", unknown)
-
-    def _check_rate(self, steps: Array) -> None:
-        if self._checked or len(steps) <= RATE_STEPS:
-            return
-        self._checked = True
-        step = float(np.median(steps))
-        if abs(step - 1.0) > RATE_TOLERANCE:
-            line = (
-                f"timestamps have {self._rate / step:.4g} Hz, the nominal rate is"
-                f" {self._rate:g} Hz: labels and spectrogram are wrong, set --rate"
-            )
-            self._warnings.note("wrong rate", line)

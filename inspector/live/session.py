@@ -5,6 +5,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import inf
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -12,13 +13,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-import noisemodel as nm
 from inspector.analysis import headline, status_of
 from inspector.errors import Status
 from inspector.library import Library, for_robot, load_library
-from inspector.live.drawing import SHOWN, Drawing, Lane, SpectrogramStream
+from inspector.live.drawing import Drawing
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
-from inspector.live.robot import LinkLevels, LiveRobot
 from inspector.live.samples import (
     DROPPED,
     Clock,
@@ -30,15 +29,12 @@ from inspector.live.samples import (
 )
 from inspector.live.sink import LATE, Sink
 from inspector.logs.plausibility import LONG, LimitWatch, check_joints
-from inspector.recording.unstable import Camera
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from noiseclassifier import Event, merged
 from noisemodel.files import beyond, limit
 from noisemodel.robot import joint_limits
 from noisemodel.types import Array, Mask
 
-POSES = 40
-"""Poses of the robot in a message to a file without a viewer: 2 s."""
 MAX_DELAYS = 100_000
 """Delays that are kept, of the latest labels."""
 UNSEEN = "samples that the viewer may not have shown"
@@ -49,14 +45,11 @@ class Worker:
     """Works on batches of samples, one after the other.
 
     Args:
-        rate: Nominal samples per second, in [Hz].
-        robot: The robot to draw; None draws none.
-        watch: The limits of the robot that the samples are said to be of; None checks none.
+        robot: The robot that the samples are said to be of; None is of none.
         stream: Keeps octave levels; None keeps none.
 
     Attributes:
         samples: How many were worked on.
-        labeller: Labels them.
         counts: How many frames were labelled, by class.
         delays: From a frame's last sample to its label in the recording, in [s].
         levels: Octave levels of all samples, once they have ended, if they were kept.
@@ -65,53 +58,33 @@ class Worker:
     def __init__(
         self,
         sink: Sink,
-        *,
         rate: float,
         robot: str | None,
         joint_names: Sequence[str],
         widths: Mapping[str, int],
         library: Library,
         warnings: Warnings,
-        watch: LimitWatch | None = None,
-        stream: LevelStream | None = None,
-        on_finding: Callable[[Event, bool], None] | None = None,
+        stream: LevelStream | None,
+        on_finding: Callable[[Event, bool], None] | None,
     ) -> None:
         self.samples, self._now = 0, 0.0
         self._unconfirmed = 0  # samples since the viewer was last known to be there
         self._rate, self._sink, self._warnings = rate, sink, warnings
         self._noisy = [name for name in NOISY if name in widths]
-        self._clock, self._spectrogram = Clock(rate, warnings), SpectrogramStream(rate)
-        self.labeller = Labeller(library, rate, widths)
-        self._lane = Lane(self.labeller.hop, self.labeller.length)
+        self._clock = Clock(rate, warnings)
+        self.labeller = Labeller(for_robot(library, robot), rate, widths)
         self._findings, self._on_finding = Findings(), on_finding
         self._news = News(self._tell, self.labeller.length + SETTLED * self.labeller.hop)
         self._shift: float | None = None  # from the clock of the labels to that of the samples
         self.counts: Counter[str] = Counter()
         self.delays: deque[float] = deque(maxlen=MAX_DELAYS)
-        self._watch, self._stream = watch, stream
+        self._watch = LimitWatch(joint_names, robot) if robot else None
+        self._stream = stream
         self.levels: Levels | None = None
-        self._robot: LiveRobot | None = None
-        self._links: LinkLevels | None = None
-        if robot is not None:
-            floating, poses = "base_pose" in widths, 1 if sink.watched else POSES
-            self._robot = LiveRobot(
-                sink.recording, robot, joint_names, floating=floating, at_once=poses
-            )
-            try:
-                self._links = LinkLevels(robot, joint_names, rate, floating=floating)
-            except nm.NoiseModelError as error:  # its surface cannot be had
-                warnings.emit(f"The links are not coloured: {error}.")
+        drawn = robot if "position" in widths else None
         self._drawing = Drawing(
-            sink.recording,
-            joint_names,
-            list(widths),
-            self.labeller.classes,
-            self._spectrogram.edges,
-            watched=sink.watched,
+            sink, rate, drawn, joint_names, widths, self.labeller, warnings.emit
         )
-        self._camera: Camera | None = None
-        self._start: float | None = None  # time of the first sample
-        self._full = False  # whether plots show the last ten seconds, not the first
         if self.labeller.remark:
             warnings.emit(self.labeller.remark)
 
@@ -128,10 +101,15 @@ class Worker:
         if not len(time):
             return
         self._now = float(time[-1])
-        self._lay_out(float(time[0]), signals)
+        self._drawing.begin(float(time[0]), signals)
         motion = np.hstack([signals[name] for name in self._noisy])
         valid = np.asarray(np.isfinite(motion).all(axis=1))
-        self._note_unknown(time, valid)
+        if not valid.all():
+            line = (
+                f"{' or '.join(self._noisy)} is not known at {time[~valid][0]:.3f} s:"
+                " such samples make no noise, frames with one have no label"
+            )
+            self._warnings.note("samples without noise", line, int((~valid).sum()))
         motion = np.where(valid[:, None], motion, 0.0)
         if self._stream is not None:
             self._stream.push(float(time[0]), signals, valid, lost)
@@ -139,15 +117,29 @@ class Worker:
         for first, stop in pairwise(edges):  # labels first: their latency counts
             piece = slice(first, stop)
             if lost[first]:
-                self._skip(int(lost[first]))
+                self.labeller.skip(int(lost[first]))
+                self._drawing.skip()
             self._label(time[piece], received[piece], motion[piece], valid[piece])
-            self._draw_piece(time[piece], valid[piece], {n: s[piece] for n, s in signals.items()})
+            own = {name: signal[piece] for name, signal in signals.items()}
+            self._drawing.piece(time[piece], valid[piece], own)
         if self._sink.open:
-            self._draw_batch(time, motion, valid, signals)
+            self._drawing.batch(time, motion, valid, signals)
         self._check_limits(signals)
-        self._unconfirmed += len(time)
+        self._check_viewer(len(time))
+
+    def _check_limits(self, signals: Mapping[str, Array]) -> None:
+        """Warn where the motion has been far beyond the limits of the robot for a second."""
+        if self._watch is not None:
+            self._watch.add(signals.get("position"), signals["velocity"])
+            if line := next(self._watch.warnings(LONG * self._rate), None):
+                self._warnings.note("joints beyond their limits", line)
+                self._watch = None
+
+    def _check_viewer(self, samples: int) -> None:
+        """Count samples until the viewer is known to be there; warn if it is gone or late."""
+        self._unconfirmed += samples
         if self._sink.behind > LATE and not (self._sink.late or self._sink.gone):
-            self._drawing.changes(self._lane.end())  # nothing is shown while it is late
+            self._drawing.end_lane()  # nothing is shown while it is late
         if self._sink.check_viewer():
             self._unconfirmed = 0
         if self._sink.gone or self._sink.late:
@@ -166,50 +158,18 @@ class Worker:
 
     def remark(self, line: str) -> None:
         """Show a line among the events."""
-        if self._sink.open:
-            self._drawing.event(self._now, line)
+        self._drawing.event(self._now, line)
 
     def finish(self) -> None:
         """Show what waits, and tell of findings that last to the end."""
         self.labeller.finish()
-        self._news.update(self.findings, float("inf"))
+        self._news.update(self.findings, inf)
         if self._stream is not None:
             self.levels = self._stream.finish()
             if self._stream.too_long:
                 line = f"more than {LONGEST / 60:.0f} minutes are not compared as a whole"
                 self._warnings.note("streams too long for a reference", line)
-        if self._sink.open:
-            self._drawing.changes(self._lane.end())
-            if self.labeller.classes and self._start is not None:
-                self._drawing.findings(self._now, self.findings, ())
-            self._drawing.flush()
-            if self._robot is not None:
-                self._robot.flush()
-
-    def _lay_out(self, time: float, signals: Mapping[str, Array]) -> None:
-        """Send the layout with the first sample, whose pose places the camera, and at 10 s."""
-        if self._start is None:
-            self._start = time
-            if self._robot is not None:
-                pose = signals.get("base_pose")
-                first = None if pose is None else pose[0]
-                self._camera = self._robot.camera(signals["position"][0], first)
-                self._robot.colour(time, (), np.empty(0))
-            if self.labeller.classes:
-                self._drawing.findings(time, (), ())
-        elif not self._full and time >= self._start + SHOWN:
-            self._full = True
-        else:
-            return
-        links = self._links is not None
-        layout = self._drawing.layout(self._start, self._camera, links=links, full=self._full)
-        self._sink.recording.send_blueprint(layout)
-
-    def _skip(self, samples: int) -> None:
-        self.labeller.skip(samples)
-        self._spectrogram.skip()
-        if self._links is not None:
-            self._links.skip()
+        self._drawing.finish(self._now, self.findings)
 
     def _label(self, time: Array, received: Array, motion: Array, valid: Mask) -> None:
         """Label and draw a stretch without missing samples."""
@@ -226,20 +186,14 @@ class Worker:
         told = self._with_lasting(self._findings.confirmed)
         decided = min(self._findings.decided, self.labeller.decided + self._shift)
         self._news.update(told, decided, float(labels.stop[-1]))
-        labels = replace(labels, label=labels.raw)
-        self.counts.update(labels.label.tolist())
-        changes = self._lane.take(labels)
+        self.counts.update(labels.raw.tolist())
+        self._drawing.labels(labels)
         if self._sink.open:
-            self._drawing.labels(labels)
-            self._drawing.changes(changes)
             last = len(received) - 1 - back
             before = np.minimum(last, 0) / self._rate
             delay = clocks.perf_counter() - received[np.maximum(last, 0)] - before
             self.delays.extend(delay.tolist())
-            found, latest = self.findings, end - 2 * self.labeller.hop
-            # One that reaches the latest frame lasts.
-            lasting = [event for event in found if event.stop >= latest]
-            self._drawing.findings(end, found, lasting)
+            self._drawing.findings(end, self.findings, end - 2 * self.labeller.hop)
 
     def _with_lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
         """Findings of the labels and of what lasts, on the clock of the samples."""
@@ -251,53 +205,10 @@ class Worker:
         return merged(*events, *lasting)
 
     def _tell(self, event: Event, over: bool) -> None:
-        if self._sink.open and not over:
+        if not over:
             self._drawing.found(event)
         if self._on_finding is not None:
             self._on_finding(event, over)
-
-    def _draw_piece(self, time: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
-        """Draw the spectrogram and the levels of links of a stretch without missing samples."""
-        velocity = np.where(valid[:, None], signals["velocity"], 0.0)
-        columns = self._spectrogram.push(velocity, valid, float(time[-1]) + 1.0 / self._rate)
-        if not self._sink.open:
-            return
-        self._drawing.spectrogram(*columns)
-        if self._links is not None and self._robot is not None:
-            for start, level in self._links.push(time, signals):
-                self._robot.colour(start, self._links.links, level)
-
-    def _draw_batch(
-        self, time: Array, motion: Array, valid: Mask, signals: Mapping[str, Array]
-    ) -> None:
-        """Draw the noise of measured and desired velocities side by side, the joints, the robot."""
-        self._drawing.changes(self._lane.expire(self._now))
-        rows = dict(signals)
-        if not valid.all():
-            time, motion = time[valid], motion[valid]
-            rows = {name: signal[valid] for name, signal in signals.items()}
-        self._drawing.lines(time, nm.simplified(motion), rows, len(valid) / self._rate)
-        if self._robot is not None:
-            pose = signals.get("base_pose")
-            last = None if pose is None else pose[-1]
-            self._robot.show(self._now, signals["position"][-1], last)
-
-    def _check_limits(self, signals: Mapping[str, Array]) -> None:
-        """Warn where the motion has been far beyond the limits of the robot for a second."""
-        if self._watch is not None:
-            self._watch.add(signals.get("position"), signals["velocity"])
-            for line in self._watch.warnings(LONG * self._rate):
-                self._warnings.note("joints beyond their limits", line)
-                self._watch = None
-                return
-
-    def _note_unknown(self, time: Array, valid: Mask) -> None:
-        if not valid.all():
-            line = (
-                f"{' or '.join(self._noisy)} is not known at {time[~valid][0]:.3f} s:"
-                " such samples make no noise, frames with one have no label"
-            )
-            self._warnings.note("samples without noise", line, int((~valid).sum()))
 
 
 BATCH = 0.05
@@ -409,11 +320,10 @@ class LiveSession:
         self._rate, self._robot, self._names = rate, robot, tuple(joint_names)
         self._library = load_library() if library is None else library
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
-        self._on_finding, self._keep_levels = on_finding, keep_levels
-        self._on_levels = on_levels
+        self._on_finding, self._on_levels = on_finding, on_levels
+        self._keep_levels = keep_levels or on_levels is not None
         self._latest = -1.0 / rate
-        self._buffer: SampleBuffer | None = None
-        self._worker: Worker | None = None
+        self._worker: tuple[Worker, SampleBuffer] | None = None  # once there are samples
         self._closed = False
         self._sink = Sink(Path(save) if save else None, connect, overwrite=overwrite)
 
@@ -462,14 +372,13 @@ class LiveSession:
         stamps = self._stamps(time, len(rows["velocity"]))
         if not len(stamps):
             return
-        if self._buffer is None or self._worker is None:
-            self._buffer, self._worker = self._begin(rows)
+        worker, buffer = self._worker = self._worker or self._begin(rows)
         taken = 0
         while taken < len(stamps):
             rest = {name: array[taken:] for name, array in rows.items()} if taken else rows
-            taken += self._buffer.put(rest, stamps[taken:], received)
-            if self._buffer.full:
-                self._worker.work(self._buffer)
+            taken += buffer.put(rest, stamps[taken:], received)
+            if buffer.full:
+                worker.work(buffer)
 
     def note(self, kind: str, line: str, count: int = 1) -> None:
         """Count what could not be pushed, and warn if it is the first of its kind."""
@@ -478,9 +387,10 @@ class LiveSession:
     @property
     def summary(self) -> Summary:
         """What became of the samples so far."""
-        worker, buffer, counts = self._worker, self._buffer, self._warnings.counts
-        if worker is None or buffer is None:
+        counts = dict(self._warnings.counts)
+        if self._worker is None:
             return Summary(0, self._rate, "", {}, counts, (), self._sink.where)
+        worker, buffer = self._worker
         labeller, findings = worker.labeller, worker.findings
         samples = worker.samples + buffer.held
         status = status_of(worker.counts.total(), findings)
@@ -510,15 +420,16 @@ class LiveSession:
         if self._closed:
             return self.summary
         self._closed = True
-        if self._worker is None or self._buffer is None:
+        if self._worker is None:
             self._sink.discard()
             return self.summary
+        worker, buffer = self._worker
         try:
-            self._worker.work(self._buffer, ended=True)
-            self._worker.finish()
+            worker.work(buffer, ended=True)
+            worker.finish()
         finally:
             if not self._sink.close():
-                self._worker.note_unseen()
+                worker.note_unseen()
         return self.summary
 
     def __enter__(self) -> Self:
@@ -536,34 +447,43 @@ class LiveSession:
         """Warn the program that began the session, and among the events of the recording."""
         self._on_warning(line)
         if self._worker is not None:
-            self._worker.remark(line)
+            self._worker[0].remark(line)
 
-    def _begin(self, rows: Mapping[str, Array]) -> tuple[SampleBuffer, Worker]:
+    def _begin(self, rows: Mapping[str, Array]) -> tuple[Worker, SampleBuffer]:
         """Fix signals and names by the first samples."""
         widths = widths_of(rows, self._names)
-        if widths["velocity"] > limit("joints"):
-            raise LiveError(f"{widths['velocity']} joints, {beyond('joints')}")
-        names = _names(self._names, self._robot, widths["velocity"])
-        absent = check_joints(names, self._robot)
-        size = max(1, round(BATCH * self._rate))
-        # A file's name is none that a reference knows.
-        robot = "" if self._robot is None or Path(self._robot).suffix else self._robot
+        joints, robot = widths["velocity"], self._robot
+        if joints > limit("joints"):
+            raise LiveError(f"{joints} joints, {beyond('joints')}")
+        names = self._names
+        if not names and robot is None:
+            names = tuple(f"joint{number + 1}" for number in range(joints))
+        elif not names and robot is not None:
+            known = tuple(joint_limits(robot))
+            if len(known) < joints:
+                raise LiveError(
+                    f"{joints} velocities, and {robot} has {len(known)} joints:"
+                    f" {', '.join(known)}; name those of the samples (--names)"
+                )
+            names = known[:joints]
+        absent = check_joints(names, robot)
         stream = None
-        if self._keep_levels or self._on_levels is not None:
-            stream = LevelStream(tuple(names), self._rate, robot, self._on_levels)
+        if self._keep_levels:
+            # A file's name is none that a reference knows.
+            named = "" if robot is None or Path(robot).suffix else robot
+            stream = LevelStream(names, self._rate, named, self._on_levels)
         worker = Worker(
             self._sink,
-            rate=self._rate,
-            robot=self._robot if "position" in widths else None,
-            joint_names=names,
-            widths=widths,
-            library=for_robot(self._library, self._robot),
-            warnings=self._warnings,
-            watch=LimitWatch(names, self._robot) if self._robot else None,
-            stream=stream,
-            on_finding=self._on_finding,
+            self._rate,
+            robot,
+            names,
+            widths,
+            self._library,
+            self._warnings,
+            stream,
+            self._on_finding,
         )
-        if self._robot and "position" not in widths:
+        if robot and "position" not in widths:
             self.note("missing signals", "no positions: the robot is not drawn")
         elif absent:
             line = f"not in the log, assumed stationary: {', '.join(absent)}"
@@ -572,7 +492,8 @@ class LiveSession:
             else:  # which columns are which joints was assumed
                 line = f"taken for {', '.join(names)}; {line} (--names says otherwise)"
                 self.note("joints assumed stationary", line, len(absent))
-        return SampleBuffer(size, widths, self._warnings), worker
+        size = max(1, round(BATCH * self._rate))
+        return worker, SampleBuffer(size, widths, self._warnings)
 
     def _stamps(self, time: ArrayLike | None, samples: int) -> Array:
         if time is None:
@@ -584,18 +505,3 @@ class LiveSession:
         if samples:
             self._latest = float(stamps[-1])
         return stamps
-
-
-def _names(given: Sequence[str], robot: str | None, joints: int) -> tuple[str, ...]:
-    """Name the joints: as they were named, as the robot names them, or by numbers."""
-    if given:
-        return tuple(given)
-    if robot is None:
-        return tuple(f"joint{number + 1}" for number in range(joints))
-    names = tuple(joint_limits(robot))
-    if len(names) < joints:
-        raise LiveError(
-            f"{joints} velocities, and {robot} has {len(names)} joints: {', '.join(names)};"
-            " name those of the samples (--names)"
-        )
-    return names[:joints]

@@ -172,12 +172,8 @@ def _viewer(connect: str | None) -> tuple[str, int]:
             f"no viewer at {host}:{port}, {state}; start one with"
             f" `rerun --bind {HOST} --port PORT`, or use --save FILE.rrd"
         )
-    if not viewer.has_display():
-        raise SinkError(
-            f"no viewer runs at {host}:{port}, and there is no display to open one on;"
-            " use --connect HOST:PORT or --save FILE.rrd"
-        )
-    if problem := viewer.display_problem():
+    nowhere = "" if viewer.has_display() else "there is no display to open one on"
+    if problem := nowhere or viewer.display_problem():
         raise SinkError(
             f"no viewer runs at {host}:{port}, and {problem};"
             " use --connect HOST:PORT or --save FILE.rrd"

@@ -4,6 +4,7 @@ import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -109,23 +110,31 @@ def outwards(tree: UrdfTree) -> Iterator[UrdfJoint]:
 
 def entities(tree: UrdfTree) -> dict[str, str]:
     """The entity to select of each link that moves and is drawn."""
-    found = {}
-    for link, members in moving_links(tree).items():
-        drawn = [path for member in members for path in tree.get_visual_geometry_paths(member)]
-        if drawn:
-            found[link] = drawn[0].rpartition("/")[0]
-    return found
+    drawn = {
+        link: [path for each in own for path in tree.get_visual_geometry_paths(each)]
+        for link, own in moving_links(tree).items()
+    }
+    return {link: paths[0].rpartition("/")[0] for link, paths in drawn.items() if paths}
 
 
-def shapes(tree: UrdfTree) -> dict[str, str]:
-    """The shape of each entity that is drawn, a key of ``COLOURED``."""
-    found = {}
+def shapes_by_link(tree: UrdfTree) -> dict[str, list[tuple[str, str]]]:
+    """What is drawn of each link that moves: entities and their shapes, keys of ``COLOURED``."""
+    kinds = {}
     for chunk in tree.stream().to_chunks():
         for name in chunk.to_record_batch().schema.names:
             shape, _, component = name.partition(":")
             if shape in COLOURED and component != COLOURED[shape]:
-                found[chunk.entity_path] = shape
-    return found
+                kinds[chunk.entity_path] = shape
+    return {
+        link: [(path, kinds[path]) for each in own for path in tree.get_visual_geometry_paths(each)]
+        for link, own in moving_links(tree).items()
+    }
+
+
+def coloured(kind: str, shades: NDArray[np.uint8]) -> Iterable[Any]:
+    """Columns of the colours of a shape, shape (steps, 4)."""
+    columns: Iterable[Any] = getattr(rr, kind).columns(**{COLOURED[kind]: shades})
+    return columns
 
 
 def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run) -> None:
@@ -202,19 +211,18 @@ def log_colours(
         colours: Of each link that moves, shape (steps, 4).
         rest: Colour of the others, such as the base of an arm, shape (1, 4).
     """
-    kinds = shapes(tree)
-    for link, members in moving_links(tree).items():
-        paths = [path for member in members for path in tree.get_visual_geometry_paths(member)]
+    for link, shapes in shapes_by_link(tree).items():
         if link not in colours:
-            for path in paths:
-                colour = {COLOURED[kinds[path]]: rest}
-                recording.log(path, getattr(rr, kinds[path]).from_fields(**colour), static=True)
+            for path, kind in shapes:
+                colour = getattr(rr, kind).from_fields(**{COLOURED[kind]: rest})
+                recording.log(path, colour, static=True)
             continue
         own = colours[link]
         changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
-        for path in paths:
-            columns = getattr(rr, kinds[path]).columns(**{COLOURED[kinds[path]]: own[changed]})
-            recording.send_columns(path, indexes=[axes.at(time[changed])], columns=columns)
+        index = [axes.at(time[changed])]
+        for path, kind in shapes:
+            columns = coloured(kind, own[changed])
+            recording.send_columns(path, indexes=index, columns=columns)
 
 
 STICK = 0.1

@@ -18,7 +18,7 @@ When rerun moves on, this module follows and no other.
 """
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -284,7 +284,8 @@ def log_stretches(
     times = np.array([(start, stop, stop + 1) for start, stop in apart], dtype=np.int64).ravel()
     values = np.tile([middle, middle, np.nan], len(apart))[:, None].repeat(copies, axis=1)
     style_bands(recording, path, [name] * copies, [color] * copies)
-    send_bands(recording, path, times, values, half)
+    index = rr.TimeColumn(TIMELINE, duration=times.astype("timedelta64[ns]"))
+    recording.send_columns(path, indexes=[index], columns=band_columns(values, half))
 
 
 def style_bands(
@@ -293,29 +294,14 @@ def style_bands(
     names: Sequence[str],
     shades: Sequence[tuple[int, int, int]],
 ) -> None:
-    """Log names and colours of bands that `send_bands` draws."""
+    """Log names and colours of bands that `band_columns` draws."""
     style = rr.Measurements.from_fields(names=names, colors=shades, widths=[0.0] * len(names))
     recording.log(path, style, static=True)
 
 
-def send_bands(
-    recording: rr.RecordingStream,
-    path: str,
-    times: NDArray[np.int64],
-    values: Array,
-    half: float,
-) -> None:
-    """Draw bands along a plot, which end where there is no value.
-
-    Args:
-        times: Shape (points,), in [ns].
-        values: Middle of each band, shape (points, bands); NaN draws nothing.
-    """
-    recording.send_columns(
-        path,
-        indexes=[rr.TimeColumn(TIMELINE, duration=times.astype("timedelta64[ns]"))],
-        columns=rr.Measurements.columns(values=values, variances=np.full_like(values, half**2)),
-    )
+def band_columns(middles: Array, half: float) -> Iterable[Any]:
+    """Columns of bands along a plot, shape (points, bands); NaN draws nothing."""
+    return rr.Measurements.columns(values=middles, variances=np.full_like(middles, half**2))
 
 
 def log_up(recording: rr.RecordingStream) -> None:

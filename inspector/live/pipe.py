@@ -1,0 +1,428 @@
+"""The pipe of `inspector live`: rows of text in, a line for each finding out, and the exit status.
+
+Rows are CSV with a header, or a JSON object per line.
+"""
+
+import json
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from datetime import date
+from itertools import chain, groupby
+from math import nan
+from pathlib import Path
+from time import perf_counter, sleep
+from types import FrameType
+from typing import Any, BinaryIO, TypeAlias, TypeVar
+
+import numpy as np
+
+from inspector.errors import EXIT, Status
+from inspector.live.samples import SIGNALS, LiveError
+from inspector.live.session import LiveSession, Summary
+from inspector.logs.clocks import UNITS
+from inspector.logs.csv import numbers_in
+from inspector.logs.names import (
+    TIME_UNITS,
+    Naming,
+    column_signal,
+    factor_of,
+    listed,
+    other_quantity,
+    time_column,
+    without_unit,
+)
+from inspector.reference.judging import GAP
+from inspector.reference.levels import Levels
+from inspector.reference.store import Reference
+from inspector.reference.verdicts import beside, judge
+from inspector.text import program_version
+from inspector.verdict import Evidence, Verdict, counts
+from noiseclassifier import Event
+from noiseclassifier.labels import interval
+from noisemodel.types import Array
+
+Item = TypeVar("Item")
+Rows: TypeAlias = dict[str, Array]
+"""What `LiveSession.push` takes: ``time``, shape (samples,), in [s], if rows have one; signals by
+name, each of shape (samples, columns)."""
+Note: TypeAlias = Callable[[str, str], None]
+"""Called with the kind of a row that cannot be read, and a line about it."""
+
+CHUNK_BYTES = 1 << 18
+"""Bytes that are read at once, if there are so many."""
+MAX_LINE_BYTES = 1 << 24
+SMALL_CHUNK_BYTES = 1 << 15
+"""Below this, reading waits for more: half of what a pipe holds by default."""
+GATHER = 0.02
+"""How long rows wait for more, in [s]: less than half of a session's batch."""
+EXPECTED = "expected a CSV header and rows, or a JSON object per line"
+UNKNOWN = ("", "nan", "null")
+"""Cells of what is not known, in lower case."""
+
+
+def follow(
+    stream: BinaryIO,
+    names: tuple[str, ...],
+    session_of: Callable[[tuple[str, ...]], LiveSession],
+    *,
+    enough: Callable[[], bool] = lambda: False,
+) -> Summary:
+    """Show rows as they arrive, until they end, Ctrl-C is pressed, or there are enough."""
+    widen(stream)
+    with interruptible(chunks(stream, gather=GATHER)) as incoming:
+        lines, number, received = next(incoming, (b"", 1, 0.0))
+        head, _, rest = lines.partition(b"\n")
+        if not head.strip():
+            raise LiveError(f"the input is empty; {EXPECTED}")
+        reader, is_header = reader_of(head, names)
+        start = (rest, number + 1, received) if is_header else (lines, number, received)
+        with session_of(reader.names) as session:
+            for lines, number, received in chain([start], incoming):
+                for rows in reader.read(lines, number, session.note):
+                    session.push(**rows, received=received)
+                if enough():
+                    break
+    if not session.summary.samples:
+        raise LiveError(f"the input has no samples; {EXPECTED}")
+    return session.summary
+
+
+def widen(stream: BinaryIO) -> None:
+    """Set a pipe's buffer to as much as is read at once, so that its writer need not wait."""
+    import fcntl
+
+    with suppress(AttributeError, OSError):  # another system; no pipe
+        fcntl.fcntl(stream.fileno(), fcntl.F_SETPIPE_SZ, CHUNK_BYTES)
+
+
+def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, int, float]]:
+    """Whole lines of a stream as they come, the number of the first, and when they were received.
+
+    Args:
+        gather: How long a small chunk waits for more, in [s]: to read row by row costs most.
+    """
+    read: Callable[[int], bytes] = getattr(stream, "read1", stream.read)
+    rest, number, waited = b"", 1, 0.0
+    while chunk := read(CHUNK_BYTES):
+        received = perf_counter() - waited
+        lines, end, rest = (rest + chunk).rpartition(b"\n")
+        if end:
+            yield lines + end, number, received
+            number += lines.count(b"\n") + 1
+        elif len(rest) > MAX_LINE_BYTES:
+            raise LiveError(
+                f"line {number} is longer than {MAX_LINE_BYTES} bytes: this is no CSV or JSON"
+            )
+        waited = gather if len(chunk) < SMALL_CHUNK_BYTES else 0.0
+        sleep(waited)
+    if rest.strip():
+        yield rest + b"\n", number, perf_counter()
+
+
+@contextmanager
+def interruptible(items: Iterator[Item]) -> Iterator[Iterator[Item]]:
+    """Items until the first Ctrl-C, which does nothing else; a second one raises as usual."""
+    pressed = waits = False
+
+    def press(number: int, frame: FrameType | None) -> None:
+        nonlocal pressed
+        again, pressed = pressed, True
+        if again or waits:
+            raise KeyboardInterrupt
+
+    def handed_out() -> Iterator[Item]:
+        nonlocal waits
+        while not pressed:
+            waits = True
+            try:
+                item = next(items)
+            except (StopIteration, KeyboardInterrupt):
+                return
+            finally:
+                waits = False
+            yield item
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield handed_out()
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def reader_of(
+    head: bytes, names: tuple[str, ...]
+) -> "tuple[CsvReader, bool] | tuple[JsonReader, bool]":
+    """Choose a format by the first line, and say whether that is a header."""
+    if head.lstrip().startswith(b"{"):
+        return JsonReader(names), False
+    return CsvReader(head, names), True
+
+
+class CsvReader:
+    """Reads rows under a header such as ``time,elbow.velocity,elbow.position``.
+
+    Args:
+        names: Names of the joints in the order that is wanted; by default the columns' order.
+    """
+
+    def __init__(self, head: bytes, names: tuple[str, ...]) -> None:
+        text = head.decode("utf-8-sig", errors="replace").strip().lstrip("# ")
+        self._delimiter = next((mark for mark in ",;\t" if mark in text), ",")
+        self._header = [cell.strip() for cell in text.split(self._delimiter)]
+        found: dict[str, dict[str, int]] = {}
+        naming = Naming.of(self._header)
+        for place, column in enumerate(self._header):
+            meaning = column_signal(column, naming)
+            if meaning is None or meaning[0] not in SIGNALS:
+                continue
+            if unit := other_quantity(column, meaning):
+                raise LiveError(
+                    f"column {column!r} is named like {meaning[0]} and has a unit of {unit};"
+                    " rename it"
+                )
+            if factor_of(column) == 1.0:
+                kind, joint = meaning
+                if not isinstance(joint, str):
+                    number = joint - naming.first
+                    joint = names[number] if number < len(names) else f"joint{number + 1}"
+                found.setdefault(kind, {})[joint] = place
+        if "velocity" not in found:
+            raise LiveError(
+                "the header names no velocity; expected columns such as elbow.velocity,"
+                f" they are {listed(self._header)}"
+            )
+        self.names = names or tuple(found["velocity"])
+        self._places: dict[str, list[int] | slice] = {}
+        for kind, by_joint in found.items():
+            if lacking := [name for name in self.names if name not in by_joint]:
+                raise LiveError(f"the header has no {kind} of joint {lacking[0]!r}")
+            places = [by_joint[name] for name in self.names]
+            beside = slice(places[0], places[0] + len(places))  # need not be copied together
+            together = places == list(range(beside.start, beside.stop))
+            self._places[kind] = beside if together else places
+        time = time_column(self._header)
+        self._time = self._header.index(time) if time else None
+        self._second = float(UNITS[TIME_UNITS.get(without_unit(time)[1], "seconds")])
+
+    def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
+        """Read whole lines; those that cannot be read are noted."""
+        columns = range(len(self._header))
+        plain = numbers_in(lines, len(columns), self._delimiter, columns)
+        table = self._read_lines(lines, first, note) if plain is None else plain[0]
+        if len(table):
+            rows = {name: table[:, places] for name, places in self._places.items()}
+            if self._time is not None:
+                rows["time"] = table[:, self._time] * self._second
+            yield rows
+
+    def _read_lines(self, lines: bytes, first: int, note: Note) -> Array:
+        """Read rows one by one, of which some have cells that are empty, padded or no numbers."""
+        rows, width = [], len(self._header)
+        for number, line in enumerate(lines.splitlines(), start=first):
+            if not line.strip():
+                continue
+            cells = line.decode(errors="replace").split(self._delimiter)
+            try:
+                if len(cells) != width:
+                    raise ValueError(f"{len(cells)} cells where the header names {width}")
+                row = [nan if cell.strip().lower() in UNKNOWN else float(cell) for cell in cells]
+                rows.append(row)
+            except ValueError as error:
+                note("malformed rows", f"line {number}: {str(error)[:200]}; such rows are left out")
+                if self._time is None:  # without timestamps, the row alone keeps the time
+                    rows.append([nan] * width)
+        return np.array(rows).reshape(-1, width)
+
+
+class JsonReader:
+    """Reads objects such as ``{"time": 0.1, "velocity": [0.2, 0.3]}``, named as in a run file."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self.names = names
+
+    def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
+        """Read whole lines; those that cannot be read are noted."""
+        samples = []
+        for number, line in enumerate(lines.splitlines(), start=first):
+            if not line.strip():
+                continue
+            try:
+                samples.append(_sample(line))
+            except ValueError as error:
+                note("malformed rows", f"line {number}: {error}; such rows are left out")
+        for widths, group in groupby(
+            samples, key=lambda each: {k: len(v) for k, v in each.items()}
+        ):
+            alike = list(group)
+            rows = {name: np.array([each[name] for each in alike]) for name in widths}
+            if "time" in rows:
+                rows["time"] = rows["time"][:, 0]
+            yield rows
+
+
+def _sample(line: bytes) -> dict[str, list[float]]:
+    """Read one object, its values as lists of numbers."""
+    try:
+        found = json.loads(line, parse_int=float)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+    if not isinstance(found, dict) or "velocity" not in found:
+        raise ValueError("no JSON object with a velocity")
+    if isinstance(found.get("time", 0.0), list) and len(found["time"]) != 1:
+        raise ValueError("time is no single number")
+    numbers = {}
+    for name in ("time", *SIGNALS):
+        if name in found:
+            values = found[name] if isinstance(found[name], list) else [found[name]]
+            if not values:
+                raise ValueError(f"{name} is empty")
+            try:
+                numbers[name] = [nan if each is None else float(each) for each in values]
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{name} holds no numbers") from error
+    return numbers
+
+
+FORMAT = "noise-live/1"
+NAME = Path("live")
+"""What stands for the file of the stream."""
+
+
+class Gate:
+    """Prints findings while they come.
+
+    Args:
+        reference: What the stream is compared with, a stretch after the other while it runs and as
+            a whole at its end; None leaves it to the model.
+
+    Attributes:
+        failed: Whether a finding counts so far.
+    """
+
+    def __init__(
+        self,
+        tell: Callable[[str], None],
+        *,
+        as_json: bool = False,
+        reference: Reference | None = None,
+    ) -> None:
+        self.failed = False
+        self._tell, self._as_json = tell, as_json
+        self._reference = reference
+        self._found: dict[tuple[str, float], Event] = {}
+        self._told: dict[Event, Evidence] = {}
+        self._begin: float | None = None  # of what was compared so far
+        self._heard = 0.0
+
+    def take(self, event: Event, over: bool) -> None:
+        """Print a finding when it is there, and when it is over; beside a reference, keep it."""
+        self._found[event.label, event.start] = event
+        if self._reference is None:
+            verdict = Verdict(NAME, Status.FINDINGS, events=tuple(self._found.values()))
+            self._print(verdict, event, over=over)
+
+    def compare(self, latest: Levels) -> None:
+        """Print the findings in the latest stretch of the stream beside the reference, each once.
+
+        Args:
+            latest: Levels of the last 6 s, 3 s of which have been there before.
+        """
+        if self._begin is None:
+            self._begin = self._heard = latest.start
+        found = tuple(self._found.values())
+        verdict = self._beside(Verdict(NAME, Status.OK, events=found, begin=self._begin), latest)
+        for event in verdict.failing:
+            if event.start > latest.time[-1] or event.stop < latest.start:
+                continue
+            if event.start >= self._heard:
+                self._told[event] = verdict.evidence[event]
+                self._print(verdict, event, over=False)
+            self._heard = max(self._heard, event.stop + GAP)
+
+    def _print(self, verdict: Verdict, event: Event, *, over: bool) -> None:
+        self.failed = self.failed or event in verdict.failing
+        ruled, evidence = verdict.ruled(event), verdict.evidence.get(event)
+        if self._as_json:
+            line: dict[str, Any] = {
+                "event": "end" if over else "begin",
+                "label": event.label,
+                "start": round(event.start, 6),
+                "stop": round(event.stop, 6) if over else None,
+                "score": round(event.score, 6),
+                "novel": event.novel,
+                "fails": ruled.ruling.fails,
+                "ruling": ruled.ruling.value,
+                "reason": ruled.reason,
+            }
+            if evidence is not None:
+                line["evidence"] = evidence.as_dict()
+            self._tell_json(line)
+        elif not over:
+            became = f" ({ruled})" if str(ruled) else f": {evidence}" if evidence else ""
+            self._tell(f"{event.label} from {event.start:.2f} s{event.novelty}{became}")
+
+    def _tell_json(self, line: dict[str, Any]) -> None:
+        self._tell(json.dumps({"format": FORMAT, **line}))
+
+    def end(self, summary: Summary) -> int:
+        """Print what became of the stream."""
+        verdict, duration = self._verdict(summary), summary.samples / summary.rate
+        if self._as_json:
+            line = {
+                "event": "summary",
+                "version": program_version(),
+                "status": verdict.status.value,
+                "exit_status": EXIT[verdict.status],
+                "reason": summary.reason if verdict.status is Status.CANNOT_TELL else "",
+                "model": summary.model,
+                "samples": summary.samples,
+                "duration": round(duration, 6),
+                "frames": dict(summary.labels),
+                "counts": counts([verdict])["findings"],
+                "missing": [str(each) for each in verdict.missing],
+                "warnings": dict(summary.warnings),
+                "where": summary.where,
+            }
+            if self._reference is not None:
+                known = verdict.as_dict()
+                line |= {"reference": known["reference"], "findings": known["events"]}
+            self._tell_json(line)
+            return EXIT[verdict.status]
+        shown = summary.findings if self._reference is None else verdict.failing
+        self._tell(str(replace(summary, status=verdict.status, findings=shown)))
+        counted = {event: e for event, e in verdict.evidence.items() if not e.excused}
+        for event, evidence in counted.items():
+            span = interval(event.start, event.stop)
+            self._tell(f"  {event.label} from {span}: {evidence}")
+        for event in verdict.excused:
+            span = interval(event.start, event.stop)
+            self._tell(f"  {event.label} from {span} does not count: {verdict.ruled(event)}")
+        for missing in verdict.missing:
+            self._tell(f"  {missing}")
+        if verdict.beside is not None:
+            self._tell(f"compared with {verdict.beside.path}: {verdict.beside.words}")
+        return EXIT[verdict.status]
+
+    def _verdict(self, summary: Summary) -> Verdict:
+        """The verdict on the whole stream."""
+        duration, events = summary.samples / summary.rate, tuple(summary.findings)
+        verdict = Verdict(NAME, summary.status, summary.model, events, duration=duration)
+        if self._reference is None or (summary.levels is None and self._begin is None):
+            return verdict
+        if summary.levels is None:  # too long to be compared as a whole
+            status = Status.FINDINGS if self._told else Status.OK
+            told = dict(self._told)
+            verdict = replace(verdict, status=status, events=tuple(told), evidence=told)
+        else:
+            verdict = replace(verdict, begin=summary.levels.start)
+            verdict = self._beside(verdict, summary.levels)
+        if summary.status is Status.CANNOT_TELL and summary.model and verdict.status is Status.OK:
+            return replace(verdict, status=Status.CANNOT_TELL)  # too little of it was seen
+        return verdict
+
+    def _beside(self, verdict: Verdict, levels: Levels) -> Verdict:
+        assert self._reference is not None
+        verdict = beside(verdict, self._reference.compare(levels), self._reference)
+        return judge(verdict, self._reference, today=date.today())
