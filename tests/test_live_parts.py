@@ -12,7 +12,7 @@ from inspector.live.drawing import LinkLevels, LiveRobot, Messages, SpectrogramS
 from inspector.live.labels import Decimator, Labeller, noise_signal
 from inspector.live.samples import Clock, Warnings
 from inspector.recording import robot as scene
-from inspector.recording.camera import FIELD_OF_VIEW, sight
+from inspector.recording.robot import FIELD_OF_VIEW, sight
 from noisemodel.noise import link_noise
 
 

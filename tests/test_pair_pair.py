@@ -3,13 +3,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inspector.compare.changes import (
+from inspector.compare.pair import (
+    Align,
+    PairError,
+    align,
+    alike,
     by_band,
     by_class,
     by_link,
     changes,
+    compare,
     largest_change,
     link_steps,
+    part,
     report,
     shared_links,
     spectra,
@@ -17,7 +23,6 @@ from inspector.compare.changes import (
     summary,
     whole,
 )
-from inspector.compare.pair import Align, PairError, align, alike, compare, part
 from inspector.compare.recording import write
 from inspector.library import demo_run, load_library, model_files
 from noiseclassifier import Event, Labels

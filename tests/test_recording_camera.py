@@ -12,9 +12,8 @@ from rerun.chunk import RrdReader
 from test_noisemodel_mjcf import ARM, LEGS, written
 
 from inspector.analysis import analyse_file
-from inspector.recording import camera as cameras
 from inspector.recording import robot as scene
-from inspector.recording.camera import FIELD_OF_VIEW, fitted
+from inspector.recording.robot import FIELD_OF_VIEW, fitted
 from inspector.recording.run import write
 from noisemodel import Robot, Run
 from noisemodel.surface import pieces
@@ -181,7 +180,7 @@ def test_a_robot_without_shapes_is_drawn_as_sticks_from_joint_to_joint(tmp_path)
     (tmp_path / "out").mkdir()
     tree = scene.load(str(path), tmp_path / "out")
     assert set(kinds(tree)) == {"Ellipsoids3D", "Cylinders3D"}
-    outermost = cameras.outermost(scene.drawn_file(str(path), tmp_path / "out"))
+    outermost = scene.outermost(scene.drawn_file(str(path), tmp_path / "out"))
     stick = outermost["a"]
     assert (stick @ [0.0, 0.6, 0.8]).max() == pytest.approx(0.5)  # ends at the next joint
 

@@ -308,8 +308,7 @@ def _one(runs: list["Opened"], target: Path, request: Request) -> float:
 
 def _two(runs: list["Opened"], target: Path, request: Request) -> None:
     """Write the recording of a run before and after a change."""
-    from inspector.compare.changes import changes, summary
-    from inspector.compare.pair import Align, compare
+    from inspector.compare.pair import Align, changes, compare, summary
     from inspector.compare.recording import write
 
     before, after = runs

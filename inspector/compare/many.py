@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from inspector import colors, levels
 from inspector.analysis import Analysis, analyse
@@ -30,22 +29,14 @@ from noisemodel.types import Array
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """Runs that are laid side by side.
-
-    Attributes:
-        names: What each is called; no two are alike.
-        sides: Each with what was found in it, in the order in which they were given.
-    """
+    """Runs that are laid side by side, by names of which no two are alike."""
 
     names: tuple[str, ...]
     sides: tuple[Analysis, ...]
 
     @cached_property
     def levels(self) -> tuple[tuple[Array, Array], ...]:
-        """Of each run, starts of steps of 50 ms in [s], and levels above 10 Hz there.
-
-        In [dB re 1 rad/s], each of shape (steps,); NaN in gaps.
-        """
+        """Of each run, starts of steps of 50 ms in [s], and levels above 10 Hz; NaN in gaps."""
         found = []
         for side in self.sides:
             run, noise = side.run, side.noise[:, None]
@@ -60,10 +51,7 @@ class Several:
 
     @cached_property
     def order(self) -> tuple[int, ...]:
-        """Indices of the runs, the worst first.
-
-        The worst has findings for the longest time; among runs alike in that, the loudest counts.
-        """
+        """Indices of the runs: those with findings for longest first, then the loudest."""
         return tuple(sorted(range(len(self.sides)), key=lambda i: (-self.found(i), -self.peaks[i])))
 
     def found(self, index: int) -> float:
@@ -125,7 +113,7 @@ LINE = 8.0
 LETTERS = 16
 """Most letters of a name beside a row."""
 SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"
-"""The markers of `classes.MARKERS` as text."""
+"""The markers of `panels.MARKERS` as text."""
 
 
 def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
@@ -183,19 +171,15 @@ def report(several: Several) -> str:
         found = ", ".join(f"{number} {label}" for label, number in count.items())
         lines.append(f"| {shown} | {found or side.status} | {several.peaks[index]:.0f} |")
     lines += ["", "Peak of the level above 10 Hz, in dB re 1 rad/s."]
-    remarks = Counter(
-        remark for side in several.sides for remark in dict.fromkeys(map(spoken, side.remarks))
-    )
+    remarks: dict[str, list[str]] = {}
+    for name, side in zip(several.names, several.sides, strict=True):
+        for remark in dict.fromkeys(map(spoken, side.remarks)):
+            remarks.setdefault(remark, []).append(name)
     told = [
-        f"- {remark} ({f'{number} runs' if number > 1 else _of(several, remark)})"
-        for remark, number in remarks.items()
+        f"- {remark} ({f'{len(who)} runs' if len(who) > 1 else who[0]})"
+        for remark, who in remarks.items()
     ]
     return "\n".join([*lines, *(["", "**Remarks**", "", *told] if told else [])]) + "\n"
-
-
-def _of(several: Several, remark: str) -> str:
-    sides = zip(several.names, several.sides, strict=True)
-    return next(name for name, side in sides if remark in map(spoken, side.remarks))
 
 
 def _height(count: int) -> float:
@@ -222,20 +206,11 @@ def _ending(name: str) -> str:
     return name if len(name) <= LETTERS else f"\u2026{name[1 - LETTERS :]}"
 
 
-def _log_rows(
-    recording: rr.RecordingStream,
-    several: Several,
-    panel: Panel,
-    edges: Array,
-    rgba: NDArray[np.uint8],
-    names: Sequence[str],
-) -> None:
-    """Log a row of colours for each run."""
+def _lines(several: Several, panel: Panel) -> tuple[float, int]:
+    """Width and number of the lines that make a run's row."""
     height = (panel.height - axes.AXIS) / len(several.names)
     lines = max(1, int(height / LINE))
-    width = 0.8 * height if lines == 1 else height / (lines + 1) + 1.0
-    path = "/class/found" if panel.name == "class" else f"/{panel.name}"
-    axes.log_rows(recording, path, edges, rgba, names=names, width=width, lines=lines)
+    return 0.8 * height if lines == 1 else height / (lines + 1) + 1.0, lines
 
 
 def _names(several: Several, panel: Panel) -> list[Label]:
@@ -262,7 +237,9 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
         for start, stop, name in lane:
             first, last = np.searchsorted(edges, (start, stop))
             rgba[row, first:last] = (*colours[name], 255)
-    _log_rows(recording, several, panel, edges, rgba, several.names)
+    width, lines = _lines(several, panel)
+    path, names = "/class/found", several.names
+    axes.log_rows(recording, path, edges, rgba, names=names, width=width, lines=lines)
     failing = list(dict.fromkeys(e.label for side in several.sides for e in side.findings))
     places = axes.middles(len(lanes))
     for number, name in enumerate(failing):
@@ -274,7 +251,6 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
         ]
         time, place = zip(*sorted(marks), strict=True)
         panels.log_marks(recording, name, number, axes.INK, time, place)
-    axes.log_left(recording, panel, _names(several, panel))
     shown = [*failing, "ok"]
     key = [
         Label(
@@ -286,7 +262,7 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
         )
         for row, name in enumerate(shown)
     ]
-    axes.log_right(recording, panel, key)
+    axes.log_beside(recording, panel, _names(several, panel), key)
     return axes.timed(panel, name="Classes")
 
 
@@ -300,12 +276,19 @@ def _log_levels(
         edges = np.array([span[0], span[0] + step])
     found = np.stack([_columns(time, level, edges) for time, level in several.levels])
     scale = levels.JOINTS.following(found)
-    rgba = scale.colours(np.nan_to_num(found, nan=-np.inf), shades=axes.SHADES)
-    rgba[np.isnan(found)] = axes.EMPTY
-    called = [f"{name} [{scale.unit}]" for name in several.names]
-    _log_rows(recording, several, panel, edges, rgba, called)
-    axes.log_left(recording, panel, _names(several, panel))
-    axes.log_scale(recording, panel, scale)
+    width, lines = _lines(several, panel)
+    axes.log_levels(
+        recording,
+        panel,
+        edges,
+        found,
+        scale,
+        _names(several, panel),
+        path="/levels",
+        names=[f"{name} [{scale.unit}]" for name in several.names],
+        width=width,
+        lines=lines,
+    )
     return axes.timed(panel, name="Level above 10 Hz")
 
 
@@ -323,11 +306,7 @@ def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -
         time, level = several.levels[index]
         path, name = f"/curves/{index:03d}", several.names[index]
         axes.log_line(recording, path, time, level, color, name=name)
-    title = Label(0.62, "above 10 Hz\n[dB re\n1 rad/s]", -22.0)
-    panels.log_level_axis(recording, panel, title)
-    more = len(several.names) > len(chosen)
-    axes.log_right(
-        recording, panel, [Label(0.5, f"the worst\n{CURVES} runs" if more else "all runs")]
-    )
+    told = f"the worst\n{CURVES} runs" if len(several.names) > len(chosen) else "all runs"
+    axes.log_beside(recording, panel, panels.level_axis(), [Label(0.5, told)])
     paths, ends = ("$origin/**",), (LOW_DB, HIGH_DB)
     return axes.timed(panel, title="", between=ends, paths=paths, legend=True)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from rerun.blueprint import Blueprint
 
 from inspector import colors
 from inspector.errors import InspectorError
@@ -60,32 +59,29 @@ WHOLE, WIDE, TITLES = 832.0, 720.0, 28.0
 
 
 def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
-    """Write comparisons as one recording, whole or not at all."""
+    """Write comparisons as one recording, whole or not at all: heat maps, table, tabs of robots."""
     text = str(found)
     # The same comparison has the same id: opened again, it replaces itself in the viewer.
     identity = hashlib.sha256("\n".join([text, *(one.name for one in found)]).encode())
     with writing(path, identity.hexdigest(), overwrite=overwrite) as recording:
-        recording.send_blueprint(layout(found))  # takes the place of an older layout
-        for name in MAPS:
-            _log_map(recording, found, name)
+        maps = [(_log_map(recording, found, name), 1.0) for name in MAPS]
         begin, end = min(one.time[0] for one in found), max(one.time[-1] for one in found)
         axes.log_span(recording, float(begin), float(end))
-        for one in found:
-            _log(recording, one)
+        robots = [_log_robot(recording, one) for one in found]
         document = rr.TextDocument(f"```\n{text}\n```", media_type="text/markdown")
         recording.log("/report", document, static=True)
         recording.send_recording_name(f"noise models: {', '.join(one.name for one in found)}")
+        # A map is as wide as half of the window: its cells are larger or smaller than drawn.
+        grown = WIDE / (NAMED[0] + CELL[0] * len(found[0].kinds))
+        share = min(grown * (max(len(found), 3) * CELL[1] + NAMED[1]) + 2 * TITLES, 520.0)
+        table = (unstable.text("Table", "/report"), WHOLE - share)
+        overview = unstable.above((unstable.beside(*maps), share), table, name="Robots")
+        whole = unstable.tabs(overview, *robots)
+        recording.send_blueprint(unstable.blueprint(whole))  # instead of an older layout
 
 
 def levels(one: Comparison, pressure: Array) -> tuple[Array, Array]:
-    """Level of each estimate every 10 ms, relative to its own root mean square.
-
-    Args:
-        pressure: Its pressures, or a part of them, shape (kinds, samples).
-
-    Returns:
-        Centres of the steps, shape (steps,), in [s], and levels, shape (steps, kinds), in [dB].
-    """
+    """Centres of steps of 10 ms, and levels relative to the rms of each, shape (steps, kinds)."""
     size = max(1, round(STEP * one.rate))
     firsts = np.arange(0, len(one.time), size)
     counts = np.diff(np.append(firsts, len(one.time)))
@@ -95,45 +91,13 @@ def levels(one: Comparison, pressure: Array) -> tuple[Array, Array]:
     return one.time[firsts] + counts / 2 / one.rate, np.maximum(level, FLOOR_DB)
 
 
-def layout(found: Comparisons) -> Blueprint:
-    """Lay out a recording: heat maps and table first, then one tab per robot."""
-    reference = found[0].kinds[found[0].reference]
-    columns, rows = len(found[0].kinds), len(found)
-    across, down = (-NAMED[0], CELL[0] * columns), (-NAMED[1], CELL[1] * rows)
-    maps: list[tuple[Part, float]] = [
-        (
-            unstable.picture(
-                title.format(f"\u2018{reference}\u2019"), f"/overview/{name}", across, down
-            ),
-            1.0,
-        )
-        for name, title in MAPS.items()
-    ]
-    table = unstable.text("Table", "/report")
-    # A map is as wide as half of the window: its cells are larger or smaller than drawn.
-    grown = WIDE / (NAMED[0] + CELL[0] * columns)
-    share = min(grown * (max(rows, 3) * CELL[1] + NAMED[1]) + 2 * TITLES, 520.0)
-    overview = unstable.above(
-        (unstable.beside(*maps), share), (table, WHOLE - share), name="Robots"
-    )
-    return unstable.blueprint(unstable.tabs(overview, *map(_robot, found)))
-
-
 def cells(found: Comparisons, name: str) -> Array:
-    """The numbers of a heat map.
-
-    Args:
-        name: "correlation" of the envelopes or "distance" of the spectra in [dB], to the reference.
-    """
+    """Correlations with the reference, or distances to it in [dB], shape (robots, kinds)."""
     return np.stack([getattr(one, name)[:, one.reference] for one in found])
 
 
 def shades(numbers: Array, name: str) -> NDArray[np.uint8]:
-    """Colour the numbers of a heat map: the farther from the reference, the lighter.
-
-    Returns:
-        Red, green and blue, shape (robots, kinds, 3); NaN has the background's.
-    """
+    """Colour the numbers of a heat map: the farther from the reference, the lighter."""
     far = 1.0 - numbers if name == "correlation" else numbers / WORST_DB
     rgb = colors.heat(LIGHTEST * np.clip(np.nan_to_num(far), 0.0, 1.0))[..., :3]
     return np.where(
@@ -141,37 +105,30 @@ def shades(numbers: Array, name: str) -> NDArray[np.uint8]:
     )
 
 
-def _log_map(recording: rr.RecordingStream, found: Comparisons, name: str) -> None:
+def _log_map(recording: rr.RecordingStream, found: Comparisons, name: str) -> Part:
     """Log a heat map, robots by kinds, with its numbers."""
-    numbers = cells(found, name)
-    image = shades(numbers, name).repeat(CELL[1] - 2, axis=0).repeat(CELL[0] - 2, axis=1)
-    framed = np.zeros((len(found), CELL[1], len(found[0].kinds), CELL[0], 3), dtype=np.uint8)
-    framed[:] = colors.BACKGROUNDS[0]
-    shape = (len(found), CELL[1] - 2, len(found[0].kinds), CELL[0] - 2, 3)
-    framed[:, 1:-1, :, 1:-1] = image.reshape(shape)
-    size = (len(found) * CELL[1], len(found[0].kinds) * CELL[0], 3)
+    (width, height), kinds, numbers = CELL, found[0].kinds, cells(found, name)
+    image = shades(numbers, name).repeat(height, axis=0).repeat(width, axis=1)
+    for edge in (0, -1):  # so that cells stand apart
+        image[edge % height :: height] = colors.BACKGROUNDS[0]
+        image[:, edge % width :: width] = colors.BACKGROUNDS[0]
     path = f"/overview/{name}"
-    recording.log(f"{path}/cells", rr.Image(framed.reshape(size)), static=True)
-    texts, places = [], []
+    recording.log(f"{path}/cells", rr.Image(image), static=True)
+    written = []
     for row, one in enumerate(found):
-        y = CELL[1] * (row + 0.5)
-        texts.append(_short(one.name))
-        places.append((-NAMED[0] / 2, y))
+        y = height * (row + 0.5)
+        written.append((-NAMED[0] / 2, y, _short(one.name)))
         for column, number in enumerate(numbers[row].tolist()):
             if not np.isnan(number):
-                texts.append(f"{number:.2f}" if name == "correlation" else f"{number:.1f}")
-                places.append((CELL[0] * (column + 0.5), y))
-    for column, kind in enumerate(found[0].kinds):
-        texts.append(kind)
-        places.append((CELL[0] * (column + 0.5), -NAMED[1] / 2))
-    labels = rr.Points2D(
-        [(x, y - axes.TEXT) for x, y in places],
-        labels=texts,
-        colors=[axes.INK] * len(texts),
-        radii=rr.Radius.ui_points(0.0),
-        show_labels=True,
-    )
+                text = f"{number:.2f}" if name == "correlation" else f"{number:.1f}"
+                written.append((width * (column + 0.5), y, text))
+    written += [(width * (i + 0.5), -NAMED[1] / 2, kind) for i, kind in enumerate(kinds)]
+    places = [(x, y - axes.TEXT) for x, y, _ in written]
+    labels = axes.texts(places, [text for *_, text in written], [axes.INK] * len(written))
     recording.log(f"{path}/numbers", labels, static=True)
+    title = MAPS[name].format(f"\u2018{kinds[found[0].reference]}\u2019")
+    across, down = (-NAMED[0], width * len(kinds)), (-NAMED[1], height * len(found))
+    return unstable.picture(title, path, across, down)
 
 
 def _short(name: str) -> str:
@@ -180,64 +137,44 @@ def _short(name: str) -> str:
     return stem if len(stem) <= 18 else f"\u2026{stem[-17:]}"
 
 
-def _log(recording: rr.RecordingStream, one: Comparison) -> None:
+def _log_robot(recording: rr.RecordingStream, one: Comparison) -> Part:
+    """Log the events, levels and spectrograms of a robot or run; its tab."""
+    root = f"/{rr.escape_entity_path_part(one.name)}"
+    labels = tuple(dict.fromkeys(event.label for event in one.events))
+    panel = Panel(f"{root[1:]}/events", 20.0 * max(len(labels), 2) + axes.AXIS)
+    states = colors.of_series(len(labels))
+    for row, (label, state) in enumerate(zip(labels, states, strict=True)):
+        own = [(event.start, event.stop) for event in one.events if event.label == label]
+        path, place = f"{root}/events/{label}", (row, len(labels))
+        axes.log_row(recording, path, label, own, state, place, (0.15, 0.85))
+    left = axes.row_labels(labels) or [Label(0.5, "no events")]
+    axes.log_beside(recording, panel, left, [Label(0.5, "events")])
+    parts = [axes.timed(panel, title="")]
+    height = (WHOLE - panel.height - HEIGHT - 2 * TITLES) / 2
     whole = np.ones(len(one.time), dtype=bool)
     pressures = {"vibration": vibrating(one.pressure.T, whole, one.rate).T, "level": one.pressure}
     shown = dict(zip(one.kinds, colors.of_series(len(one.kinds)), strict=True))
+    named = [
+        Label(1.0 - (row + 0.5) / max(len(shown), 6), kind, color=color)
+        for row, (kind, color) in enumerate(shown.items())
+    ]
     for part, pressure in pressures.items():
         time, level = levels(one, pressure)
         for index, (kind, color) in enumerate(shown.items()):
-            axes.log_line(
-                recording, f"{_root(one)}/{part}/{kind}", time, level[:, index], color, name=kind
-            )
-        panel = _panel(one, part)
-        axes.log_left(recording, panel, [Label(0.5, f"{PARTS[part]}\n[dB re its rms]")])
-        named = [
-            Label(1.0 - (row + 0.5) / max(len(shown), 6), kind, color=color)
-            for row, (kind, color) in enumerate(shown.items())
-        ]
-        axes.log_right(recording, panel, named)
+            path = f"{root}/{part}/{kind}"
+            axes.log_line(recording, path, time, level[:, index], color, name=kind)
+        panel, title = Panel(f"{root[1:]}/{part}", height), f"{PARTS[part]}\n[dB re its rms]"
+        axes.log_beside(recording, panel, [Label(0.5, title)], named)
+        parts.append(axes.timed(panel, title="", between=RANGE_DB))
+    spectrograms = []
     for kind, pressure in zip(one.kinds, one.pressure, strict=True):
         spectrum = spectrogram(pressure, one.rate, start=float(one.time[0]), valid=whole)
-        log_panel(recording, _panel(one, f"spectrogram/{kind}"), spectrum, SPECTRUM, kind)
-    labels = tuple(dict.fromkeys(event.label for event in one.events))
-    states = dict(zip(labels, colors.of_series(len(labels)), strict=True))
-    panel = _panel(one, "events")
-    for row, label in enumerate(labels):
-        own = [(event.start, event.stop) for event in one.events if event.label == label]
-        path, place = f"{_root(one)}/events/{label}", (row, len(labels))
-        axes.log_row(recording, path, label, own, states[label], place, (0.15, 0.85))
-    axes.log_left(recording, panel, axes.row_labels(labels) or [Label(0.5, "no events")])
-    axes.log_right(recording, panel, [Label(0.5, "events")])
-
-
-def _panel(one: Comparison, part: str) -> Panel:
-    """A panel of a robot, by what lies below the robot's entity."""
-    labels = len(dict.fromkeys(event.label for event in one.events))
-    events = 20.0 * max(labels, 2) + axes.AXIS
-    curves = (WHOLE - events - HEIGHT - 2 * TITLES) / 2
-    height = {"events": events, "vibration": curves, "level": curves}
-    return Panel(f"{_root(one)[1:]}/{part}", height.get(part, HEIGHT))
-
-
-def _robot(one: Comparison) -> Part:
-    """The tab of a robot or run: events, levels and spectrograms."""
-    ends = {"events": (0.0, axes.TOP), "vibration": RANGE_DB, "level": RANGE_DB}
-    parts = [
-        axes.timed(_panel(one, part), title="", between=between) for part, between in ends.items()
-    ]
-    spectrograms = [
-        axes.timed(_panel(one, f"spectrogram/{kind}"), title="", name=kind, paths=("$origin/**",))[
-            0
-        ]
-        for kind in one.kinds
-    ]
+        panel = Panel(f"{root[1:]}/spectrogram/{kind}", HEIGHT)
+        log_panel(recording, panel, spectrum, SPECTRUM, kind)
+        plot, _ = axes.timed(panel, title="", name=kind, paths=("$origin/**",))
+        spectrograms.append(plot)
     details = (unstable.tabs(*spectrograms), HEIGHT + TITLES)
     return unstable.above(*parts, details, name=_short(one.name))
-
-
-def _root(one: Comparison) -> str:
-    return f"/{rr.escape_entity_path_part(one.name)}"
 
 
 MOST = 8
@@ -246,14 +183,7 @@ MOST = 8
 
 @dataclass(frozen=True)
 class Outputs:
-    """What to write; None is not written.
-
-    Attributes:
-        csv: All numbers.
-        recording: For the viewer.
-        picture: A PNG file.
-        overwrite: Whether files that exist may be replaced.
-    """
+    """Which files to write; None is not written."""
 
     csv: Path | None = None
     recording: Path | None = None

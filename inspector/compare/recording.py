@@ -12,9 +12,14 @@ from rerun.urdf import UrdfTree
 
 from inspector import colors
 from inspector.analysis import Analysis, worst_joint
-from inspector.compare.changes import (
+from inspector.compare.pair import (
+    LOUDER,
     NEW,
+    QUIETER,
+    RESOLVED,
+    UNCHANGED,
     Change,
+    Pair,
     by_link,
     changes,
     largest_change,
@@ -25,41 +30,26 @@ from inspector.compare.changes import (
     verdict,
     whole,
 )
-from inspector.compare.pair import Pair
 from inspector.errors import InspectorError
 from inspector.export.sound import SMALL_RATE, common_gain, sound_of
-from inspector.levels import LINKS, SPECTRUM, extremes, link_levels
-from inspector.recording import axes, robot, unstable
+from inspector.levels import LINKS, SPECTRUM, link_levels
+from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.axes import Label, Panel, Timed
-from inspector.recording.camera import log_cameras
-from inspector.recording.panels import (
-    AFTER,
-    BEFORE,
-    CHANGE,
-    HIGH_DB,
-    LOW_DB,
-    SHADES,
-    Signal,
-    found_stretches,
-    in_levels,
-    limb_tabs,
-    limbs,
-    log_class,
-    log_heat,
-    log_level_axis,
-    log_power,
-    log_robot_levels,
-    log_signal,
-    scaled,
-    signal_plot,
-    signals,
-)
+from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Drawn, Signal, found_stretches
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.findings import classes_of, spoken
 from noisemodel.run import part
 
-SIDE_COLORS = {"before": BEFORE, "after": AFTER}
+SIDE_COLORS = {"before": panels.BEFORE, "after": panels.AFTER}
+SHADES = {
+    NEW: panels.AFTER,
+    LOUDER: panels.AFTER,
+    RESOLVED: panels.BEFORE,
+    QUIETER: panels.BEFORE,
+    UNCHANGED: axes.INK,
+}
+"""Of changes: the colour of the run that has them."""
 
 NOISE_POINTS = 60_000
 """Of each run's noise."""
@@ -73,26 +63,26 @@ SPAN_DB = 24.0
 def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> list[Timed]:
     """Log both levels every 50 ms, and their change, with what changed shaded."""
     time, level = steps(pair)
-    log_shades(recording, "/level/change", found, (LOW_DB, HIGH_DB))
+    changed = [(change.kind, change.start, change.stop) for change in found]
+    styles = {kind: (kind, shade) for kind, shade in SHADES.items()}
+    panels.log_shades(recording, "/level/change", changed, styles, (LOW_DB, HIGH_DB))
     for place, (name, _) in enumerate(pair.sides):
         axes.log_line(recording, f"/level/{name}", time, level[:, place], SIDE_COLORS[name])
-    title = Label(0.62, "above 10 Hz\n[dB re\n1 rad/s]", -22.0)
-    log_level_axis(recording, LEVEL, title)
-    axes.log_right(recording, LEVEL, _sides())
+    axes.log_beside(recording, LEVEL, panels.level_axis(), _sides())
     change = level[:, 1] - level[:, 0]
     peak = float(change[np.abs(change).argmax()])
     reach = SPAN_DB * max(float(np.ceil(abs(peak) / SPAN_DB)), 1.0)
     axes.log_line(recording, "/change/noise", time, change, axes.INK)
     nothing = colors.CLASSES["unknown"]
     axes.log_line(recording, "/change/none", time[[0, -1]], np.zeros(2), nothing)
-    log_shades(recording, "/change/finding", found, (-reach, reach))
+    panels.log_shades(recording, "/change/finding", changed, styles, (-reach, reach))
     marks = [
         Label(0.5 + mark / reach / 2, axes.written(mark), 44.0)
         for mark in (-reach / 2, 0.0, reach / 2)
     ]
-    axes.log_left(recording, CHANGED, [Label(0.6, "change\n[dB]", -22.0), *marks])
     signed = f"{peak:+.0f}".replace("-", "\u2212").replace("+0", "0")
-    axes.log_right(recording, CHANGED, [Label(0.5, f"largest\n{signed}")])
+    left, right = [Label(0.6, "change\n[dB]", -22.0), *marks], [Label(0.5, f"largest\n{signed}")]
+    axes.log_beside(recording, CHANGED, left, right)
     return [
         axes.timed(LEVEL, title="Level", between=(LOW_DB, HIGH_DB)),
         axes.timed(CHANGED, title="Change", between=(-reach, reach), paths=CHANGE_PATHS),
@@ -104,7 +94,7 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[P
     both = spectra(pair, joint)
     if not len(both[0].time):
         return []
-    edges, level = in_levels(both[0])[0], [in_levels(each)[1] for each in both]
+    edges, level = panels.in_levels(both[0])[0], [panels.in_levels(each)[1] for each in both]
     scale = SPECTRUM.following(np.stack(level))
     level = [np.maximum(each, scale.low) for each in level]
     shown = {
@@ -116,103 +106,65 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[P
     for what, (values, own) in shown.items():
         panel = Panel(f"spectrum_{what}", DETAILS)
         path, title = f"/spectrogram/{what}", f"{joint or 'noise'}\n{what}"
-        shades = SHADES if own is CHANGE else axes.SHADES
-        log_heat(recording, panel, path, both[0].time, edges, values, own, title, shades=shades)
+        shades = panels.SHADES if own is CHANGE else axes.SHADES
+        time = both[0].time
+        panels.log_heat(recording, panel, path, time, edges, values, own, title, shades=shades)
         name = f"Spectrum{', ' if what == 'change' else ' '}{what}"
         parts.append(axes.timed(panel, path, name=name)[0])
     return parts
 
 
-def log_noise(recording: rr.RecordingStream, pair: Pair) -> list[Part]:
+def log_noise(recording: rr.RecordingStream, pair: Pair) -> Part:
     """Log both noises, and the sound powers of all links."""
-    loudest = np.concatenate([side.noise[side.run.mask] for _, side in pair.sides])
-    scale, unit = scaled(loudest)
-    for name, side in pair.sides:
-        mask = side.run.mask
-        time, values = extremes(
-            pair.time[mask], side.noise[mask, None] / scale, points=NOISE_POINTS
-        )
-        axes.log_line(recording, f"/noise/{name}", time, values[:, 0], SIDE_COLORS[name])
+    sides, shades = dict(pair.sides), list(SIDE_COLORS.values())
+    ends = panels.log_noise(recording, NOISE_PANEL, sides, shades, _sides(), NOISE_POINTS)
+    for (name, side), shade in zip(sides.items(), shades, strict=True):
         if side.links is not None:
-            log_power(recording, f"/power/{name}", side.links, side.links.total, SIDE_COLORS[name])
-    axes.log_left(recording, NOISE_PANEL, [Label(0.5, f"noise p\u0302\n[{unit}]")])
-    axes.log_right(recording, NOISE_PANEL, _sides())
-    between = (0.0, 1.08 * max(float(loudest.max(initial=0.0)) / scale, 0.01))
-    return [axes.timed(NOISE_PANEL, title="Noise", name="Noise", between=between)[0]]
+            panels.log_power(recording, f"/power/{name}", side.links, side.links.total, shade)
+    return axes.timed(NOISE_PANEL, title="Noise", name="Noise", between=ends)[0]
 
 
-def _sides() -> list[Label]:
+def _sides(*places: float) -> list[Label]:
     return [
-        Label(place, name, color=SIDE_COLORS[name])
-        for place, name in ((0.75, "before"), (0.4, "after"))
+        Label(place, name, color=color)
+        for place, (name, color) in zip(places or (0.75, 0.4), SIDE_COLORS.items(), strict=True)
     ]
 
 
 ROW, LEAST = 26.0, 50.0
 """Height of a class, and of all of them at least, in points."""
-FOUND = {"before": (0.06, 0.34), "after": (0.52, 0.80)}
-ANNOTATED = {"before": (0.37, 0.45), "after": (0.83, 0.91)}
-"""From where to where in its row each side is drawn, from above."""
+BETWEEN = {"before": ((0.06, 0.34), (0.37, 0.45)), "after": ((0.52, 0.80), (0.83, 0.91))}
+"""From where to where in its row what was found and annotated is drawn, from above."""
 
 
 def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Timed:
     """Log found and annotated classes, and the changes."""
-    names = [name for name in dict.fromkeys(_every(pair)) if name != "ok"]
+    occur = {
+        name: None
+        for _, one in pair.sides
+        for name in classes_of(one)
+        if name != "ok" and any(_occurs(side, name) for _, side in pair.sides)
+    }
+    names = list(occur)
     panel = Panel("class", max(ROW * len(names), LEAST) + axes.AXIS)
     for row, name in enumerate(names):
         for side, analysis in pair.sides:
-            color, place = SIDE_COLORS[side], (row, len(names))
-            stretches = found_stretches(analysis, name)
-            log_class(recording, f"{side}/found", name, stretches, color, place, FOUND[side])
-            blocks = [(b.start, b.stop) for b in analysis.run.blocks if b.label == name]
-            log_class(recording, f"{side}/annotated", name, blocks, color, place, ANNOTATED[side])
+            shades, place = (SIDE_COLORS[side], SIDE_COLORS[side]), (row, len(names))
+            panels.log_class(recording, analysis, name, place, shades, BETWEEN[side], side)
     titles = [Label(label.place, spoken(label.text)) for label in axes.row_labels(names)]
-    axes.log_left(recording, panel, titles or [Label(0.5, "no failure\nin either run")])
-    told = [
-        Label(0.8, "before", color=SIDE_COLORS["before"]),
-        Label(0.45, "after", color=SIDE_COLORS["after"]),
-    ]
+    told = _sides(0.8, 0.45)
     if any(side.run.blocks for _, side in pair.sides):
         told.append(Label(0.1, "thin: annotated"))
-    axes.log_right(recording, panel, told)
+    axes.log_beside(recording, panel, titles or [Label(0.5, "no failure\nin either run")], told)
     if found:
         axes.log_events(
             recording,
             [change.start for change in found],
             [str(change) for change in found],
-            [_shade(change) for change in found],
+            [SHADES[change.kind] for change in found],
             warnings=[change.kind == NEW for change in found],
         )
     return axes.timed(panel)
-
-
-def log_shades(
-    recording: rr.RecordingStream,
-    path: str,
-    found: Sequence[Change],
-    between: tuple[float, float],
-) -> None:
-    """Shade the changes in a plot, in the colour of the run that has them."""
-    for kind in dict.fromkeys(change.kind for change in found):
-        own = [change for change in found if change.kind == kind]
-        unstable.log_stretches(
-            recording,
-            f"{path}/{kind}",
-            [(change.start, change.stop) for change in own],
-            between=between,
-            name=kind,
-            color=_shade(own[0]),
-        )
-
-
-def _shade(change: Change) -> colors.Color:
-    shades = {"new": "after", "louder": "after", "resolved": "before", "quieter": "before"}
-    return SIDE_COLORS[shades[change.kind]] if change.kind in shades else axes.INK
-
-
-def _every(pair: Pair) -> list[str]:
-    known = [name for _, side in pair.sides for name in classes_of(side)]
-    return [name for name in known if any(_occurs(side, name) for _, side in pair.sides)]
 
 
 def _occurs(side: Analysis, name: str) -> bool:
@@ -230,41 +182,23 @@ def log_joints(
 ) -> list[Part]:
     """Log the joints' signals of both runs, paler before, and after less before: tabs of limbs."""
     before, after = (
-        {_signal_name(signal): signal for signal in signals(side.run)} for _, side in pair.sides
+        {f"{'desired ' * each.desired}{each.kind}": each for each in panels.signals(side.run)}
+        for _, side in pair.sides
     )
-    plots: dict[str, list[Part]] = {}
+    plots: dict[str, list[Drawn]] = {}
     for name in dict.fromkeys([*after, *before]):
-        shown = {"before": before.get(name), "after": after.get(name)}
-        shown["change"] = _difference(shown["before"], shown["after"])
-        masks = (pair.before.run.mask, pair.after.run.mask, pair.valid)
-        paths = {
-            what: log_signal(
-                recording,
-                f"/joints/{name.replace(' ', '_')}/{what}",
-                replace(signal, values=signal.values[mask]),
-                pair.time[mask],
-                limbs,
-                suffix="" if what == "change" else f" {what}",
-                dim=what == "before",
-                points=JOINT_POINTS,
-            )
-            for (what, signal), mask in zip(shown.items(), masks, strict=True)
-            if signal is not None and mask.any()
-        }
-        unit = next(signal.unit for signal in shown.values() if signal is not None)
-        for limb in limbs:
-            both = [paths[what].get(limb) for what in ("before", "after") if what in paths]
-            change = paths.get("change", {}).get(limb)
-            own = plots.setdefault(limb, [])
-            if over := [path for path in both if path]:
-                own.append(signal_plot(f"{name} [{unit}]", over))
-            if change:
-                own.append(signal_plot(f"change of {name} [{unit}]", [change]))
-    return limb_tabs(plots)
-
-
-def _signal_name(signal: Signal) -> str:
-    return f"desired {signal.kind}" if signal.desired else signal.kind
+        was, now = before.get(name), after.get(name)
+        for what, signal, mask in (
+            ("before", was, pair.before.run.mask),
+            ("after", now, pair.after.run.mask),
+            ("change", _difference(was, now), pair.valid),
+        ):
+            if signal is not None and mask.any():
+                change, path = what == "change", f"/joints/{name.replace(' ', '_')}/{what}"
+                drawn = (path, signal, mask, "" if change else f" {what}", what == "before")
+                title = f"{'change of ' * change}{name} [{signal.unit}]"
+                plots.setdefault(title, []).append(drawn)
+    return panels.log_plots(recording, pair.time, plots, limbs, JOINT_POINTS)
 
 
 def _difference(before: Signal | None, after: Signal | None) -> Signal | None:
@@ -287,41 +221,43 @@ BOTH = 4
 """Links whose power before and after is shown."""
 KEY = Panel("key", 260.0)
 """The scale beside the robots."""
-ROBOT_SHADES = 16
 
 
 def log_links(
     recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair: Pair
 ) -> tuple[Part, list[Part]]:
-    """Log the noise of links: colour both robots by it, and rows by how it changed.
-
-    Returns:
-        The changes; sound powers, and levels of the links that changed most.
-    """
+    """Colour both robots by their links' noise; parts of its changes, powers and levels."""
     assert pair.links is not None
     scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
     for tree, noise in zip(trees.values(), pair.links, strict=True):
-        log_robot_levels(recording, tree, noise, scale)
+        panels.log_robot_levels(recording, tree, noise, scale)
     axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
     names = [level.name for level in by_link(pair)]
     for (side, _), noise in zip(pair.sides, pair.links, strict=True):
         for name in names[:BOTH]:
             power = noise.vibration[:, noise.links.index(name)]
-            log_power(recording, f"/links/{name}/{side}", noise, power, SIDE_COLORS[side])
+            path, shade = f"/links/{name}/{side}", SIDE_COLORS[side]
+            panels.log_power(recording, path, noise, power, shade)
     own = names[:SHOWN_LINKS]
     time, change = link_steps(pair, own)
     panel = Panel("links", DETAILS)
     if own:
         end = float(pair.time[-1]) + 1.0 / pair.rate
-        rgba = CHANGE.colours(change.T, shades=SHADES)
-        called = [f"{name}, change [dB]" for name in own]
-        width = (DETAILS - axes.AXIS) / len(own) / (LINK_LINES + 1) + 2.0
-        edges = np.append(time, max(end, float(time[-1])))
-        axes.log_rows(
-            recording, "/change/links", edges, rgba, names=called, width=width, lines=LINK_LINES
+        axes.log_levels(
+            recording,
+            panel,
+            np.append(time, max(end, float(time[-1]))),
+            change.T,
+            CHANGE,
+            axes.row_labels(own),
+            path="/change/links",
+            names=[f"{name}, change [dB]" for name in own],
+            width=(DETAILS - axes.AXIS) / len(own) / (LINK_LINES + 1) + 2.0,
+            lines=LINK_LINES,
+            shades=panels.SHADES,
         )
-    axes.log_left(recording, panel, axes.row_labels(own) or [Label(0.5, "no links")])
-    axes.log_scale(recording, panel, CHANGE)
+    else:
+        axes.log_beside(recording, panel, [Label(0.5, "no links")], CHANGE)
     parts = [unstable.plot("Sound power [dB re 1 pW]", "/power", axes.ALL, legend=True)]
     if names:
         both = [
@@ -376,7 +312,7 @@ def _log_robots(
     for tree, own in pairs:
         robot.log(recording, tree, own)
     urdf = robot.drawn_file(pair.after.run.robot, folder)
-    cameras = log_cameras(recording, pairs, urdf, aspect=ASPECT)
+    cameras = robot.log_cameras(recording, pairs, urdf, aspect=ASPECT)
     views = [
         (unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0)
         for side, camera in zip(trees, cameras, strict=True)
@@ -393,12 +329,13 @@ def _log_details(
         changed, of_links = log_links(recording, trees, pair)
         parts.append(changed)
     parts += log_spectra(recording, pair, _joint(pair))
-    parts += [*log_noise(recording, pair), *of_links]
+    parts += [log_noise(recording, pair), *of_links]
     for name, sound in _sounds(pair, around).items():
         unstable.log_audio(recording, f"/sound/{name}", sound, float(pair.time[0]))
         parts.append(unstable.audio(f"Listen {name}", f"/sound/{name}"))
     names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
-    parts += log_joints(recording, pair, limbs(tuple(names), trees.get("after")))
+    limbs = panels.limbs(tuple(names), trees.get("after"))
+    parts += log_joints(recording, pair, limbs)
     return unstable.tabs(*parts)
 
 

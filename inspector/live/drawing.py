@@ -19,18 +19,17 @@ from inspector.levels import LINKS, SPECTRUM, amplitudes, extremes, in_bands, wi
 from inspector.live.labels import Labeller, Windows
 from inspector.live.sink import Sink
 from inspector.recording import axes, unstable
-from inspector.recording import camera as cameras
 from inspector.recording import robot as scene
 from inspector.recording.axes import Label, Panel, log_events, scalars, style_lines
 from inspector.recording.panels import (
     BANDS,
     FOUND,
     JOINTS_PER_PLOT,
+    LINE_WIDTH,
     ROW,
     UNITS,
-    log_axis,
+    band_axis,
     readable,
-    style_bands,
 )
 from inspector.recording.unstable import TIMELINE, Camera, Part
 from inspector.report.findings import spoken
@@ -49,11 +48,7 @@ memory while they are written."""
 
 
 class Messages:
-    """Holds rows of entities back until a message has enough of them.
-
-    Args:
-        watched: Whether there is a viewer: what is urgent is sent at once then.
-    """
+    """Holds rows of entities back until a message has enough of them."""
 
     def __init__(self, recording: rr.RecordingStream, *, watched: bool = True) -> None:
         self.recording, self._watched = recording, watched
@@ -71,13 +66,7 @@ class Messages:
         *,
         urgent: bool = False,
     ) -> None:
-        """Let rows of an entity wait.
-
-        Args:
-            time: Shape (rows,), in [ns].
-            values: Shape (rows, …).
-            columns: Makes rerun's columns of the values of all rows that waited.
-        """
+        """Let rows wait, at times in [ns]; `columns` makes rerun's columns of all that waited."""
         if len(time):
             self._makers[path] = columns
             self._waiting.setdefault(path, []).append((time, values))
@@ -113,13 +102,7 @@ def nanoseconds(time: Array) -> NDArray[np.int64]:
 
 
 class SpectrogramStream:
-    """Levels of the loudest joint in each band of a logarithmic axis, on a fixed scale.
-
-    Which joint will be the worst is not known while samples come in.
-
-    Attributes:
-        edges: Of the bands, shape (bands + 1,), in [Hz].
-    """
+    """Levels of the loudest joint in bands of a logarithmic axis, on a fixed scale."""
 
     def __init__(self, rate: float) -> None:
         self._rate = rate
@@ -130,17 +113,7 @@ class SpectrogramStream:
         self._windows, self._gap = Windows(self._length, self._hop), False
 
     def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
-        """Take samples.
-
-        Args:
-            velocity: Shape (samples, joints), in [rad/s] or [m/s].
-            valid: False in gaps, shape (samples,); windows that touch one are dark.
-            end: Time after the last sample, in [s].
-
-        Returns:
-            Centres of the windows that are complete now, shape (columns,), in [s], and levels from
-            0 to 1, shape (columns, bands).
-        """
+        """Take samples; centres of windows in [s], and levels, shape (columns, bands)."""
         windows, whole, since = self._windows.push(velocity, valid)
         if not len(windows):
             return np.empty(0), np.empty((0, BANDS))
@@ -169,11 +142,7 @@ STEP = 0.2
 
 
 class LinkLevels:
-    """Levels above 10 Hz of a robot's links, every 0.2 s, half a period of 10 Hz late.
-
-    Attributes:
-        links: Names of the links.
-    """
+    """Levels above 10 Hz of a robot's links, every 0.2 s, half a period of 10 Hz late."""
 
     def __init__(
         self, robot: str, joint_names: Sequence[str], rate: float, *, floating: bool
@@ -191,12 +160,7 @@ class LinkLevels:
         self._before = 0  # samples before the step that comes next
 
     def push(self, time: Array, signals: Mapping[str, Array]) -> list[tuple[float, Array]]:
-        """Take samples that follow each other.
-
-        Args:
-            time: Shape (samples,), in [s].
-            signals: Velocities and positions, shape (samples, joints), and a base's velocity, shape
-                (samples, 6), if there is one. A sample that is not finite begins anew.
+        """Take samples that follow each other; one that is not finite begins anew.
 
         Returns:
             Start of each step that is complete now, in [s], and the levels of all links, shape
@@ -250,12 +214,7 @@ UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 class LiveRobot:
-    """A robot in a live recording.
-
-    Attributes:
-        children: Links that move, in the order of `transforms`; the base, if it moves, and the
-            frame of the camera are last.
-    """
+    """A robot in a live recording; its base, if it moves, and the camera are its last children."""
 
     def __init__(
         self, messages: Messages, robot: str, joint_names: Sequence[str], *, floating: bool
@@ -265,7 +224,7 @@ class LiveRobot:
         self._messages, self._rotation = messages, Rotation
         with TemporaryDirectory() as folder:
             tree = scene.load(robot, Path(folder), joint_names)
-            self._outermost = cameras.outermost(scene.drawn_file(robot, Path(folder)))
+            self._outermost = scene.outermost(scene.drawn_file(robot, Path(folder)))
             scene.log_shapes(messages.recording, tree)
             self._shapes = scene.shapes_by_link(tree)
         self._tree = tree
@@ -284,7 +243,7 @@ class LiveRobot:
         self._slide, self._spin = np.where(slides, axis, 0.0), np.where(slides, 0.0, axis)
         self._place = np.array([joint.origin_xyz for joint in joints])
         self._turn = Rotation.from_euler("xyz", [joint.origin_rpy for joint in joints])
-        base = [str(tree.root_link().name), cameras.VIEW] if floating else []
+        base = [str(tree.root_link().name), scene.VIEW] if floating else []
         self.children = [joint.child_link for joint in joints] + base
         self._carriers = [joint.parent_link for joint in joints] + len(base) * [scene.WORLD]
         self._names = [joint.name for joint in joints]
@@ -298,37 +257,29 @@ class LiveRobot:
 
         A robot on a base is seen wherever its joints can take it; one that moves its base as it
         stands at first, with room to move.
-
-        Args:
-            position: Of the named joints, shape (joints,), in [rad] or [m].
-            base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (7,).
         """
         first = np.nan_to_num(position)[None]
         if base_pose is not None:
             unknown = np.concatenate((np.zeros(3), UPRIGHT))
             pose = (base_pose if np.isfinite(base_pose).all() else unknown)[None]
-            seen = cameras.fitted(self._reached(first, pose), room=ROOM)
-            seen = cameras.standing(seen, self._tree, moves=True)
+            seen = scene.fitted(self._reached(first, pose), room=ROOM)
+            seen = scene.standing(seen, self._tree, moves=True)
             floor = pose[:, :2] + AROUND
-            cameras.log_floor(self._messages.recording, self._tree, seen, floor)
+            scene.log_floor(self._messages.recording, self._tree, seen, floor)
             return seen
-        floor = cameras.fitted(self._reached(first, None)).floor
+        floor = scene.fitted(self._reached(first, None)).floor
         random = np.random.default_rng(0)
         everywhere = random.uniform(self._low, self._high, (POSES, len(position)))
-        seen = cameras.fitted(self._reached(np.concatenate((first, everywhere)), None))
-        return cameras.standing(replace(seen, floor=floor), self._tree, moves=False)
+        seen = scene.fitted(self._reached(np.concatenate((first, everywhere)), None))
+        return scene.standing(replace(seen, floor=floor), self._tree, moves=False)
 
     def _reached(self, position: Array, pose: Array | None) -> Iterator[Array]:
         angle = self._factor * position[:, self._columns] + self._offset
         angles = dict(zip(self._names, angle.T, strict=True))
-        return cameras.reached(self._tree, self._outermost, angles, pose)
+        return scene.reached(self._tree, self._outermost, angles, pose)
 
     def colour(self, time: float, links: Sequence[str], level: Array) -> None:
-        """Colour the links from a time on, in [s], those whose colour changes.
-
-        Args:
-            level: Shape (links,), in [dB re 1 pW]; what is not among the links is silent.
-        """
+        """Colour the links from a time on, where that changes, by levels in [dB re 1 pW]."""
         levels = dict(zip(links, level.tolist(), strict=True))
         each = np.array([levels.get(link, -np.inf) for link in self._shapes])
         index = nanoseconds(np.array([time]))
@@ -340,18 +291,12 @@ class LiveRobot:
                     self._messages.add(path, index, own[None], columns, urgent=True)
 
     def show(self, time: float, position: Array, base_pose: Array | None) -> None:
-        """Move the robot, if its pose is known.
-
-        Args:
-            time: In [s].
-            position: Of the named joints, shape (joints,), in [rad] or [m].
-            base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (7,).
-        """
+        """Move the robot, if its pose is known, at a time in [s]."""
         if not all(np.isfinite(each).all() for each in (position, base_pose) if each is not None):
             return
         poses = np.hstack(self.transforms(position))
         if base_pose is not None:
-            below = np.concatenate((base_pose[:3] * cameras.ON_FLOOR, UPRIGHT))
+            below = np.concatenate((base_pose[:3] * scene.ON_FLOOR, UPRIGHT))
             poses = np.vstack((poses, base_pose, below))
         index = nanoseconds(np.full(len(poses), time))
         self._messages.add("/robot/motion", index, poses, self._moved, urgent=True)
@@ -366,15 +311,7 @@ class LiveRobot:
         )
 
     def transforms(self, position: Array) -> tuple[Array, Array]:
-        """The pose of each joint's link relative to the link that carries it.
-
-        Args:
-            position: Of the named joints, shape (joints,), in [rad] or [m].
-
-        Returns:
-            Translations, shape (moving, 3), and quaternions x, y, z, w, shape (moving, 4), of all
-            joints that move: the named ones, and those that mimic one of them.
-        """
+        """Places and quaternions of links in the axes of their carriers, mimics included."""
         angle = (self._factor * position[self._columns] + self._offset)[:, None]
         turned = self._turn * self._rotation.from_rotvec(angle * self._spin)
         return self._place + self._turn.apply(angle * self._slide), turned.as_quat()
@@ -405,13 +342,7 @@ NEWEST = 8
 
 
 class Drawing:
-    """Draws into a recording.
-
-    Args:
-        robot: The robot to draw; None draws none.
-        widths: Columns of each signal that there is.
-        warn: Called with a line about what cannot be drawn.
-    """
+    """Draws into a recording."""
 
     def __init__(
         self,
@@ -461,32 +392,30 @@ class Drawing:
         """Log how everything but the joints' signals is drawn, and what stands beside it."""
         recording, nothing = self._recording, [Label(0.5, "")]  # else the viewer says: no data
         style_lines(recording, NOISE, names=["simplified [rad/s]"], colours=[colors.NOISE])
-        axes.log_left(recording, NOISE_PANEL, [Label(0.5, "noise p\u0302\n[rad/s]")])
-        axes.log_right(recording, NOISE_PANEL, nothing)
-        axes.log_left(recording, SIGNALS_PANEL, nothing)
-        axes.log_right(recording, SIGNALS_PANEL, nothing)
+        noise = Label(0.5, "noise p\u0302\n[rad/s]")
+        axes.log_beside(recording, NOISE_PANEL, [noise], nothing)
+        axes.log_beside(recording, SIGNALS_PANEL, nothing, nothing)
         # A line of one entity each: an entity each would cost a message each.
         edges = self._spectrogram.edges
-        style_bands(recording, BANDS_PATH, np.sqrt(edges[:-1] * edges[1:]).tolist())
-        title = Label(0.5, "spectrum,\nloudest\njoint", -22.0)
-        log_axis(recording, SPECTROGRAM_PANEL, float(edges[0]), float(edges[-1]), title, axes.hertz)
-        axes.log_scale(recording, SPECTROGRAM_PANEL, SPECTRUM)
+        bands = rr.SeriesLines(
+            names=[f"{centre:.0f} Hz" for centre in np.sqrt(edges[:-1] * edges[1:]).tolist()],
+            widths=[LINE_WIDTH] * BANDS,
+            aggregation_policy="Off",
+            interpolation_mode="StepAfter",
+        )
+        recording.log(BANDS_PATH, bands, static=True)
+        left = band_axis(SPECTROGRAM_PANEL, edges, "spectrum,\nloudest\njoint")
+        axes.log_beside(recording, SPECTROGRAM_PANEL, left, SPECTRUM)
         if self._classes is None:
             return
         own = [self._colours[name] for name in classes]
         style_lines(recording, SCORES, names=classes, colours=own)
         shades = [self._colours[name] for name in self._rows]
         names = [spoken(name) for name in self._rows]
-        bands = [
-            (name, shade)
-            for name, shade in zip(names, shades, strict=True)
-            for _ in range(unstable.COPIES)
-        ]
-        unstable.style_bands(recording, FOUND_PATH, *zip(*bands, strict=True))
+        unstable.style_bands(recording, FOUND_PATH, names, shades, unstable.COPIES)
         rows = zip(axes.row_labels(names), shades, strict=True)
         named = [replace(row, color=readable(shade)) for row, shade in rows]
-        axes.log_left(recording, self._classes, named)
-        axes.log_right(recording, self._classes, nothing)
+        axes.log_beside(recording, self._classes, named, nothing)
 
     def begin(self, time: float, signals: Mapping[str, Array]) -> None:
         """Send the layout with the first sample, whose pose places the camera, and at 10 s."""
@@ -522,14 +451,7 @@ class Drawing:
             self._links.skip()
 
     def batch(self, time: Array, motion: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
-        """Draw the noise, the joints' signals and the robot of the next stretch.
-
-        Args:
-            time: Shape (samples,), in [s].
-            motion: Velocities that make noise, shape (samples, columns).
-            valid: False for samples without noise, which are left out, shape (samples,).
-            signals: Each of shape (samples, columns); rows that are not finite are left out.
-        """
+        """Draw the noise, the joints' signals and the robot of the next stretch, where valid."""
         now, seconds = float(time[-1]), len(valid) / self._rate
         if now > self._lane_end + self._length + self._hop:  # the next frame is overdue
             self.end_lane()
@@ -590,12 +512,7 @@ class Drawing:
         self._messages.add(FOUND_PATH, times, shown, _found, urgent=True)
 
     def findings(self, time: float, found: Sequence[Event], latest: float = np.inf) -> None:
-        """Show the findings so far in a document; nothing without a model.
-
-        Args:
-            time: Of the latest sample, in [s].
-            latest: A finding that reaches this time lasts, in [s].
-        """
+        """Show the findings so far in a document; those that reach the latest time last."""
         if self._classes is None:
             return
         lines = []

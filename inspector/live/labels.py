@@ -32,15 +32,7 @@ class Windows:
         self._samples, self._valid = np.zeros((before, 1)), np.zeros(before, dtype=bool)
 
     def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask, int]:
-        """Take samples.
-
-        Args:
-            valid: False in gaps, shape (samples,).
-
-        Returns:
-            The windows that are complete now, shape (windows, columns, length); which of them touch
-            no gap; and how many samples came since the first of them began.
-        """
+        """Windows that are complete, which touch no gap, and samples since the first began."""
         held = np.broadcast_to(self._samples, (len(self._valid), samples.shape[1]))
         samples = np.concatenate((held, samples))
         valid = np.concatenate((self._valid, valid))
@@ -55,11 +47,9 @@ class Windows:
 
 
 class Decimator:
-    """Low-passes and decimates signals, and marks the samples for which it cannot.
+    """Low-passes and decimates signals as `noisemodel.decimated` does, but for their ends.
 
-    In the middle of a signal it returns what `noisemodel.decimated` does. That one extrapolates
-    beyond the ends, which is impossible while samples come in: here the first ten samples are not
-    valid, and the last ten are missing.
+    That one extrapolates: here the first ten samples are not valid, and the last ten are missing.
     """
 
     def __init__(self, ratio: int) -> None:
@@ -80,17 +70,7 @@ NOISY = ("base_velocity", "velocity", "velocity_desired")
 
 
 def noise_signal(name: str, motion: Array, base: int, joints: int) -> Array:
-    """A norm of a motion, or joint by joint what it is of, as `noisemodel` makes them of a run.
-
-    Args:
-        name: A noise signal.
-        motion: Velocities, shape (samples, columns), in [rad/s] and [m/s].
-        base: Columns of the base, which are first.
-        joints: Columns of the joints, followed by the columns of desired velocities, if any.
-
-    Returns:
-        Shape (samples,), or (joints, samples), in [rad/s].
-    """
+    """A norm of a motion, or joint by joint what it is of, as `noisemodel` makes them."""
     if name == NOISE:
         return nm.simplified(motion)
     each, moved = name in JOINTS, base + joints
@@ -158,16 +138,7 @@ class Labeller:
         return self._samples / self.rate
 
     def push(self, motion: Array, valid: Mask) -> Labels | None:
-        """Take samples.
-
-        Args:
-            motion: All velocities that the noise is made of, shape (samples, columns).
-            valid: False where there is none, shape (samples,).
-
-        Returns:
-            Labels that are complete now, on the clock that starts with the first sample; None
-            without a model.
-        """
+        """Take a motion, shape (samples, columns); labels now complete, None without a model."""
         self._samples += len(motion)
         return self._take(motion, valid)
 

@@ -100,8 +100,7 @@ def widen(stream: BinaryIO) -> None:
 def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, int, float]]:
     """Whole lines of a stream as they come, the number of the first, and when they were received.
 
-    Args:
-        gather: How long a small chunk waits for more, in [s]: to read row by row costs most.
+    A small chunk waits for more, in [s]: to read row by row costs most.
     """
     read: Callable[[int], bytes] = getattr(stream, "read1", stream.read)
     rest, number, waited = b"", 1, 0.0
@@ -291,15 +290,7 @@ NAME = Path("live")
 
 
 class Gate:
-    """Prints findings while they come.
-
-    Args:
-        reference: What the stream is compared with, a stretch after the other while it runs and as
-            a whole at its end; None leaves it to the model.
-
-    Attributes:
-        failed: Whether a finding counts so far.
-    """
+    """Prints findings while they come, beside a reference or by the model alone."""
 
     def __init__(
         self,
@@ -324,11 +315,7 @@ class Gate:
             self._print(verdict, event, over=over)
 
     def compare(self, latest: Levels) -> None:
-        """Print the findings in the latest stretch of the stream beside the reference, each once.
-
-        Args:
-            latest: Levels of the last 6 s, 3 s of which have been there before.
-        """
+        """Print findings in the last 6 s beside the reference, each once."""
         if self._begin is None:
             self._begin = self._heard = latest.start
         found = tuple(self._found.values())

@@ -60,13 +60,7 @@ class SampleBuffer:
         return self._time[: self.held]
 
     def put(self, rows: Mapping[str, Array], time: Array, received: float) -> int:
-        """Take as many samples as fit in; signals that are missing or of other widths are unknown.
-
-        Args:
-            rows: Signals, each of shape (samples, columns).
-            time: Timestamps, shape (samples,).
-            received: When they were, in [s] on the clock that delays are measured by.
-        """
+        """Take as many samples as fit in; missing signals, or of other widths, are unknown."""
         count = min(len(time), self._size + self._waiting - self.held)
         place = slice(self.held, self.held + count)
         self._time[place], self._received[place] = time[:count], received
@@ -91,11 +85,7 @@ class SampleBuffer:
         return count
 
     def take(self, kept: Mask, waiting: int) -> tuple[Array, dict[str, Array]]:
-        """Take samples out: when they were received, and the signals.
-
-        Args:
-            kept: Which of those that do not wait, shape (held - waiting,).
-        """
+        """Take out those that do not wait and are kept: when they came, and signals."""
         decided = len(kept)
         received = self._received[:decided][kept]
         signals = {name: values[:decided][kept] for name, values in self._signals.items()}
@@ -108,12 +98,7 @@ class SampleBuffer:
 
 
 def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
-    """Bring one sample or a chunk of them into rows, each of shape (samples, columns).
-
-    Args:
-        given: Signals by name, the velocity first: of shape (columns,) for one sample, or
-            (samples, columns).
-    """
+    """Bring one sample or a chunk of them into rows, each of shape (samples, columns)."""
     rows: dict[str, Array] = {}
     for name, values in given.items():
         try:

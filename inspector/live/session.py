@@ -39,178 +39,6 @@ MAX_DELAYS = 100_000
 """Delays that are kept, of the latest labels."""
 UNSEEN = "samples that the viewer may not have shown"
 LATE_SAMPLES = "samples that were not sent to a late viewer"
-
-
-class Worker:
-    """Works on batches of samples, one after the other.
-
-    Args:
-        robot: The robot that the samples are said to be of; None is of none.
-        stream: Keeps octave levels; None keeps none.
-
-    Attributes:
-        samples: How many were worked on.
-        counts: How many frames were labelled, by class.
-        delays: From a frame's last sample to its label in the recording, in [s].
-        levels: Octave levels of all samples, once they have ended, if they were kept.
-    """
-
-    def __init__(
-        self,
-        sink: Sink,
-        rate: float,
-        robot: str | None,
-        joint_names: Sequence[str],
-        widths: Mapping[str, int],
-        library: Library,
-        warnings: Warnings,
-        stream: LevelStream | None,
-        on_finding: Callable[[Event, bool], None] | None,
-    ) -> None:
-        self.samples, self._now = 0, 0.0
-        self._unconfirmed = 0  # samples since the viewer was last known to be there
-        self._rate, self._sink, self._warnings = rate, sink, warnings
-        self._noisy = [name for name in NOISY if name in widths]
-        self._clock = Clock(rate, warnings)
-        self.labeller = Labeller(for_robot(library, robot), rate, widths)
-        self._findings, self._on_finding = Findings(), on_finding
-        self._news = News(self._tell, self.labeller.length + SETTLED * self.labeller.hop)
-        self._shift: float | None = None  # from the clock of the labels to that of the samples
-        self.counts: Counter[str] = Counter()
-        self.delays: deque[float] = deque(maxlen=MAX_DELAYS)
-        self._watch = LimitWatch(joint_names, robot) if robot else None
-        self._stream = stream
-        self.levels: Levels | None = None
-        drawn = robot if "position" in widths else None
-        self._drawing = Drawing(
-            sink, rate, drawn, joint_names, widths, self.labeller, warnings.emit
-        )
-        if self.labeller.remark:
-            warnings.emit(self.labeller.remark)
-
-    @property
-    def findings(self) -> tuple[Event, ...]:
-        """The findings so far, as if the signal ended here."""
-        return self._with_lasting(self._findings.events)
-
-    def work(self, buffer: SampleBuffer, *, ended: bool = False) -> None:
-        """Show the samples that a buffer holds, and empty it; few may have to wait for others."""
-        kept, lost, time, waiting = self._clock.take(buffer.stamps, ended=ended)
-        received, signals = buffer.take(kept, waiting)
-        self.samples += len(kept)
-        if not len(time):
-            return
-        self._now = float(time[-1])
-        self._drawing.begin(float(time[0]), signals)
-        motion = np.hstack([signals[name] for name in self._noisy])
-        valid = np.asarray(np.isfinite(motion).all(axis=1))
-        if not valid.all():
-            line = (
-                f"{' or '.join(self._noisy)} is not known at {time[~valid][0]:.3f} s:"
-                " such samples make no noise, frames with one have no label"
-            )
-            self._warnings.note("samples without noise", line, int((~valid).sum()))
-        motion = np.where(valid[:, None], motion, 0.0)
-        if self._stream is not None:
-            self._stream.push(float(time[0]), signals, valid, lost)
-        edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(time)]
-        for first, stop in pairwise(edges):  # labels first: their latency counts
-            piece = slice(first, stop)
-            if lost[first]:
-                self.labeller.skip(int(lost[first]))
-                self._drawing.skip()
-            self._label(time[piece], received[piece], motion[piece], valid[piece])
-            own = {name: signal[piece] for name, signal in signals.items()}
-            self._drawing.piece(time[piece], valid[piece], own)
-        if self._sink.open:
-            self._drawing.batch(time, motion, valid, signals)
-        self._check_limits(signals)
-        self._check_viewer(len(time))
-
-    def _check_limits(self, signals: Mapping[str, Array]) -> None:
-        """Warn where the motion has been far beyond the limits of the robot for a second."""
-        if self._watch is not None:
-            self._watch.add(signals.get("position"), signals["velocity"])
-            if line := next(self._watch.warnings(LONG * self._rate), None):
-                self._warnings.note("joints beyond their limits", line)
-                self._watch = None
-
-    def _check_viewer(self, samples: int) -> None:
-        """Count samples until the viewer is known to be there; warn if it is gone or late."""
-        self._unconfirmed += samples
-        if self._sink.behind > LATE and not (self._sink.late or self._sink.gone):
-            self._drawing.end_lane()  # nothing is shown while it is late
-        if self._sink.check_viewer():
-            self._unconfirmed = 0
-        if self._sink.gone or self._sink.late:
-            self.note_unseen()
-
-    def note_unseen(self) -> None:
-        """Count the samples since the viewer was last known to be there and to keep up."""
-        kind, state = UNSEEN, "is gone or hangs"
-        rest = "the file goes on" if self._sink.saved else "samples are only labelled and counted"
-        if self._sink.late:
-            kind, state = LATE_SAMPLES, f"is {self._sink.late:.0f} s behind the stream"
-            rest = "it is sent nothing until it has caught up"
-        line = f"the viewer {state}, noticed at {self._now:.3f} s: {rest}"
-        self._warnings.note(kind, line, self._unconfirmed)
-        self._unconfirmed = 0
-
-    def remark(self, line: str) -> None:
-        """Show a line among the events."""
-        self._drawing.event(self._now, line)
-
-    def finish(self) -> None:
-        """Show what waits, and tell of findings that last to the end."""
-        self.labeller.finish()
-        self._news.update(self.findings, inf)
-        if self._stream is not None:
-            self.levels = self._stream.finish()
-            if self._stream.too_long:
-                line = f"more than {LONGEST / 60:.0f} minutes are not compared as a whole"
-                self._warnings.note("streams too long for a reference", line)
-        self._drawing.finish(self._now, self.findings)
-
-    def _label(self, time: Array, received: Array, motion: Array, valid: Mask) -> None:
-        """Label and draw a stretch without missing samples."""
-        labels = self.labeller.push(motion, valid)
-        if labels is None or not len(labels):
-            return
-        end = float(time[-1]) + 1.0 / self._rate
-        # How far back in the stretch frames end; a lower rate lags behind.
-        back = np.rint((self.labeller.elapsed - labels.stop) * self._rate).astype(int)
-        shift = end - self.labeller.elapsed
-        labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
-        self._findings.add(labels)
-        self._shift = shift if self._shift is None else self._shift
-        told = self._with_lasting(self._findings.confirmed)
-        decided = min(self._findings.decided, self.labeller.decided + self._shift)
-        self._news.update(told, decided, float(labels.stop[-1]))
-        self.counts.update(labels.raw.tolist())
-        self._drawing.labels(labels)
-        if self._sink.open:
-            last = len(received) - 1 - back
-            before = np.minimum(last, 0) / self._rate
-            delay = clocks.perf_counter() - received[np.maximum(last, 0)] - before
-            self.delays.extend(delay.tolist())
-            self._drawing.findings(end, self.findings, end - 2 * self.labeller.hop)
-
-    def _with_lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
-        """Findings of the labels and of what lasts, on the clock of the samples."""
-        shift = self._shift or 0.0
-        lasting = (
-            replace(each, start=each.start + shift, stop=each.stop + shift)
-            for each in self.labeller.lasting
-        )
-        return merged(*events, *lasting)
-
-    def _tell(self, event: Event, over: bool) -> None:
-        if not over:
-            self._drawing.found(event)
-        if self._on_finding is not None:
-            self._on_finding(event, over)
-
-
 BATCH = 0.05
 """Samples are worked on in batches of this duration, in [s]."""
 FASTEST = 1e6
@@ -322,8 +150,13 @@ class LiveSession:
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
         self._on_finding, self._on_levels = on_finding, on_levels
         self._keep_levels = keep_levels or on_levels is not None
-        self._latest = -1.0 / rate
-        self._worker: tuple[Worker, SampleBuffer] | None = None  # once there are samples
+        self._latest, self._now = -1.0 / rate, 0.0  # timestamp that came, time that was worked on
+        self._buffer: SampleBuffer | None = None  # what follows is there once there are samples
+        self._samples = self._unconfirmed = 0  # since the viewer was last known to be there
+        self._counts: Counter[str] = Counter()  # frames that were labelled, by class
+        self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
+        self._levels: Levels | None = None
+        self._shift: float | None = None  # from the clock of the labels to that of the samples
         self._closed = False
         self._sink = Sink(Path(save) if save else None, connect, overwrite=overwrite)
 
@@ -372,13 +205,13 @@ class LiveSession:
         stamps = self._stamps(time, len(rows["velocity"]))
         if not len(stamps):
             return
-        worker, buffer = self._worker = self._worker or self._begin(rows)
+        buffer = self._buffer = self._buffer or self._begin(rows)
         taken = 0
         while taken < len(stamps):
             rest = {name: array[taken:] for name, array in rows.items()} if taken else rows
             taken += buffer.put(rest, stamps[taken:], received)
             if buffer.full:
-                worker.work(buffer)
+                self._work(buffer)
 
     def note(self, kind: str, line: str, count: int = 1) -> None:
         """Count what could not be pushed, and warn if it is the first of its kind."""
@@ -388,12 +221,11 @@ class LiveSession:
     def summary(self) -> Summary:
         """What became of the samples so far."""
         counts = dict(self._warnings.counts)
-        if self._worker is None:
+        if self._buffer is None:
             return Summary(0, self._rate, "", {}, counts, (), self._sink.where)
-        worker, buffer = self._worker
-        labeller, findings = worker.labeller, worker.findings
-        samples = worker.samples + buffer.held
-        status = status_of(worker.counts.total(), findings)
+        labeller, findings = self._labeller, self._found
+        samples = self._samples + self._buffer.held
+        status = status_of(self._counts.total(), findings)
         reason = labeller.remark if not labeller.model else "no frame was labelled"
         dropped = {kind: counts[kind] for kind in DROPPED if kind in counts}
         if status is Status.OK and sum(dropped.values()) > MOST_DROPPED * max(samples, 1):
@@ -404,32 +236,38 @@ class LiveSession:
             samples=samples,
             rate=self._rate,
             model=labeller.model,
-            labels=dict(worker.counts),
+            labels=dict(self._counts),
             warnings=counts,
-            delays=tuple(worker.delays),
+            delays=tuple(self._delays),
             where=self._sink.where,
             status=status,
             findings=findings,
             reason=reason,
             frame=labeller.length,
-            levels=worker.levels,
+            levels=self._levels,
         )
 
     def close(self) -> Summary:
-        """Show what waits, and end the recording."""
+        """Show what waits, tell of findings that last to the end, and end the recording."""
         if self._closed:
             return self.summary
         self._closed = True
-        if self._worker is None:
+        if self._buffer is None:
             self._sink.discard()
             return self.summary
-        worker, buffer = self._worker
         try:
-            worker.work(buffer, ended=True)
-            worker.finish()
+            self._work(self._buffer, ended=True)
+            self._labeller.finish()
+            self._news.update(self._found, inf)
+            if self._stream is not None:
+                self._levels = self._stream.finish()
+                if self._stream.too_long:
+                    line = f"more than {LONGEST / 60:.0f} minutes are not compared as a whole"
+                    self.note("streams too long for a reference", line)
+            self._drawing.finish(self._now, self._found)
         finally:
             if not self._sink.close():
-                worker.note_unseen()
+                self._note_unseen()
         return self.summary
 
     def __enter__(self) -> Self:
@@ -446,10 +284,10 @@ class LiveSession:
     def _emit(self, line: str) -> None:
         """Warn the program that began the session, and among the events of the recording."""
         self._on_warning(line)
-        if self._worker is not None:
-            self._worker[0].remark(line)
+        if self._buffer is not None:
+            self._drawing.event(self._now, line)
 
-    def _begin(self, rows: Mapping[str, Array]) -> tuple[Worker, SampleBuffer]:
+    def _begin(self, rows: Mapping[str, Array]) -> SampleBuffer:
         """Fix signals and names by the first samples."""
         widths = widths_of(rows, self._names)
         joints, robot = widths["velocity"], self._robot
@@ -467,33 +305,33 @@ class LiveSession:
                 )
             names = known[:joints]
         absent = check_joints(names, robot)
-        stream = None
+        self._stream: LevelStream | None = None
         if self._keep_levels:
             # A file's name is none that a reference knows.
             named = "" if robot is None or Path(robot).suffix else robot
-            stream = LevelStream(names, self._rate, named, self._on_levels)
-        worker = Worker(
-            self._sink,
-            self._rate,
-            robot,
-            names,
-            widths,
-            self._library,
-            self._warnings,
-            stream,
-            self._on_finding,
+            self._stream = LevelStream(names, self._rate, named, self._on_levels)
+        self._noisy = [name for name in NOISY if name in widths]
+        self._clock = Clock(self._rate, self._warnings)
+        self._labeller = Labeller(for_robot(self._library, robot), self._rate, widths)
+        self._findings = Findings()
+        self._news = News(self._tell, self._labeller.length + SETTLED * self._labeller.hop)
+        self._watch = LimitWatch(names, robot) if robot else None
+        drawn = robot if "position" in widths else None
+        self._drawing = Drawing(
+            self._sink, self._rate, drawn, names, widths, self._labeller, self._on_warning
         )
-        if robot and "position" not in widths:
+        if self._labeller.remark:
+            self._on_warning(self._labeller.remark)
+        if robot and drawn is None:
             self.note("missing signals", "no positions: the robot is not drawn")
         elif absent:
             line = f"not in the log, assumed stationary: {', '.join(absent)}"
             if self._names:
-                worker.remark(line)
+                self._drawing.event(self._now, line)
             else:  # which columns are which joints was assumed
                 line = f"taken for {', '.join(names)}; {line} (--names says otherwise)"
                 self.note("joints assumed stationary", line, len(absent))
-        size = max(1, round(BATCH * self._rate))
-        return worker, SampleBuffer(size, widths, self._warnings)
+        return SampleBuffer(max(1, round(BATCH * self._rate)), widths, self._warnings)
 
     def _stamps(self, time: ArrayLike | None, samples: int) -> Array:
         if time is None:
@@ -505,3 +343,106 @@ class LiveSession:
         if samples:
             self._latest = float(stamps[-1])
         return stamps
+
+    @property
+    def _found(self) -> tuple[Event, ...]:
+        """The findings so far, as if the signal ended here."""
+        return self._with_lasting(self._findings.events)
+
+    def _with_lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
+        """Findings of the labels and of what lasts, on the clock of the samples."""
+        shift = self._shift or 0.0
+        lasting = (
+            replace(each, start=each.start + shift, stop=each.stop + shift)
+            for each in self._labeller.lasting
+        )
+        return merged(*events, *lasting)
+
+    def _tell(self, event: Event, over: bool) -> None:
+        if not over:
+            self._drawing.found(event)
+        if self._on_finding is not None:
+            self._on_finding(event, over)
+
+    def _work(self, buffer: SampleBuffer, *, ended: bool = False) -> None:
+        """Show the samples that a buffer holds, and empty it; few may have to wait for others."""
+        kept, lost, time, waiting = self._clock.take(buffer.stamps, ended=ended)
+        received, signals = buffer.take(kept, waiting)
+        self._samples += len(kept)
+        if not len(time):
+            return
+        self._now = float(time[-1])
+        self._drawing.begin(float(time[0]), signals)
+        motion = np.hstack([signals[name] for name in self._noisy])
+        valid = np.asarray(np.isfinite(motion).all(axis=1))
+        if not valid.all():
+            line = (
+                f"{' or '.join(self._noisy)} is not known at {time[~valid][0]:.3f} s:"
+                " such samples make no noise, frames with one have no label"
+            )
+            self.note("samples without noise", line, int((~valid).sum()))
+        motion = np.where(valid[:, None], motion, 0.0)
+        if self._stream is not None:
+            self._stream.push(float(time[0]), signals, valid, lost)
+        edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(time)]
+        for first, stop in pairwise(edges):  # labels first: their latency counts
+            piece = slice(first, stop)
+            if lost[first]:
+                self._labeller.skip(int(lost[first]))
+                self._drawing.skip()
+            self._label(time[piece], received[piece], motion[piece], valid[piece])
+            own = {name: signal[piece] for name, signal in signals.items()}
+            self._drawing.piece(time[piece], valid[piece], own)
+        if self._sink.open:
+            self._drawing.batch(time, motion, valid, signals)
+        if self._watch is not None:
+            self._watch.add(signals.get("position"), signals["velocity"])
+            if line := next(self._watch.warnings(LONG * self._rate), ""):
+                self.note("joints beyond their limits", line)
+                self._watch = None
+        self._check_viewer(len(time))
+
+    def _label(self, time: Array, received: Array, motion: Array, valid: Mask) -> None:
+        """Label and draw a stretch without missing samples."""
+        labels = self._labeller.push(motion, valid)
+        if labels is None or not len(labels):
+            return
+        end, elapsed = float(time[-1]) + 1.0 / self._rate, self._labeller.elapsed
+        # How far back in the stretch frames end; a lower rate lags behind.
+        back = np.rint((elapsed - labels.stop) * self._rate).astype(int)
+        shift = end - elapsed
+        labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
+        self._findings.add(labels)
+        self._shift = shift if self._shift is None else self._shift
+        told = self._with_lasting(self._findings.confirmed)
+        decided = min(self._findings.decided, self._labeller.decided + self._shift)
+        self._news.update(told, decided, float(labels.stop[-1]))
+        self._counts.update(labels.raw.tolist())
+        self._drawing.labels(labels)
+        if self._sink.open:
+            last = len(received) - 1 - back
+            before = np.minimum(last, 0) / self._rate
+            delay = clocks.perf_counter() - received[np.maximum(last, 0)] - before
+            self._delays.extend(delay.tolist())
+            self._drawing.findings(end, self._found, end - 2 * self._labeller.hop)
+
+    def _check_viewer(self, samples: int) -> None:
+        """Count samples until the viewer is known to be there; warn if it is gone or late."""
+        self._unconfirmed += samples
+        if self._sink.behind > LATE and not (self._sink.late or self._sink.gone):
+            self._drawing.end_lane()  # nothing is shown while it is late
+        if self._sink.check_viewer():
+            self._unconfirmed = 0
+        if self._sink.gone or self._sink.late:
+            self._note_unseen()
+
+    def _note_unseen(self) -> None:
+        """Count the samples since the viewer was last known to be there and to keep up."""
+        kind, state = UNSEEN, "is gone or hangs"
+        rest = "the file goes on" if self._sink.saved else "samples are only labelled and counted"
+        if self._sink.late:
+            kind, state = LATE_SAMPLES, f"is {self._sink.late:.0f} s behind the stream"
+            rest = "it is sent nothing until it has caught up"
+        line = f"the viewer {state}, noticed at {self._now:.3f} s: {rest}"
+        self.note(kind, line, self._unconfirmed)
+        self._unconfirmed = 0

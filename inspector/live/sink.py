@@ -219,12 +219,9 @@ def _opened(port: int) -> int:
     start = ("--port", str(port), "--hide-welcome-screen", "--expect-data-soon")
     env = os.environ | {"RUST_LOG": "error"}
     with viewer.started(*start, "--memory-limit", MEMORY, env=env) as process:
-        until = time.monotonic() + START_TIMEOUT
-        while time.monotonic() < until:
-            if problem := process.ended():
-                raise SinkError(f"{problem}; use --save FILE.rrd")
-            if _listens(HOST, port):
-                return port
-            time.sleep(0.1)
+        if process.listens(port, START_TIMEOUT):
+            return port
+        if problem := process.ended():
+            raise SinkError(f"{problem}; use --save FILE.rrd")
         process.kill()
     raise SinkError(f"the viewer did not start within {START_TIMEOUT:g} s; use --save FILE.rrd")

@@ -22,7 +22,7 @@ from inspector.errors import InspectorError
 from inspector.levels import Scale
 from inspector.recording import unstable
 from inspector.recording.unstable import TIMELINE, Part
-from noisemodel.types import Array, Mask, Real
+from noisemodel.types import Array, Real
 
 SPAN = "/span"
 """Lies in every plot over time, so that it reaches from the start to the end."""
@@ -63,11 +63,7 @@ def log_lines(
     names: Sequence[str],
     colours: Sequence[Color],
 ) -> None:
-    """Log one line or several that share their times.
-
-    Args:
-        time: Shape (samples,), in [s].
-    """
+    """Log lines, shape (samples, lines), that share their times, in [s]."""
     style_lines(recording, path, names=names, colours=colours)
     recording.send_columns(path, indexes=[at(time)], columns=scalars(values))
 
@@ -108,11 +104,7 @@ def log_events(
     *,
     warnings: Sequence[bool] | None = None,
 ) -> None:
-    """List events, a line of text each.
-
-    Args:
-        time: When, in [s].
-    """
+    """List events, a line of text each, at times in [s]."""
     level = None if warnings is None else ["WARN" if each else "INFO" for each in warnings]
     recording.send_columns(
         "/events",
@@ -149,14 +141,11 @@ APART = 17.0
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel over time; what is beside it lies at its name below ``/axis``.
-
-    Attributes:
-        height: With its time axis, in points, in a window of 1440 x 900; it grows with the window.
-    """
+    """A panel over time; what is beside it lies at its name below ``/axis``."""
 
     name: str
     height: float
+    """With its time axis, in points, in a window of 1440 x 900; it grows with the window."""
 
     def y(self, place: float) -> float:
         """Where a label is put in the view beside the panel, so that it stands at a place in it."""
@@ -167,34 +156,34 @@ class Panel:
 
 @dataclass(frozen=True)
 class Label:
-    """A text beside a panel.
-
-    Attributes:
-        place: Its height in the panel, from 0 at the bottom to 1 at the top.
-        text: A line or several.
-        shift: From the middle of the view beside the panel to the right, in points.
-        color: Of the text.
-    """
+    """A text beside a panel."""
 
     place: float
+    """Its height in the panel, from 0 at the bottom to 1 at the top."""
     text: str
     shift: float = 0.0
-    color: colors.Color = INK
+    """From the middle of the view beside the panel to the right, in points."""
+    color: Color = INK
 
 
-def log_left(recording: rr.RecordingStream, panel: Panel, labels: Sequence[Label]) -> None:
-    """Log what stands at the left of a panel: its title, names of rows, ticks."""
-    _log_labels(recording, f"/axis/{panel.name}/left", panel, labels)
-
-
-def log_right(recording: rr.RecordingStream, panel: Panel, labels: Sequence[Label]) -> None:
-    """Log what stands at the right of a panel."""
-    _log_labels(recording, f"/axis/{panel.name}/right", panel, labels)
+def log_beside(
+    recording: rr.RecordingStream,
+    panel: Panel,
+    left: Sequence[Label],
+    right: Sequence[Label] | Scale,
+    unit: str = "dB",
+) -> None:
+    """Log what stands beside a panel: its title, names of rows, ticks, and labels or a scale."""
+    log_labels(recording, panel, "left", left)
+    if isinstance(right, Scale):
+        log_scale(recording, panel, right, unit)
+    else:
+        log_labels(recording, panel, "right", right)
 
 
 def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: str = "dB") -> None:
     """Log a scale of colours at the right of a panel, with its ticks in decibels."""
-    path, shift = f"/axis/{panel.name}/right", -22.0 / panel.height
+    shift = -22.0 / panel.height
     below = 2.0 * HALF + LINE * title.count("\n") + HALF  # the title ends, the highest tick begins
     top = 1.0 - below / (GROWN * panel.height - AXIS)
     low = 0.04
@@ -203,12 +192,30 @@ def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: 
     shades = scale.colours(np.linspace(scale.low, scale.high, STEPS))
     strips = [[[shift, low], [shift, high]] for low, high in pairwise(edges.tolist())]
     bar = rr.LineStrips2D(strips, colors=shades, radii=rr.Radius.ui_points(6.0))
-    recording.log(f"{path}/scale", bar, static=True)
+    recording.log(f"/axis/{panel.name}/right/scale", bar, static=True)
     ticks = [
         Label(low + (top - low) * float(scale.place(np.array(tick))), written(tick), 8.0)
         for tick in scale.ticks
     ]
-    log_right(recording, panel, [*ticks, Label(1.0, title)])
+    log_labels(recording, panel, "right", [*ticks, Label(1.0, title)])
+
+
+def log_labels(
+    recording: rr.RecordingStream, panel: Panel, side: str, labels: Sequence[Label]
+) -> None:
+    """Log labels at one side of a panel."""
+    places = [(label.shift / panel.height, panel.y(label.place)) for label in labels]
+    drawn = texts(places, [label.text for label in labels], [label.color for label in labels])
+    recording.log(f"/axis/{panel.name}/{side}", drawn, static=True)
+
+
+def texts(
+    places: Sequence[tuple[float, float]], words: Sequence[str], colours: Sequence[Color]
+) -> rr.Points2D:
+    """Texts in a plane, each below its place."""
+    return rr.Points2D(
+        places, labels=words, colors=colours, radii=rr.Radius.ui_points(0.0), show_labels=True
+    )
 
 
 ALL = ("$origin/**", SPAN)
@@ -277,39 +284,16 @@ def hertz(value: float) -> str:
     return f"{value:g} Hz" if value < 1000 else f"{value / 1000:g} kHz"
 
 
-def _log_labels(
-    recording: rr.RecordingStream, path: str, panel: Panel, labels: Sequence[Label]
-) -> None:
-    points = rr.Points2D(
-        [[label.shift / panel.height, panel.y(label.place)] for label in labels],
-        labels=[label.text for label in labels],
-        colors=[label.color for label in labels],
-        radii=rr.Radius.ui_points(0.0),
-        show_labels=True,
-    )
-    recording.log(path, points, static=True)
-
-
 def log_verdict(
     recording: rr.RecordingStream, verdict: str, text: str, time: float | None = None
 ) -> None:
-    """Log a verdict in white on its colour, for all times or from one on, in [s].
-
-    Args:
-        verdict: A key of ``colors.VERDICTS``.
-    """
+    """Log a verdict, a key of ``colors.VERDICTS``, for all times or from one on, in [s]."""
     band = rr.LineStrips2D(
         [[(-99.0, 0.5), (99.0, 0.5)]],
         colors=[colors.VERDICTS[verdict]],
         radii=rr.Radius.ui_points(60.0),
     )
-    words = rr.Points2D(
-        [(0.0, 0.5 - TEXT / VERDICT)],
-        labels=[text],
-        colors=[WHITE],
-        radii=rr.Radius.ui_points(0.0),
-        show_labels=True,
-    )
+    words = texts([(0.0, 0.5 - TEXT / VERDICT)], [text], [WHITE])
     if time is not None:
         recording.set_time(TIMELINE, duration=time)
     for path, drawn in (("band", band), ("words", words)):
@@ -333,11 +317,7 @@ def log_rows(
     width: float,
     lines: int = 1,
 ) -> None:
-    """Log rows of colours, the first at the top.
-
-    Args:
-        edges: Starts of the columns and the end of the last one, shape (columns + 1,), in [s].
-    """
+    """Log rows of colours, shape (rows, columns, 4), the first at the top, between edges in [s]."""
     apart = (np.arange(lines) - (lines - 1) / 2) * TOP / len(names) / (lines + 1)
     for row, (name, place) in enumerate(zip(names, middles(len(names)), strict=True)):
         entity, own = f"{path}/{row:02d}", rgba[row]
@@ -360,6 +340,28 @@ def log_rows(
         )
 
 
+def log_levels(
+    recording: rr.RecordingStream,
+    panel: Panel,
+    edges: Array,
+    level: Real,
+    scale: Scale,
+    left: Sequence[Label],
+    *,
+    path: str,
+    names: Sequence[str],
+    width: float,
+    lines: int = 1,
+    shades: int = SHADES,
+) -> None:
+    """Log levels in [dB], shape (rows, columns), as rows of colours; nothing where one is NaN."""
+    unknown = np.isnan(level)
+    rgba = scale.colours(np.asarray(np.where(unknown, scale.low, level)), shades=shades)
+    rgba[unknown] = EMPTY
+    log_rows(recording, path, edges, rgba, names=names, width=width, lines=lines)
+    log_beside(recording, panel, left, scale)
+
+
 def log_row(
     recording: rr.RecordingStream,
     path: str,
@@ -369,22 +371,14 @@ def log_row(
     place: tuple[int, int],
     between: tuple[float, float],
 ) -> None:
-    """Log stretches of time in a row, if there are any.
+    """Log stretches of time, in [s], if there are any, in a row by its number among all rows.
 
     Args:
-        stretches: Start and stop of each, in [s].
-        place: Number of the row, and of all rows.
         between: From where to where in the row, from above.
     """
     if stretches:
         row, count = place
         upper, lower = (TOP * (1.0 - (row + share) / count) for share in between)
-        ends = (lower, upper)
         unstable.log_stretches(
-            recording, path, stretches, between=ends, name=name, color=color, opaque=True
+            recording, path, stretches, between=(lower, upper), name=name, color=color, opaque=True
         )
-
-
-def blanked(rgba: NDArray[np.uint8], known: Mask) -> NDArray[np.uint8]:
-    """Blank the columns of which nothing is known; colours, shape (rows, columns, 4)."""
-    return np.where(known[None, :, None], rgba, np.array(EMPTY, dtype=np.uint8))

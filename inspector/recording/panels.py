@@ -6,7 +6,8 @@ One run, two, many and a stream draw the same panels; each only chooses which.
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, takewhile
+from itertools import takewhile
+from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -26,7 +27,7 @@ from inspector.report.findings import brief, classes_of, finding_of, spoken
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
-from noisemodel.types import Array, Real
+from noisemodel.types import Array, Mask, Real
 
 HATCHES = 6
 """Strokes of a gap."""
@@ -70,35 +71,26 @@ def limbs(names: Sequence[str], tree: UrdfTree | None) -> dict[str, tuple[str, .
 
 def _chains(names: Sequence[str], tree: UrdfTree) -> list[tuple[str, ...]]:
     """Follow the robot outwards: a limb begins where it branches, and has two joints or more."""
-    carrier = _carriers(names, tree)
-    branches = Counter(carrier.values())
-    limb: dict[str, str] = {}
+    moved_by = {joint.child_link: joint for joint in tree.joints()}
+    carrier: dict[str, str] = {}  # the next of the named joints towards the root, if there is one
+    for joint in moved_by.values():
+        link = joint.parent_link
+        while link in moved_by and moved_by[link].name not in names:
+            link = moved_by[link].parent_link
+        carrier[joint.name] = moved_by[link].name if link in moved_by else ""
+    branches = Counter(carrier[name] for name in names)
+    limb = {"": ""}
     waiting = list(names)
     while waiting:
         name = next(name for name in waiting if carrier[name] not in waiting)
-        above = carrier[name]
-        alone = not branches[name]  # a finger, a wheel
-        goes_on = above in limb and (alone or branches[above] == 1)
-        limb[name] = limb[above] if goes_on else "" if alone and not above else name
+        above, alone = carrier[name], not branches[name]  # a finger, a wheel
+        goes_on = above and (alone or branches[above] == 1)
+        limb[name] = limb[above] if goes_on or (alone and not above) else name
         waiting.remove(name)
     return [
         tuple(name for name in names if limb[name] == first)
         for first in dict.fromkeys(limb[name] for name in names)
     ]
-
-
-def _carriers(names: Sequence[str], tree: UrdfTree) -> dict[str, str]:
-    """Name, for each joint, the next of them towards the root; nothing if there is none."""
-    moved_by = {joint.child_link: joint for joint in tree.joints()}
-    carrier = {}
-    for joint in tree.joints():
-        link, found = joint.parent_link, ""
-        while not found and link in moved_by:
-            above = moved_by[link]
-            found = above.name if above.name in names else ""
-            link = above.parent_link
-        carrier[joint.name] = found
-    return {name: carrier[name] for name in names}
 
 
 def _limb_title(joints: Sequence[str]) -> str:
@@ -131,8 +123,18 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     run, labels = analysis.run, analysis.labels
     colours = colours_of(analysis)
     if labels is not None:
-        _log_scores(recording, labels, colours)
-    _log_events(recording, analysis, colours)
+        centres = (labels.start + labels.stop) / 2
+        for name, score in zip(labels.classes, labels.scores.T, strict=True):
+            path, called = f"/score/{name}", spoken(name)
+            axes.log_line(recording, path, centres, score, colours[name], name=called)
+    if rows := listed_events(analysis):
+        axes.log_events(
+            recording,
+            [event.start for _, event in rows],
+            [f"{how}: {brief(analysis, event)}" for how, event in rows],
+            [colours[event.label] for _, event in rows],  # legible in light themes, too
+            warnings=[how == "found" for how, _ in rows],
+        )
     names = classes_of(analysis)
     if not names:
         return []
@@ -140,11 +142,8 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     count = len(names) + bool(lost)
     panel = Panel("class", ROW * count + axes.AXIS)
     for row, name in enumerate(names):
-        found = found_stretches(analysis, name)
-        blocks = [(block.start, block.stop) for block in run.blocks if block.label == name]
-        place = (row, count)
-        log_class(recording, "found", name, found, colours[name], place, FOUND)
-        log_class(recording, "annotated", name, blocks, axes.INK, place, ANNOTATED)
+        shades, place = (colours[name], axes.INK), (row, count)
+        log_class(recording, analysis, name, place, shades, (FOUND, ANNOTATED))
         if starts := [event.start for event in analysis.findings if event.label == name]:
             middle = axes.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
             log_marks(recording, name, row, colours[name], starts, [middle] * len(starts))
@@ -154,11 +153,10 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     shown += [("gap: no samples", axes.INK)] * bool(lost)
     places = axes.row_labels([name for name, _ in shown])
     named = [replace(at, color=shade) for at, (_, shade) in zip(places, shown, strict=True)]
-    axes.log_left(recording, panel, named)
     both = labels is not None and bool(run.blocks)
     told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")] if both else []
     only = "found" if labels is not None else "annotated"
-    axes.log_right(recording, panel, told or [Label(0.5, only)])
+    axes.log_beside(recording, panel, named, told or [Label(0.5, only)])
     return [axes.timed(panel)]
 
 
@@ -178,39 +176,45 @@ def readable(color: colors.Color) -> colors.Color:
 
 
 def log_shades(
-    recording: rr.RecordingStream, path: str, analysis: Analysis, between: tuple[float, float]
+    recording: rr.RecordingStream,
+    path: str,
+    found: Sequence[tuple[str, float, float]],
+    styles: Mapping[str, tuple[str, colors.Color]],
+    between: tuple[float, float],
 ) -> None:
-    """Shade the findings in a plot, each in the colour of its class."""
-    colours = colours_of(analysis)
-    for name in dict.fromkeys(event.label for event in analysis.findings):
+    """Shade stretches in a plot, by kind, start and stop in [s], in the name and colour of each."""
+    for kind in dict.fromkeys(kind for kind, *_ in found):
+        own = [(start, stop) for each, start, stop in found if each == kind]
+        name, color = styles[kind]
         unstable.log_stretches(
-            recording,
-            f"{path}/{name}",
-            [(event.start, event.stop) for event in analysis.findings if event.label == name],
-            between=between,
-            name=f"found: {spoken(name)}",
-            color=colours[name],
+            recording, f"{path}/{kind}", own, between=between, name=name, color=color
         )
+
+
+def log_class(
+    recording: rr.RecordingStream,
+    analysis: Analysis,
+    name: str,
+    place: tuple[int, int],
+    shades: tuple[colors.Color, colors.Color],
+    between: tuple[tuple[float, float], tuple[float, float]],
+    side: str = "",
+) -> None:
+    """Log when a class was found, and when it was annotated, in its row; see `axes.log_row`."""
+    stretches = {
+        "found": found_stretches(analysis, name),
+        "annotated": [(b.start, b.stop) for b in analysis.run.blocks if b.label == name],
+    }
+    for (how, own), color, ends in zip(stretches.items(), shades, between, strict=True):
+        called = f"{side}, {how}: {spoken(name)}" if side else f"{how}: {spoken(name)}"
+        path = "/".join(["/class", *([side] if side else []), how, name])
+        axes.log_row(recording, path, called, own, color, place, ends)
 
 
 def found_stretches(analysis: Analysis, name: str) -> list[tuple[float, float]]:
     """When a class was found: findings as they are reported, and what else frames cover."""
     found = [(event.start, event.stop) for event in analysis.findings if event.label == name]
     return found + [(start, stop) for start, stop, label in analysis.lane if label == name]
-
-
-def log_class(
-    recording: rr.RecordingStream,
-    how: str,
-    name: str,
-    stretches: Sequence[tuple[float, float]],
-    color: colors.Color,
-    place: tuple[int, int],
-    between: tuple[float, float],
-) -> None:
-    """Log when a class was found or annotated, as `how` says; see `axes.log_row`."""
-    path, called = f"/class/{how}/{name}", f"{how.replace('/', ', ')}: {spoken(name)}"
-    axes.log_row(recording, path, called, stretches, color, place, between)
 
 
 def log_marks(
@@ -232,15 +236,6 @@ def log_marks(
     recording.send_columns(path, indexes=[axes.at(np.array(time))], columns=columns)
 
 
-def _log_scores(
-    recording: rr.RecordingStream, labels: Labels, colours: dict[str, colors.Color]
-) -> None:
-    centres = (labels.start + labels.stop) / 2
-    for name, score in zip(labels.classes, labels.scores.T, strict=True):
-        path, called = f"/score/{name}", spoken(name)
-        axes.log_line(recording, path, centres, score, colours[name], name=called)
-
-
 def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
     """List findings, and annotated failures that were not found, by time."""
     rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
@@ -251,21 +246,6 @@ def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
         if block.label != "ok" and finding_of(analysis, block) is None
     ]
     return sorted(rows, key=lambda row: row[1].start)
-
-
-def _log_events(
-    recording: rr.RecordingStream, analysis: Analysis, colours: dict[str, colors.Color]
-) -> None:
-    """List events: findings are warnings."""
-    rows = listed_events(analysis)
-    if rows:
-        axes.log_events(
-            recording,
-            [event.start for _, event in rows],
-            [f"{how}: {brief(analysis, event)}" for how, event in rows],
-            [colours[event.label] for _, event in rows],  # legible in light themes, too
-            warnings=[how == "found" for how, _ in rows],
-        )
 
 
 NOISE_POINTS = 100_000
@@ -279,9 +259,10 @@ def log_curves(
     recording: rr.RecordingStream, analysis: Analysis, beside: Comparison | None = None
 ) -> list[Timed]:
     """Log the noise, its level and the repetitions' level, and the probability of a failure."""
-    curves = [_log_noise(recording, analysis), _log_level(recording, analysis, beside)]
+    ends = log_noise(recording, NOISE, {"simplified": analysis}, [colors.NOISE])
+    curves = [_curve(recording, analysis, NOISE, ends), _log_level(recording, analysis, beside)]
     if analysis.labels is not None and analysis.alarm is not None:
-        curves.append(_log_probability(recording, analysis, analysis.alarm))
+        curves.append(_log_probability(recording, analysis, analysis.labels, analysis.alarm))
     return curves
 
 
@@ -289,36 +270,44 @@ def _curve(
     recording: rr.RecordingStream, analysis: Analysis, panel: Panel, between: tuple[float, float]
 ) -> Timed:
     """Shade findings and hatch gaps behind a curve, whose axis has these ends."""
-    path = f"/{panel.name}"
-    log_shades(recording, f"{path}/finding", analysis, between)
+    path, found = f"/{panel.name}", [(e.label, e.start, e.stop) for e in analysis.findings]
+    styles = {
+        name: (f"found: {spoken(name)}", shade) for name, shade in colours_of(analysis).items()
+    }
+    log_shades(recording, f"{path}/finding", found, styles, between)
     log_gaps(recording, path, analysis.run, between)
     plot = unstable.plot(panel.name, path, axes.ALL, between=between, titled=False)
     return axes.part(panel, plot), panel.height
 
 
 def scaled(values: Array) -> tuple[float, str]:
-    """A power of ten by which the largest of some values has one digit, and the unit then.
-
-    Args:
-        values: In [rad/s].
-    """
+    """A power of ten by which the largest of values in [rad/s] has one digit, and the unit then."""
     largest = float(np.nanmax(values, initial=0.0))
     power = int(np.floor(np.log10(largest))) if largest > 0.0 else 0
     return 10.0**power, "rad/s" if power == 0 else f"{10.0**power:g} rad/s"
 
 
-def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> Timed:
-    run, noise = analysis.run, analysis.noise
-    scale, unit = scaled(noise[run.mask])
-    time, values = extremes(run.time[run.mask], noise[run.mask, None] / scale, points=NOISE_POINTS)
-    peak = float(values.max(initial=0.0))
-    between = (0.0, 1.08 * max(peak, 0.01))
-    name = f"noise p\u0302 [{unit}]"
-    axes.log_line(recording, "/noise/simplified", time, values[:, 0], colors.NOISE, name=name)
-    axes.log_left(recording, NOISE, [Label(0.5, f"noise p\u0302\n[{unit}]")])
-    label = Label(min(peak / between[1], 0.9), f"max\n{peak * scale:.3g}")
-    axes.log_right(recording, NOISE, [label])
-    return _curve(recording, analysis, NOISE, between)
+def log_noise(
+    recording: rr.RecordingStream,
+    panel: Panel,
+    sides: Mapping[str, Analysis],
+    shades: Sequence[colors.Color],
+    right: Sequence[Label] = (),
+    points: int = NOISE_POINTS,
+) -> tuple[float, float]:
+    """Log the noise of one run or two on one axis, and what stands beside it; the axis' ends."""
+    known = [side.noise[side.run.mask] for side in sides.values()]
+    scale, unit = scaled(np.concatenate(known))
+    peak = 0.0
+    for (which, side), noise, shade in zip(sides.items(), known, shades, strict=True):
+        name = which if len(sides) > 1 else f"noise p\u0302 [{unit}]"
+        time, values = extremes(side.run.time[side.run.mask], noise[:, None] / scale, points=points)
+        axes.log_line(recording, f"/noise/{which}", time, values[:, 0], shade, name=name)
+        peak = float(values.max(initial=peak))
+    top = 1.08 * max(peak, 0.01)
+    right = right or [Label(min(peak / top, 0.9), f"max\n{peak * scale:.3g}")]
+    axes.log_beside(recording, panel, [Label(0.5, f"noise p\u0302\n[{unit}]")], right)
+    return 0.0, top
 
 
 def _log_level(
@@ -332,27 +321,26 @@ def _log_level(
         axes.log_lines(recording, path, time, beside.band, names=names, colours=band)
     name = f"noise above {lowest:g} Hz [dB re 1 rad/s]"
     axes.log_line(recording, "/level/noise", time, level[:, 0], colors.LEVEL, name=name)
-    title = f"level above\n{lowest:g} Hz [dB re\n1 rad/s]"
-    log_level_axis(recording, LEVEL, Label(0.62, title, -20.0))
     peak = float(np.nanmax(level, initial=LOW_DB))
     place = min(max((peak - LOW_DB) / (HIGH_DB - LOW_DB), 0.05), 0.85)
-    axes.log_right(recording, LEVEL, [Label(place, f"max\n{axes.written(peak)}")])
+    left = level_axis(f"level above\n{lowest:g} Hz [dB re\n1 rad/s]", -20.0)
+    axes.log_beside(recording, LEVEL, left, [Label(place, f"max\n{axes.written(peak)}")])
     return _curve(recording, analysis, LEVEL, (LOW_DB, HIGH_DB))
 
 
-def log_level_axis(recording: rr.RecordingStream, panel: Panel, title: Label) -> None:
-    """Log the title and the ticks of the axis of levels."""
+def level_axis(title: str = "above 10 Hz\n[dB re\n1 rad/s]", shift: float = -22.0) -> list[Label]:
+    """The title and the ticks of the axis of levels."""
     marks = [
         Label((tick - LOW_DB) / (HIGH_DB - LOW_DB), axes.written(tick), 44.0)
         for tick in (-60.0, -40.0, -20.0, 0.0)
     ]
-    axes.log_left(recording, panel, [title, *marks])
+    return [Label(0.62, title, shift), *marks]
 
 
-def _log_probability(recording: rr.RecordingStream, analysis: Analysis, alarm: float) -> Timed:
-    labels, run = analysis.labels, analysis.run
-    assert labels is not None
-    middles = (labels.start + labels.stop) / 2
+def _log_probability(
+    recording: rr.RecordingStream, analysis: Analysis, labels: Labels, alarm: float
+) -> Timed:
+    run, middles = analysis.run, (labels.start + labels.stop) / 2
     failure = 1.0 - labels.scores[:, 0]
     # Between frames that a gap parts there is no line.
     apart = np.flatnonzero(labels.start[1:] > labels.stop[:-1] + 1.0 / run.rate) + 1
@@ -363,8 +351,8 @@ def _log_probability(recording: rr.RecordingStream, analysis: Analysis, alarm: f
     path, name = "/probability/alarm", f"alarm threshold {alarm:g}"
     ends = run.time[[0, -1]]
     axes.log_line(recording, path, ends, np.full(2, alarm), colors.THRESHOLD, name=name)
-    axes.log_left(recording, PROBABILITY, [Label(0.5, "probability\nof a failure")])
-    axes.log_right(recording, PROBABILITY, [Label(alarm, f"alarm {alarm:g}")])
+    title, mark = Label(0.5, "probability\nof a failure"), Label(alarm, f"alarm {alarm:g}")
+    axes.log_beside(recording, PROBABILITY, [title], [mark])
     return _curve(recording, analysis, PROBABILITY, (0.0, 1.05))
 
 
@@ -375,15 +363,12 @@ UNITS = {"velocity": "rad/s", "position": "rad", "effort": "N m"}
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """A signal of joints, of a kind such as "velocity" or "stage planned".
-
-    Attributes:
-        values: Shape (samples, joints), in the unit of its kind.
-    """
+    """A signal of joints, of a kind such as "velocity" or "stage planned"."""
 
     kind: str
     desired: bool
     values: Real
+    """Shape (samples, joints), in the unit of its kind."""
     joints: tuple[str, ...]
 
     @property
@@ -410,75 +395,59 @@ def signals(run: Run) -> list[Signal]:
     ]
 
 
+Drawn: TypeAlias = tuple[str, Signal, Mask, str, bool]
+"""Entity of a signal, the signal, the samples shown, what is added to names, whether it is dim."""
+
+
 def log_joints(
     recording: rr.RecordingStream, run: Run, limbs: Mapping[str, tuple[str, ...]]
 ) -> list[Part]:
     """Log the joints' signals, at most 4000 points each; tabs of a limb each."""
-    plots: dict[str, list[Part]] = {}
-    whole = bool(run.mask.all())  # then a signal can stay in its file
-    for kind, group in groupby(signals(run), key=lambda signal: signal.kind):
-        both = list(group)[::-1]  # the first is drawn below the other
-        paths = [
-            log_signal(
-                recording,
-                f"/joints/{kind.replace(' ', '_')}{'_desired' * signal.desired}",
-                signal if whole else replace(signal, values=signal.values[run.mask]),
-                run.time[run.mask],
-                limbs,
-                suffix=" desired" * signal.desired,
-                dim=signal.desired,
-                points=JOINT_POINTS,
-            )
-            for signal in both
-        ]
-        for limb in limbs:
-            shown = [each[limb] for each in paths if limb in each]
-            plots.setdefault(limb, []).append(signal_plot(f"{kind} [{both[0].unit}]", shown))
-    return limb_tabs(plots)
+    plots: dict[str, list[Drawn]] = {}
+    for signal in signals(run):
+        path = f"/joints/{signal.kind.replace(' ', '_')}{'_desired' * signal.desired}"
+        drawn = (path, signal, run.mask, " desired" * signal.desired, signal.desired)
+        # The first is drawn below the other.
+        plots.setdefault(f"{signal.kind} [{signal.unit}]", []).insert(0, drawn)
+    return log_plots(recording, run.time, plots, limbs, JOINT_POINTS)
 
 
-def signal_plot(title: str, paths: Sequence[str]) -> Part:
-    """A plot of lines that lie at these paths."""
-    return unstable.plot(title, "/joints", (*paths, axes.SPAN), legend=True)
-
-
-def limb_tabs(plots: Mapping[str, Sequence[Part]]) -> list[Part]:
-    """A part for each limb, with its plots behind each other."""
-    return [unstable.tabs(*own, name=limb) for limb, own in plots.items()]
-
-
-def log_signal(
+def log_plots(
     recording: rr.RecordingStream,
-    path: str,
-    signal: Signal,
     time: Array,
+    plots: Mapping[str, Sequence[Drawn]],
     limbs: Mapping[str, tuple[str, ...]],
-    *,
-    suffix: str,
-    dim: bool,
     points: int,
-) -> dict[str, str]:
-    """Log a signal, each limb as one entity.
-
-    Args:
-        time: Shape (samples,), in [s].
-    """
-    shown, values = extremes(time, signal.values, points=points)
-    paths = {}
-    for number, (limb, joints) in enumerate(limbs.items()):
-        colours = dict(zip(joints, colors.of_series(len(joints), dim=dim), strict=True))
-        own = [name for name in joints if name in signal.joints]
-        if own:
-            paths[limb] = f"{path}/{number}"
-            axes.log_lines(
-                recording,
-                paths[limb],
-                shown,
-                np.ascontiguousarray(values[:, [signal.joints.index(name) for name in own]]),
-                names=[name + suffix for name in own],
-                colours=[colours[name] for name in own],
+) -> list[Part]:
+    """Log signals, an entity for each limb; a tab for each limb, with its plots as tabs."""
+    parts: dict[str, list[Part]] = {limb: [] for limb in limbs}
+    for title, signals in plots.items():
+        paths: dict[str, list[str]] = {limb: [] for limb in limbs}
+        for path, signal, mask, suffix, dim in signals:
+            whole = bool(mask.all())  # then a signal can stay in its file
+            shown, values = extremes(
+                time if whole else time[mask],
+                signal.values if whole else signal.values[mask],
+                points=points,
             )
-    return paths
+            for number, (limb, joints) in enumerate(limbs.items()):
+                colours = dict(zip(joints, colors.of_series(len(joints), dim=dim), strict=True))
+                if own := [name for name in joints if name in signal.joints]:
+                    columns = [signal.joints.index(name) for name in own]
+                    paths[limb].append(f"{path}/{number}")
+                    axes.log_lines(
+                        recording,
+                        paths[limb][-1],
+                        shown,
+                        np.ascontiguousarray(values[:, columns]),
+                        names=[name + suffix for name in own],
+                        colours=[colours[name] for name in own],
+                    )
+        for limb, own in paths.items():
+            if own:
+                plot = unstable.plot(title, "/joints", (*own, axes.SPAN), legend=True)
+                parts[limb].append(plot)
+    return [unstable.tabs(*own, name=limb) for limb, own in parts.items()]
 
 
 STRIP_ROW = 18.0
@@ -512,14 +481,7 @@ SHADES = 25
 
 
 def diverging(place: Array) -> NDArray[np.uint8]:
-    """Colour changes: blue at 0, grey at 0.5, orange at 1.
-
-    Args:
-        place: Any shape.
-
-    Returns:
-        Red, green, blue and opacity, shape (…, 4).
-    """
+    """Colour changes, red, green, blue and opacity: blue at 0, grey at 0.5, orange at 1."""
     scale = np.array([BEFORE, SAME, AFTER], dtype=np.float64)
     channels = [np.interp(place, (0.0, 0.5, 1.0), scale[:, channel]) for channel in range(3)]
     return np.stack([*channels, np.full(np.shape(place), 255.0)], axis=-1).astype(np.uint8)
@@ -532,12 +494,10 @@ CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
 def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
     """Log by how much each joint is louder than its reference: the eight that are most."""
     which = beside.loudest(SHOWN)
-    own, shown = [beside.joints[place] for place in which], beside.by_joint[:, which].T
-    rgba = CHANGE.colours(np.nan_to_num(shown, nan=0.0), shades=SHADES)
-    rgba[np.isnan(shown)] = axes.EMPTY
+    own, level = [beside.joints[place] for place in which], beside.by_joint[:, which].T
     edges = np.append(beside.time - HOP / 2, beside.time[-1] + HOP / 2)
     title, unit = "Over the reference", ", over the reference [dB]"
-    return _log_strip(recording, "over", title, edges, rgba, own, CHANGE, unit)
+    return _log_strip(recording, "over", title, edges, level, own, CHANGE, unit, SHADES)
 
 
 def log_links(
@@ -581,11 +541,9 @@ def _log_strips(
 ) -> Timed:
     """Log levels, shape (columns, rows), of those that vibrate most."""
     which = chosen(analysis, edges[:-1], level)
-    shown = level[:, which].T
-    rgba = scale.colours(np.nan_to_num(shown, nan=-np.inf), shades=axes.SHADES)
-    rgba = axes.blanked(rgba, np.asarray(~np.isnan(shown).all(axis=0)))
     own, title = [names[index] for index in which], f"{name.capitalize()} above 10 Hz"
-    return _log_strip(recording, name, title, edges, rgba, own, scale, f" [{scale.unit}]")
+    unit = f" [{scale.unit}]"
+    return _log_strip(recording, name, title, edges, level[:, which].T, own, scale, unit)
 
 
 def _log_strip(
@@ -593,16 +551,26 @@ def _log_strip(
     name: str,
     title: str,
     edges: Array,
-    rgba: NDArray[np.uint8],
+    level: Real,
     names: Sequence[str],
     scale: Scale,
     unit: str,
+    shades: int = axes.SHADES,
 ) -> Timed:
     panel, path = Panel(name, STRIP_ROW * len(names) + axes.AXIS), f"/strips/{name}"
-    called = [f"{each}{unit}" for each in names]
-    axes.log_rows(recording, path, edges, rgba, names=called, width=STRIP_WIDTH, lines=STROKES)
-    axes.log_left(recording, panel, axes.row_labels(names))
-    axes.log_scale(recording, panel, scale)
+    axes.log_levels(
+        recording,
+        panel,
+        edges,
+        level,
+        scale,
+        axes.row_labels(names),
+        path=path,
+        names=[f"{each}{unit}" for each in names],
+        width=STRIP_WIDTH,
+        lines=STROKES,
+        shades=shades,
+    )
     return axes.timed(panel, path, name=title)
 
 
@@ -623,35 +591,22 @@ HEIGHT = 160.0
 """Height of a spectrogram, in points."""
 
 
-def log_spectrogram(
+def log_panel(
     recording: rr.RecordingStream,
-    analysis: Analysis,
+    panel: Panel,
     spectrum: Spectrogram,
     scale: Scale,
     title: str,
-) -> Part:
-    """Log a spectrogram on a logarithmic axis, as rows of colours."""
-    panel = Panel("spectrogram", HEIGHT)
-    log_panel(recording, panel, spectrum, scale, "velocity\nspectrum")
-    log_gaps(recording, "/spectrogram", analysis.run, (0.0, axes.TOP))
-    return axes.timed(panel, name=title)[0]
-
-
-def log_panel(
-    recording: rr.RecordingStream, panel: Panel, spectrum: Spectrogram, scale: Scale, title: str
+    written: Callable[[float], str] = axes.hertz,
 ) -> None:
-    """Log a spectrogram with its axis in Hz and its scale."""
+    """Log a spectrogram with its axis and its scale."""
     edges, level = in_levels(spectrum)
     path = f"/{panel.name}/bands"
-    log_heat(recording, panel, path, spectrum.time, edges, level, scale, title)
+    log_heat(recording, panel, path, spectrum.time, edges, level, scale, title, written=written)
 
 
 def in_levels(spectrum: Spectrogram) -> tuple[Array, Array]:
-    """Bands of a logarithmic axis, and their levels.
-
-    Returns:
-        Edges, shape (bands + 1,), and levels in [dB], shape (bands, columns); NaN in gaps.
-    """
+    """Edges of bands, and their levels in [dB], shape (bands, columns); NaN in gaps."""
     low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
     edges = np.geomspace(low, max(high, 1.01 * low), BANDS + 1)
     level = 2 * decibel(in_bands(spectrum.frequency, spectrum.amplitude, edges))
@@ -675,18 +630,22 @@ def log_heat(
 
     Args:
         time: Middles of the columns, shape (columns,), in [s].
-        edges: Of the bands, shape (bands + 1,).
         level: Shape (bands, columns), in [dB]; nothing is drawn where it is NaN.
     """
-    log_axis(recording, panel, float(edges[0]), float(edges[-1]), Label(0.5, title, -22.0), written)
-    rgba = scale.colours(np.nan_to_num(level[::-1], nan=-np.inf), shades=shades)
-    rgba = axes.blanked(rgba, np.asarray(~np.isnan(level).all(axis=0)))
     half = np.diff(time).min(initial=WINDOW) / 2
-    times = np.append(time - half, time[-1] + half)
     unit = "Hz" if written is axes.hertz else "periods per turn"
-    names = [f"{centre:.0f} {unit}" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1].tolist()]
-    axes.log_rows(recording, path, times, rgba, names=names, width=LINE_WIDTH)
-    axes.log_scale(recording, panel, scale)
+    axes.log_levels(
+        recording,
+        panel,
+        np.append(time - half, time[-1] + half),
+        level[::-1],
+        scale,
+        band_axis(panel, edges, title, written),
+        path=path,
+        names=[f"{centre:.0f} {unit}" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1].tolist()],
+        width=LINE_WIDTH,
+        shades=shades,
+    )
 
 
 def log_orders(recording: rr.RecordingStream, analysis: Analysis, scale: Scale) -> list[Part]:
@@ -699,44 +658,22 @@ def log_orders(recording: rr.RecordingStream, analysis: Analysis, scale: Scale) 
         return []
     joint, spectrum = found
     panel = Panel("orders", HEIGHT)
-    edges, level = in_levels(spectrum)
-    path, title = "/orders/bands", "periods\nper turn"
-    written = "{:g}".format
-    log_heat(recording, panel, path, spectrum.time, edges, level, scale, title, written=written)
+    log_panel(recording, panel, spectrum, scale, "periods\nper turn", "{:g}".format)
     log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
     return [axes.timed(panel, name=f"Orders of {joint}")[0]]
 
 
-def log_axis(
-    recording: rr.RecordingStream,
-    panel: Panel,
-    low: float,
-    high: float,
-    title: Label,
-    written: Callable[[float], str],
-) -> None:
-    """Log a title and ticks at the left of a panel whose axis is logarithmic."""
+def band_axis(
+    panel: Panel, edges: Array, title: str, written: Callable[[float], str] = axes.hertz
+) -> list[Label]:
+    """Title and ticks at the left of a panel of bands, whose axis is logarithmic."""
+    low, high = float(edges[0]), float(edges[-1])
     span = np.log(max(high / low, 1.01))
     marks = [
         Label(float(np.log(tick / low) / span), written(tick), 40.0)
         for tick in axes.ticks(low, max(high, 1.01 * low), panel)
     ]
-    axes.log_left(recording, panel, [title, *marks])
-
-
-def style_bands(recording: rr.RecordingStream, path: str, centres: Sequence[float]) -> None:
-    """Log how the bands of one entity are drawn.
-
-    Args:
-        centres: Of its bands, in [Hz].
-    """
-    style = rr.SeriesLines(
-        names=[f"{centre:.0f} Hz" for centre in centres],
-        widths=[LINE_WIDTH] * len(centres),
-        aggregation_policy="Off",
-        interpolation_mode="StepAfter",
-    )
-    recording.log(path, style, static=True)
+    return [Label(0.5, title, -22.0), *marks]
 
 
 def log_bars(recording: rr.RecordingStream, path: str, spectrum: Spectrogram) -> None:

@@ -14,7 +14,7 @@ from rerun.urdf import UrdfTree
 from inspector import levels
 from inspector.analysis import Analysis, worst, worst_joint, worst_signal
 from inspector.levels import spectrogram
-from inspector.recording import axes, camera, panels, robot, unstable
+from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
 from inspector.report.findings import report, spoken
@@ -149,7 +149,7 @@ def _log_robot(recording: rr.RecordingStream, tree: UrdfTree, run: Run, folder: 
     assert run.robot is not None
     robot.log(recording, tree, run)
     urdf = robot.drawn_file(run.robot, folder)
-    (seen,) = camera.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
+    (seen,) = robot.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
     shown = unstable.robot("Robot, links coloured by level above 10 Hz", "/robot", seen)
     return unstable.beside((shown, 88.0), (unstable.drawing("/axis/key/right"), 12.0))
 
@@ -163,7 +163,10 @@ def _log_spectra(
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
     scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
     title = f"Spectrogram of {'the noise' if joint is None else run.joint_names[joint]}"
-    parts = [panels.log_spectrogram(recording, analysis, spectrum, scale, title)]
+    panel = axes.Panel("spectrogram", panels.HEIGHT)
+    panels.log_panel(recording, panel, spectrum, scale, "velocity\nspectrum")
+    panels.log_gaps(recording, "/spectrogram", run, (0.0, axes.TOP))
+    parts = [axes.timed(panel, name=title)[0]]
     parts += panels.log_orders(recording, analysis, scale)
     panels.log_bars(recording, "/spectrum/now", spectrum)
     top = min(panels.TOP_HZ, run.rate / 2)

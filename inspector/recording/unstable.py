@@ -70,15 +70,21 @@ def plot(
         during: Stretch of time that is shown, in [s]; by default as in all other views.
         last: Time up to the cursor that is shown in place of that, in [s].
     """
-    corner = (
-        rrb.Corner2D.RightTop if last is None else rrb.Corner2D.LeftTop
-    )  # the newest is at the right
+    time, corner = rrb.TimeAxis(link="LinkToGlobal"), rrb.Corner2D.RightTop
+    if during is not None:
+        start, stop = (rrb.TimeRangeBoundary.absolute(seconds=each) for each in during)
+        alone = rrb.TimeRange(start=start, end=stop)
+        time = rrb.TimeAxis(link="Independent", view_range=alone)
+    if last is not None:
+        start = rrb.TimeRangeBoundary.cursor_relative(seconds=-last)
+        ending = rrb.TimeRange(start=start, end=rrb.TimeRangeBoundary.cursor_relative())
+        time, corner = rrb.TimeAxis(view_range=ending), rrb.Corner2D.LeftTop  # the newest is right
     return rrb.TimeSeriesView(
         origin=origin,
         contents=list(paths),
         name=name,
         plot_legend=rrb.PlotLegend(corner, visible=legend),
-        axis_x=_over(last) if during is None else _alone(*during),
+        axis_x=time,
         background=rrb.archetypes.PlotBackground(color=PLOTS),  # in light themes, too
         axis_y=None if between is None else rrb.ScalarAxis(range=between, zoom_lock=fixed),
         titlebar=None if titled else False,
@@ -112,23 +118,18 @@ def bars(name: str, origin: str) -> Part:
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """Where a view of a robot is seen from.
-
-    Attributes:
-        eye: Where the camera stands, shape (3,), in [m].
-        target: What it looks at, shape (3,), in [m].
-        floor: Height of the floor, in [m].
-        spacing: Distance of the lines on the floor, in [m].
-        frame: Frame of transforms that the view is drawn in, and all this.
-        moves: Whether that frame moves with a base, over a floor that is drawn by itself.
-    """
+    """Where a view of a robot is seen from, and what at, shape (3,), in [m]."""
 
     eye: Array
     target: Array
     floor: float
+    """Height of the floor, in [m]."""
     spacing: float
+    """Distance of the lines on the floor, in [m]."""
     frame: str = ""
+    """Frame of transforms that the view is drawn in, and all this."""
     moves: bool = False
+    """Whether that frame moves with a base, over a floor that is drawn by itself."""
 
 
 def robot(name: str, origin: str, camera: Camera) -> Part:
@@ -189,21 +190,16 @@ def beside(*parts: tuple[Part, float], name: str | None = None) -> Part:
 def blueprint(
     content: Part, loop: tuple[float, float] | None = None, *, following: bool = False
 ) -> rrb.Blueprint:
-    """Fill the window with a part; panels stay closed.
-
-    Args:
-        loop: Stretch of time that is selected, and that playing repeats, in [s].
-    """
+    """Fill the window with a part; playing repeats a stretch of time, if there is one, in [s]."""
     playing: Literal["following", "paused"] = "following" if following else "paused"
-    time = rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state=playing)
-    if loop is not None:
-        time = rrb.TimePanel(
-            state="collapsed",
-            timeline=TIMELINE,
-            play_state="paused",
-            loop_mode="selection",
-            time_selection=rrb.components.AbsoluteTimeRange(*map(_nanoseconds, loop)),
-        )
+    selected = None if loop is None else rrb.components.AbsoluteTimeRange(*map(_nanoseconds, loop))
+    time = rrb.TimePanel(
+        state="collapsed",
+        timeline=TIMELINE,
+        play_state=playing,
+        loop_mode=None if loop is None else "selection",
+        time_selection=selected,
+    )
     return rrb.Blueprint(
         content,
         rrb.BlueprintPanel(state="collapsed"),
@@ -233,12 +229,7 @@ def log_bars(
     places: Array,
     color: tuple[int, int, int],
 ) -> None:
-    """Log a bar chart for each of several times.
-
-    Args:
-        bars: Heights, shape (times, bars).
-        places: Where the bars stand, shape (bars,).
-    """
+    """Log a bar chart, shape (times, bars), for each of several times."""
     widths = np.diff(places, prepend=0.0)
     heights, stands = _tensors(bars), _tensors(places[None])
     style = rr.BarChart(heights[:1], abscissa=stands, color=color, widths=widths)
@@ -263,13 +254,10 @@ def log_stretches(
     color: tuple[int, int, int],
     opaque: bool = False,
 ) -> None:
-    """Shade stretches of time in a plot; rerun 0.41 cannot annotate them.
+    """Shade stretches of time, in [s], in a plot; rerun 0.41 cannot annotate them.
 
     The band of a measurement, one standard deviation to either side, is filled to its exact edges;
     a thick line has round ends. It is translucent, and several of them are opaque.
-
-    Args:
-        stretches: Start and stop of each, in [s].
     """
     copies = COPIES if opaque else 1
     middle, half = (between[0] + between[1]) / 2, (between[1] - between[0]) / 2
@@ -283,7 +271,7 @@ def log_stretches(
     # A value that is none ends a band.
     times = np.array([(start, stop, stop + 1) for start, stop in apart], dtype=np.int64).ravel()
     values = np.tile([middle, middle, np.nan], len(apart))[:, None].repeat(copies, axis=1)
-    style_bands(recording, path, [name] * copies, [color] * copies)
+    style_bands(recording, path, [name], [color], copies)
     index = rr.TimeColumn(TIMELINE, duration=times.astype("timedelta64[ns]"))
     recording.send_columns(path, indexes=[index], columns=band_columns(values, half))
 
@@ -293,9 +281,14 @@ def style_bands(
     path: str,
     names: Sequence[str],
     shades: Sequence[tuple[int, int, int]],
+    copies: int,
 ) -> None:
-    """Log names and colours of bands that `band_columns` draws."""
-    style = rr.Measurements.from_fields(names=names, colors=shades, widths=[0.0] * len(names))
+    """Log names and colours of bands that `band_columns` draws, each so many times."""
+    style = rr.Measurements.from_fields(
+        names=[name for name in names for _ in range(copies)],
+        colors=[shade for shade in shades for _ in range(copies)],
+        widths=[0.0] * len(names) * copies,
+    )
     recording.log(path, style, static=True)
 
 
@@ -314,24 +307,6 @@ def client(address: str) -> "ViewerClient":
     from rerun.experimental import ViewerClient
 
     return ViewerClient.connect(address)
-
-
-def _over(last: float | None) -> rrb.TimeAxis:
-    if last is None:
-        return rrb.TimeAxis(link="LinkToGlobal")
-    shown = rrb.TimeRange(
-        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-last),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
-    )
-    return rrb.TimeAxis(view_range=shown)
-
-
-def _alone(start: float, stop: float) -> rrb.TimeAxis:
-    shown = rrb.TimeRange(
-        start=rrb.TimeRangeBoundary.absolute(seconds=start),
-        end=rrb.TimeRangeBoundary.absolute(seconds=stop),
-    )
-    return rrb.TimeAxis(link="Independent", view_range=shown)
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -83,8 +83,8 @@ def _wayland_problem() -> str | None:
     name = os.environ.get("WAYLAND_DISPLAY")
     if not name:
         return None
-    socket_ = Path(os.environ.get("XDG_RUNTIME_DIR", "")) / name
-    reason = _unreachable([str(socket_)]) if socket_.is_absolute() else "XDG_RUNTIME_DIR is not set"
+    path = Path(os.environ.get("XDG_RUNTIME_DIR", "")) / name
+    reason = _unreachable([str(path)]) if path.is_absolute() else "XDG_RUNTIME_DIR is not set"
     return reason and f"the display {name} cannot be opened ({reason})"
 
 
@@ -122,10 +122,7 @@ def _unreachable(addresses: Sequence[str | tuple[str, int]]) -> str:
 
 
 def scratch_path(run: Path) -> Path:
-    """The file for a recording without a name: the same run replaces its own.
-
-    The oldest of such files are deleted where there are too many.
-    """
+    """The file for a recording without a name: the same run replaces its own."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = cache / "noise-inspector" / "recordings"
     try:
@@ -162,12 +159,7 @@ def command(*arguments: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Process:
-    """A viewer that was started.
-
-    Attributes:
-        process: In a session of its own.
-        stderr: What it writes there.
-    """
+    """A viewer that was started, in a session of its own."""
 
     process: "subprocess.Popen[bytes]"
     stderr: IO[bytes]
@@ -184,6 +176,15 @@ class Process:
         if re.search(r"winit|X server|wayland", reason, re.IGNORECASE):
             reason = f"no window can be opened on this display: {reason.rpartition(': ')[2]}"
         return f"the viewer ended with status {code}{reason and f' ({reason})'}"
+
+    def listens(self, port: int, seconds: float) -> bool:
+        """Wait until a program listens on a port, unless this one ends or it takes too long."""
+        until = time.monotonic() + seconds
+        while problem := _unreachable([(HOST, port)]):
+            if self.process.poll() is not None or time.monotonic() > until:
+                break
+            time.sleep(0.05)
+        return not problem
 
     def kill(self) -> None:
         """End it with all its children."""
@@ -221,15 +222,7 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
 
 
 def open_window(recording: Path, seconds: float | None = None) -> str:
-    """Show a recording in the viewer that runs, or start one and do not wait for it to end.
-
-    Args:
-        seconds: Where the time cursor is put, in [s], if nothing else takes the viewer's port; a
-            layout cannot say that.
-
-    Returns:
-        Why no window opened, in a line; empty if one did.
-    """
+    """Show a recording in the viewer that runs, or a new one; why no window opened, if none did."""
     if problem := display_problem():
         return problem
     if not _started(recording, PORT):
@@ -257,12 +250,9 @@ def _put_cursor(address: str, seconds: float) -> None:
 def _started(recording: Path, port: str) -> str:
     taken = port.isdigit() and not _unreachable([(HOST, int(port))])
     with started("--port", port, "--hide-welcome-screen", str(recording)) as viewer:
-        until = time.monotonic() + START_TIMEOUT
         # It listens before it opens its window; if another one does already, it only passes on.
-        while port.isdigit() and viewer.process.poll() is None and time.monotonic() < until:
-            if not taken and not _unreachable([(HOST, int(port))]):
-                break
-            time.sleep(0.05)
+        if port.isdigit() and not taken:
+            viewer.listens(int(port), START_TIMEOUT)
         try:
             code = viewer.process.wait(timeout=SETTLE)
         except subprocess.TimeoutExpired:
@@ -285,12 +275,7 @@ SERVE_TIMEOUT = 30.0
 
 @dataclass(frozen=True)
 class Served:
-    """A recording that browsers on this machine can open.
-
-    Attributes:
-        url: Its address.
-        server: The viewer that serves it.
-    """
+    """A recording that browsers on this machine can open at an address."""
 
     url: str
     server: Process
@@ -332,7 +317,10 @@ def serving(recording: Path, *, port: int = 0) -> Iterator[Served]:
         ports = ("--web-viewer-port", str(page), "--port", str(other))
         with started("--serve-web", *ports) as viewer:
             try:
-                _wait_for(page, viewer)
+                if not viewer.listens(page, SERVE_TIMEOUT):
+                    silent = f"the viewer does not respond on port {page}"
+                    late = f"{silent}, {SERVE_TIMEOUT:g} s after its start"
+                    raise ViewerError(viewer.ended() or late)
                 Relay.recording, Relay.page = recording, page
                 Relay.hosts = {f"{name}:{taken}" for name in (HOST, "localhost")}
                 server.server_activate()
@@ -407,22 +395,6 @@ def free_port(wanted: int = 0, *, other: int = 0) -> int:
     return free_port(other=other) if found == other and not wanted else found
 
 
-def _wait_for(port: int, server: Process) -> None:
-    until = time.monotonic() + SERVE_TIMEOUT
-    while time.monotonic() < until:
-        if problem := server.ended():
-            raise ViewerError(problem)
-        try:
-            socket.create_connection((HOST, port), 0.2).close()
-        except OSError:
-            time.sleep(0.05)
-        else:
-            return
-    raise ViewerError(
-        f"the viewer does not respond on port {port}, {SERVE_TIMEOUT:g} s after its start"
-    )
-
-
 DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 WINDOW = (1440, 900)
 """Of the picture, in points; beyond, a software driver takes minutes."""
@@ -460,11 +432,7 @@ def shoot(
     size: tuple[int, int] = WINDOW,
     overwrite: bool = False,
 ) -> tuple[str, ...]:
-    """Take a picture of a recording.
-
-    Args:
-        seconds: Where the time cursor stands, in [s].
-    """
+    """Take a picture of a recording at a time, in [s]."""
     require_driver()
     check_recording(recording)
     refuse_existing(output, overwrite=overwrite)
@@ -526,11 +494,7 @@ def headless_viewer(size: tuple[int, int] = WINDOW) -> "Iterator[ViewerClient]":
 
 
 def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
-    """Open a recording at a time and wait until nothing moves any more.
-
-    Args:
-        seconds: Where the time cursor stands, in [s].
-    """
+    """Open a recording at a time, in [s], and wait until nothing moves any more."""
     client.open(str(recording.resolve()))
     until = time.monotonic() + TIMEOUT
     while client.get_state().loading and time.monotonic() < until:
