@@ -467,53 +467,32 @@ def log_cameras(
     aspect: float = 1.0,
 ) -> list[Camera]:
     """Place the cameras for runs of a robot, and log how they move with a base, over its floor."""
-    drawn = outermost(urdf)
-    parts: list[Iterator[Array]] = []
+    drawn, parts, poses = outermost(urdf), list[Iterator[Array]](), list[Array | None]()
     for tree, run in robots:
-        frames = shown(run)
-        parts.append(reached(tree, drawn, angles(tree, run, frames), _base(run)))
+        frames, base = shown(run), run.base_pose
+        moving = None if base is None else base[frames].astype(np.float64)
+        poses.append(moving if len(frames) else None)
+        parts.append(reached(tree, drawn, angles(tree, run, frames), poses[-1]))
     seen = fitted(chain(*parts), aspect=aspect)
     cameras = []
-    for tree, run in robots:
-        pose = _base(run)
-        moves = pose is not None and len(pose) > 0
-        cameras.append(standing(seen, tree, moves=moves))
-        if pose is not None and moves:
-            follow(recording, tree, run.time[shown(run)], pose)
+    for (tree, run), pose in zip(robots, poses, strict=True):
+        cameras.append(standing(seen, tree, moves=pose is not None))
+        if pose is not None:  # the camera follows on the floor below the base, without its turns
+            below = rr.Transform3D.columns(
+                translation=pose[:, :3] * ON_FLOOR,
+                parent_frame=[frame(tree, WORLD)] * len(pose),
+                child_frame=[frame(tree, VIEW)] * len(pose),
+            )
+            index = axes.at(run.time[shown(run)])
+            recording.send_columns(f"{origin(tree)}/motion/view", indexes=[index], columns=below)
             log_floor(recording, tree, cameras[-1], pose)
     return cameras
-
-
-def _base(run: Run) -> Array | None:
-    pose = run.base_pose
-    return None if pose is None else pose[shown(run)].astype(np.float64)
-
-
-def reached(
-    tree: UrdfTree, drawn: Mapping[str, Array], angles: Mapping[str, Array], pose: Array | None
-) -> Iterator[Array]:
-    """Points of a robot in a motion, from the place on the floor below its base; see `points`."""
-    if pose is None or not len(pose):
-        return points(tree, drawn, angles)
-    height = pose[:, :3] * (1.0 - ON_FLOOR)
-    return points(tree, drawn, angles, _turns(pose[:, 3:]), height)
 
 
 def standing(camera: Camera, tree: UrdfTree, *, moves: bool) -> Camera:
     """A camera in the frame of transforms that it stands in."""
     own = frame(tree, VIEW if moves else tree.root_link().name)
     return replace(camera, frame=own, moves=moves)
-
-
-def follow(recording: rr.RecordingStream, tree: UrdfTree, time: Array, pose: Array) -> None:
-    """Log the frame that a camera moves with: on the floor below the base, without its turns."""
-    columns = rr.Transform3D.columns(
-        translation=pose[:, :3] * ON_FLOOR,
-        parent_frame=[frame(tree, WORLD)] * len(pose),
-        child_frame=[frame(tree, VIEW)] * len(pose),
-    )
-    path = f"{origin(tree)}/motion/view"
-    recording.send_columns(path, indexes=[axes.at(time)], columns=columns)
 
 
 def log_floor(recording: rr.RecordingStream, tree: UrdfTree, camera: Camera, pose: Array) -> None:
@@ -551,20 +530,18 @@ def outermost(urdf: Path) -> dict[str, Array]:
     return {link: np.concatenate(parts) for link, parts in found.items()}
 
 
-def points(
-    tree: UrdfTree,
-    drawn: Mapping[str, Array],
-    angles: Mapping[str, Array],
-    turn: Array | None = None,
-    shift: Array | None = None,
+def reached(
+    tree: UrdfTree, drawn: Mapping[str, Array], angles: Mapping[str, Array], pose: Array | None
 ) -> Iterator[Array]:
-    """Where the points of each link are in all frames, shape (points, 3), in [m].
+    """Points of each link in all frames, from the place on the floor below the base, in [m].
 
     Args:
         angles: Of joints that move, each of shape (frames,), in [rad] or [m].
-        turn: Rotation of the root, shape (frames, 3, 3), and its place, shape (frames, 3).
+        pose: x, y, z and quaternion x, y, z, w of a base that moves, shape (frames, 7).
     """
-    at_root = np.eye(3) if turn is None else turn, np.zeros(3) if shift is None else shift
+    at_root = np.eye(3), np.zeros(3)
+    if pose is not None:
+        at_root = _turns(pose[:, 3:]), pose[:, :3] * (1.0 - ON_FLOOR)
     poses = {tree.root_link().name: at_root}
     for joint in outwards(tree):
         turned, shifted = poses[joint.parent_link]

@@ -251,7 +251,10 @@ def _started(recording: Path, port: str) -> str:
     taken = port.isdigit() and not _unreachable([(HOST, int(port))])
     with started("--port", port, "--hide-welcome-screen", str(recording)) as viewer:
         # It listens before it opens its window; if another one does already, it only passes on.
-        if port.isdigit() and not taken:
+        if taken:
+            with suppress(subprocess.TimeoutExpired):
+                viewer.process.wait(timeout=START_TIMEOUT)
+        elif port.isdigit():
             viewer.listens(int(port), START_TIMEOUT)
         try:
             code = viewer.process.wait(timeout=SETTLE)
