@@ -29,7 +29,7 @@ from noisemodel import robot as robots
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
 from noisemodel.run import part
 from noisemodel.runfile import pieces
-from noisemodel.types import Array, Mask, Real
+from noisemodel.types import Array, Mask
 
 CORRELATION = 0.6
 """Correlation of the envelopes below which an alignment is refused."""
@@ -224,15 +224,11 @@ def _at_rate(run: Run, rate: float) -> Run:
     nearest = np.round(np.arange(len(lower.time)) * run.rate / rate).astype(int)
     nearest = np.minimum(nearest, len(run.time) - 1)
 
-    def at(signal: Real | None) -> Real | None:
-        return None if signal is None else signal[nearest]
-
-    return replace(
-        lower,
-        position=at(run.position),
-        position_desired=at(run.position_desired),
-        base_pose=at(run.base_pose),
-    )
+    kept: dict[str, Any] = {
+        name: None if (signal := getattr(run, name)) is None else signal[nearest]
+        for name in ("position", "position_desired", "base_pose")
+    }
+    return replace(lower, **kept)
 
 
 def _cut(run: Run, first: int, stop: int, time: Array) -> Run:
@@ -314,12 +310,16 @@ def compare(
     alignment = align(one, other, how)
     one, other, left_out = together(one, other, alignment)
     missing = _no_links(one, other) if robot else ""
-    sides = [
-        _analysed(each, run, library, kind=kind if robot and not missing else "")
-        for each, run in zip(opened, (one, other), strict=True)
-    ]
-    remarked = dict.fromkeys(remark for side in sides for remark in side.remarks)
-    both = [(remark, [remark in side.remarks for side in sides]) for remark in remarked]
+    shown_kind = kind if robot and not missing else ""
+    sides = []
+    for each, run in zip(opened, (one, other), strict=True):
+        found = analyse(run, library, name=each.source.shown.stem, sha256=each.sha256)
+        found = with_links(found, shown_kind)
+        sides.append(replace(found, missing=(), assumed=each.assumed))
+    told: dict[str, str] = {}
+    for name, side in zip(("Before", "After"), sides, strict=True):
+        told |= {remark: "Both" if remark in told else name for remark in side.remarks}
+    timed = not alignment.alike and any(side.findings for side in sides)
     return Pair(
         before=sides[0],
         after=sides[1],
@@ -328,20 +328,10 @@ def compare(
             *remarks,
             *left_out,
             *([missing] if missing else []),
-            *([TIMED] if not alignment.alike and any(side.findings for side in sides) else []),
-            *(f"{_who(*has)}: {remark}" for remark, has in both),
+            *([TIMED] if timed else []),
+            *(f"{who}: {remark}" for remark, who in told.items()),
         ),
     )
-
-
-def _who(before: bool, after: bool) -> str:
-    return "Both" if before and after else "Before" if before else "After"
-
-
-def _analysed(opened: Opened, run: nm.Run, library: Library, *, kind: str) -> Analysis:
-    """Analyse a part of a run; its links too, if a kind of noise is named."""
-    found = analyse(run, library, name=opened.source.shown.stem, sha256=opened.sha256)
-    return replace(with_links(found, kind), missing=(), assumed=opened.assumed)
 
 
 def _no_links(before: nm.Run, after: nm.Run) -> str:
