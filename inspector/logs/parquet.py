@@ -118,26 +118,20 @@ def _table(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any:
 def _values(path: Path, table: Any, name: str) -> NDArray[Any] | None:
     """Column as an array, shape (samples, columns); None if it holds no numbers."""
     column = table.column(name)
-    samples, kind = len(column), column.type
-    while _is_list(kind):
-        kind = kind.value_type
+    samples = len(column)
     if pyarrow.types.is_timestamp(column.type):
         return np.asarray(column.to_numpy())[:, None]
-    if not (pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)):
-        return None
     flat = column.combine_chunks()
-    while _is_list(flat.type):
+    while pyarrow.types.is_list(flat.type) or pyarrow.types.is_fixed_size_list(flat.type):
         flat = flat.flatten()
+    if not (pyarrow.types.is_floating(flat.type) or pyarrow.types.is_integer(flat.type)):
+        return None
     numbers = flat.to_numpy(zero_copy_only=False)
     if pyarrow.types.is_list(column.type) and len(pc.list_value_length(column).unique()) > 1:
         raise LogError(path, f"column {name!r} has lists of different lengths")
     if samples == 0 or len(numbers) % samples:
         raise LogError(path, f"column {name!r} has {len(numbers)} numbers in {samples} rows")
     return np.asarray(numbers).reshape(samples, -1)
-
-
-def _is_list(kind: Any) -> bool:
-    return bool(pyarrow.types.is_list(kind) or pyarrow.types.is_fixed_size_list(kind))
 
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
