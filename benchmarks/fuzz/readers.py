@@ -256,11 +256,11 @@ def _hdf5(folder: Path) -> Path:
     return folder / "log.hdf5"
 
 
-def _bag(**how: Any) -> Callable[[Path], Path]:
+def _bag(*, ros1: bool = False, **how: Any) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
         from samplelogs import Talk, joint_states, numbers, write_bag
 
-        talk = Talk(ros1=how.pop("ros1", False))
+        talk = Talk(ros1=ros1)
         states = joint_states(talk, position=numbers() / 10, velocity=numbers(seed=1))[:200]
         path = write_bag(folder / "bag", talk, {"/joint_states": states}, **how)
         if path.is_file():
