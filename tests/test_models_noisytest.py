@@ -72,7 +72,7 @@ def test_logs_give_back_what_was_written(log, noise, start, gap, end):
     assert read.tolist() == noise
 
 
-def test_both_readers_read_the_same_bits(log):
+def test_logs_are_read_bit_for_bit(log):
     values = np.random.default_rng(0).standard_cauchy(30_000) * 10.0 ** np.arange(-150, 150).repeat(
         100
     )

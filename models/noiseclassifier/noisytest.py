@@ -2,11 +2,11 @@
 
 import hashlib
 import stat
-import warnings
+from array import array
 from collections.abc import Iterator
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
@@ -40,12 +40,9 @@ def read_log(path: str | Path) -> tuple[Array, Array]:
         # A device or a pipe may have no end.
         if not (stat.S_ISREG(Path(path).stat().st_mode) or Path(path).is_dir()):
             raise FileError(path, "is no regular file; save what it holds to one")
-        columns = _read_fast(path)
-        if columns is None or columns.shape[1] != 2 or not np.isfinite(columns).all():
-            columns = _read_slowly(path)
+        time, noise = _columns(path)
     except OSError as error:
         raise FileError(path, f"cannot be read ({error.strerror or error})") from error
-    time, noise = columns.T.copy()
     _check_time(path, time)
     return time, noise
 
@@ -55,50 +52,29 @@ def nominal_rate(time: Array) -> float:
     return float(f"{(len(time) - 1) / (time[-1] - time[0]):.9g}")
 
 
-def _read_fast(path: str | Path) -> Array | None:
-    """Array by a compiled reader; None if it fails, or the rows are ragged."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            with Path(path).open(encoding="latin-1") as stream:
-                return np.loadtxt(_lines(path, stream), ndmin=2)
-        except FileError:
-            raise
-        except (ValueError, UserWarning):
-            return None
-
-
-def _lines(path: str | Path, stream: TextIO) -> Iterator[str]:
-    """Lines of a log, which end."""
-    while line := stream.readline(LONGEST_LINE):
-        if len(line) == LONGEST_LINE:
-            raise FileError(path, f"has a line of more than {LONGEST_LINE} characters")
-        yield line
-
-
-def _read_slowly(path: str | Path) -> Array:
-    """Read line by line, to name the line that is wrong."""
-    rows = []
-    with Path(path).open(encoding="utf-8-sig", errors="replace") as lines:
-        for number, line in enumerate(_lines(path, lines), start=1):
+def _columns(path: str | Path) -> tuple[Array, Array]:
+    """Times and noise, each of shape (rows,); the line that is wrong is named."""
+    found = array("d")
+    with Path(path).open(encoding="utf-8-sig", errors="replace") as stream:
+        lines = iter(lambda: stream.readline(LONGEST_LINE), "")
+        for number, line in enumerate(lines, start=1):
+            if len(line) == LONGEST_LINE:
+                raise FileError(path, f"has a line of more than {LONGEST_LINE} characters")
             words = line.partition("#")[0].split()
-            if words:
-                rows.append(_row(path, number, words))
-    if not rows:
+            if len(words) not in (0, 2):
+                problem = f"line {number} has {len(words)} columns, expected time and noise"
+                raise FileError(path, problem)
+            try:
+                row = [float(word) for word in words]
+            except ValueError as error:
+                raise FileError(path, f"line {number}: {error}") from error
+            if not all(map(isfinite, row)):
+                raise FileError(path, f"line {number} is not finite: {' '.join(words)}")
+            found.extend(row)
+    if not found:
         raise FileError(path, "is empty; expected rows of time and noise")
-    return np.array(rows)
-
-
-def _row(path: str | Path, number: int, words: list[str]) -> list[float]:
-    if len(words) != 2:
-        raise FileError(path, f"line {number} has {len(words)} columns, expected time and noise")
-    try:
-        row = [float(word) for word in words]
-    except ValueError as error:
-        raise FileError(path, f"line {number}: {error}") from error
-    if not np.isfinite(row).all():
-        raise FileError(path, f"line {number} is not finite: {' '.join(words)}")
-    return row
+    time, noise = np.array(found).reshape(-1, 2).T.copy()
+    return time, noise
 
 
 def _check_time(path: str | Path, time: Array) -> None:
