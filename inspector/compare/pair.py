@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import noisemodel as nm
 from inspector.analysis import Analysis, analyse, robot_known, with_links, worst_signal
 from inspector.errors import InspectorError
-from inspector.levels import Spectrogram, spectrogram
+from inspector.levels import FLOOR_DB, STEP, Spectrogram, link_levels, spectrogram
 from inspector.library import Library
 from inspector.logs.read import Opened, open_run
 from inspector.report.findings import spoken
@@ -351,10 +351,6 @@ def _no_links(before: nm.Run, after: nm.Run) -> str:
     return ""
 
 
-STEP = 0.05
-"""Time over which a level is taken, in [s]."""
-FLOOR_DB = -100.0
-"""Least level of the noise, below any encoder's, in [dB re 1 rad/s]; lower levels are raised."""
 LINK_RANGE_DB = 40.0
 """Links that are quieter than the loudest peak by more than this have no difference."""
 LOWEST_BAND = 16.0
@@ -469,19 +465,15 @@ def by_link(pair: Pair) -> tuple[Level, ...]:
 def link_steps(pair: Pair, names: Sequence[str]) -> tuple[Array, Array]:
     """Starts of steps of 50 ms in [s], and changes of links' levels, shape (steps, links)."""
     assert pair.links is not None
-    time = pair.links[0].time
-    width = float(np.median(np.diff(time))) if len(time) > 1 else STEP
-    firsts = np.arange(0, len(time), max(1, round(STEP / width)))
-    counts = np.diff(np.append(firsts, len(time)))[:, None]
-    means = [
-        np.add.reduceat(noise.vibration, firsts, axis=0)[:, [noise.links.index(n) for n in names]]
-        / counts
-        for noise in pair.links
+    found = [link_levels(noise) for noise in pair.links]
+    both = [
+        level[:, [noise.links.index(name) for name in names]]
+        for noise, (_, level) in zip(pair.links, found, strict=True)
     ]
-    peak = max(float(mean.max(initial=0.0)) for mean in means) or 1.0
-    floor = peak * 10 ** (-LINK_RANGE_DB / 10)
-    before, after = (decibel(np.maximum(mean, floor)) for mean in means)
-    return time[firsts] - width / 2, after - before
+    loudest = max(float(level.max(initial=-np.inf)) for level in both)
+    floor = loudest - LINK_RANGE_DB if np.isfinite(loudest) else 0.0
+    before, after = (np.maximum(level, floor) for level in both)
+    return found[0][0], after - before
 
 
 def shared_links(pair: Pair) -> tuple[str, ...]:

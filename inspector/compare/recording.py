@@ -151,7 +151,7 @@ def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Chang
         for side, analysis in pair.sides:
             shades, place = (SIDE_COLORS[side], SIDE_COLORS[side]), (row, len(names))
             panels.log_class(recording, analysis, name, place, shades, BETWEEN[side], side)
-    titles = [Label(label.place, spoken(label.text)) for label in axes.row_labels(names)]
+    titles = axes.row_labels(list(map(spoken, names)))
     told = _sides(0.8, 0.45)
     if any(side.run.blocks for _, side in pair.sides):
         told.append(Label(0.1, "thin: annotated"))

@@ -413,8 +413,7 @@ class Drawing:
         shades = [self._colours[name] for name in self._rows]
         names = [spoken(name) for name in self._rows]
         unstable.style_bands(recording, FOUND_PATH, names, shades, unstable.COPIES)
-        rows = zip(axes.row_labels(names), shades, strict=True)
-        named = [replace(row, color=readable(shade)) for row, shade in rows]
+        named = axes.row_labels(names, list(map(readable, shades)))
         axes.log_beside(recording, self._classes, named, nothing)
 
     def begin(self, time: float, signals: Mapping[str, Array]) -> None:

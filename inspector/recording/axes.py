@@ -251,9 +251,13 @@ def timed(
     return part(panel, plot, name=name), panel.height
 
 
-def row_labels(names: Sequence[str]) -> list[Label]:
+def row_labels(names: Sequence[str], colours: Sequence[Color] = ()) -> list[Label]:
     """Names of rows, the first at the top."""
-    return [Label(1.0 - (row + 0.5) / len(names), name) for row, name in enumerate(names)]
+    shades = colours or [INK] * len(names)
+    return [
+        Label(1.0 - (row + 0.5) / len(names), name, color=shade)
+        for row, (name, shade) in enumerate(zip(names, shades, strict=True))
+    ]
 
 
 def middles(count: int) -> list[float]:

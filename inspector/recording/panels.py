@@ -5,7 +5,7 @@ One run, two, many and a stream draw the same panels; each only chooses which.
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import takewhile
 from typing import TypeAlias
 
@@ -139,7 +139,8 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     if not names:
         return []
     lost = gaps(run)
-    count = len(names) + bool(lost)
+    titles = [*map(spoken, names), *(["gap: no samples"] if lost else [])]
+    count = len(titles)
     panel = Panel("class", ROW * count + axes.AXIS)
     for row, name in enumerate(names):
         shades, place = (colours[name], axes.INK), (row, count)
@@ -149,14 +150,12 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
             log_marks(recording, name, row, colours[name], starts, [middle] * len(starts))
     if lost:
         log_gaps(recording, "/class", run, (0.1 * axes.TOP / count, 0.9 * axes.TOP / count))
-    shown = [(spoken(name), readable(colours[name])) for name in names]
-    shown += [("gap: no samples", axes.INK)] * bool(lost)
-    places = axes.row_labels([name for name, _ in shown])
-    named = [replace(at, color=shade) for at, (_, shade) in zip(places, shown, strict=True)]
+    inks = [*(readable(colours[name]) for name in names), axes.INK][:count]
     both = labels is not None and bool(run.blocks)
     told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")] if both else []
     only = "found" if labels is not None else "annotated"
-    axes.log_beside(recording, panel, named, told or [Label(0.5, only)])
+    left, right = axes.row_labels(titles, inks), told or [Label(0.5, only)]
+    axes.log_beside(recording, panel, left, right)
     return [axes.timed(panel)]
 
 
