@@ -306,17 +306,13 @@ def _log_robots(
     """Log the robot before and after, as two robots, and the scale of their colours."""
     if pair.links is None:
         return {}, []
-    assert pair.after.run.robot is not None
-    trees = {side: robot.of_run(each.run, folder, side=side) for side, each in pair.sides}
-    pairs = [(trees[side], each.run) for side, each in pair.sides]
-    for tree, own in pairs:
-        robot.log(recording, tree, own)
-    urdf = robot.drawn_file(pair.after.run.robot, folder)
-    cameras = robot.log_cameras(recording, pairs, urdf, aspect=ASPECT)
+    runs = {side: each.run for side, each in pair.sides}
+    robots = dict(zip(runs, robot.log_robots(recording, runs, folder, aspect=ASPECT), strict=True))
     views = [
         (unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0)
-        for side, camera in zip(trees, cameras, strict=True)
+        for side, (_, camera) in robots.items()
     ]
+    trees = {side: tree for side, (tree, _) in robots.items()}
     return trees, [*views, (unstable.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 

@@ -64,22 +64,15 @@ class SampleBuffer:
         count = min(len(time), self._size + self._waiting - self.held)
         place = slice(self.held, self.held + count)
         self._time[place], self._received[place] = time[:count], received
-        since = f"from {time[0]:.3f} s on"
         for name, values in self._signals.items():
-            given, width, kind = rows.get(name), values.shape[1], ""
-            if given is None:
-                kind, line = f"samples without {name}", f"no {name} {since}: it was there at first"
-            elif given.shape[1] != width:
-                kind = f"samples with another width of {name}"
-                line = (
-                    f"{name} of {given.shape[1]} columns {since}, where it had {width}: not shown,"
-                    " and not labelled where it makes noise"
-                )
-            values[place] = np.nan if given is None or kind else given[:count]
-            if kind:
-                self._warnings.note(kind, line, count)
+            given = rows.get(name)
+            if given is not None and given.shape[1] == values.shape[1]:
+                values[place] = given[:count]
+            else:
+                values[place] = np.nan
+                self._note(name, given, values.shape[1], time[0], count)
         for name in (name for name in rows if name not in self._signals):
-            line = f"{name} {since} was not there at first: not shown"
+            line = f"{name} from {time[0]:.3f} s on was not there at first: not shown"
             self._warnings.note(f"samples with a new {name}", line, count)
         self.held += count
         return count
@@ -95,6 +88,18 @@ class SampleBuffer:
             held[:waiting] = held[decided : decided + waiting].copy()
         self.held = self._waiting = waiting
         return received, signals
+
+    def _note(self, name: str, given: Array | None, width: int, time: float, count: int) -> None:
+        since = f"from {time:.3f} s on"
+        if given is None:
+            kind, line = f"samples without {name}", f"no {name} {since}: it was there at first"
+        else:
+            kind = f"samples with another width of {name}"
+            line = (
+                f"{name} of {given.shape[1]} columns {since}, where it had {width}: not shown,"
+                " and not labelled where it makes noise"
+            )
+        self._warnings.note(kind, line, count)
 
 
 def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:

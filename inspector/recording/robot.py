@@ -71,12 +71,6 @@ def drawn_file(name: str, folder: Path) -> Path:
     return folder / robot.locate(name).with_suffix(".urdf").name
 
 
-def of_run(run: Run, folder: Path, *, side: str = "") -> UrdfTree:
-    """Read the robot of a run that names one; see `load`."""
-    assert run.robot is not None
-    return load(run.robot, folder, (*run.joint_names, *run.desired_joint_names), side=side)
-
-
 def origin(tree: UrdfTree) -> str:
     """Entity path that all of a robot lies under."""
     return f"/{tree.frame_prefix or 'robot'}".rstrip("/")
@@ -137,31 +131,56 @@ def coloured(kind: str, shades: NDArray[np.uint8]) -> Iterable[Any]:
     return columns
 
 
-def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run) -> None:
-    """Log a robot and its motion; its colours have to follow."""
-    log_shapes(recording, tree)
-    frames = shown(run)
-    moved = angles(tree, run, frames)
-    for joint in tree.joints():
-        if joint.name in moved:
-            recording.send_columns(
-                f"{origin(tree)}/motion/{joint.name}",
-                indexes=[axes.at(run.time[frames])],
-                columns=joint.compute_transform_columns(moved[joint.name].tolist(), clamp=False),
-            )
-    if run.base_pose is None:
-        return
-    pose = run.base_pose[frames]
-    recording.send_columns(
-        f"{origin(tree)}/motion/base",
-        indexes=[axes.at(run.time[frames])],
-        columns=rr.Transform3D.columns(
-            translation=pose[:, :3],
-            quaternion=pose[:, 3:],
-            parent_frame=[frame(tree, WORLD)] * len(pose),
-            child_frame=[frame(tree, tree.root_link().name)] * len(pose),
-        ),
+def log_robots(
+    recording: rr.RecordingStream, runs: Mapping[str, Run], folder: Path, *, aspect: float
+) -> list[tuple[UrdfTree, Camera]]:
+    """Log the robot of each side's run, its motion and the floor; colours have to follow.
+
+    All are of one robot, and seen from where the camera sees both.
+    """
+    trees, parts, poses = list[UrdfTree](), list[Iterator[Array]](), list[Array | None]()
+    drawn: dict[str, Array] = {}
+    for side, run in runs.items():
+        assert run.robot is not None
+        names = (*run.joint_names, *run.desired_joint_names)
+        tree, frames = load(run.robot, folder, names, side=side), shown(run)
+        log_shapes(recording, tree)
+        moved, index = angles(tree, run, frames), [axes.at(run.time[frames])]
+        for joint in tree.joints():
+            if joint.name in moved:
+                angle = moved[joint.name].tolist()
+                columns = joint.compute_transform_columns(angle, clamp=False)
+                path = f"{origin(tree)}/motion/{joint.name}"
+                recording.send_columns(path, indexes=index, columns=columns)
+        pose = None if run.base_pose is None else run.base_pose[frames].astype(np.float64)
+        if pose is not None:
+            _log_motion(recording, tree, "base", run, pose[:, :3], quaternion=pose[:, 3:])
+        trees.append(tree)
+        poses.append(pose if len(frames) else None)
+        drawn = drawn or outermost(drawn_file(run.robot, folder))
+        parts.append(reached(tree, drawn, moved, poses[-1]))
+    seen, cameras = fitted(chain(*parts), aspect=aspect), list[Camera]()
+    for tree, run, pose in zip(trees, runs.values(), poses, strict=True):
+        cameras.append(standing(seen, tree, moves=pose is not None))
+        if pose is not None:  # the camera follows on the floor below the base, without its turns
+            _log_motion(recording, tree, "view", run, pose[:, :3] * ON_FLOOR)
+            log_floor(recording, tree, cameras[-1], pose)
+    return list(zip(trees, cameras, strict=True))
+
+
+def _log_motion(
+    recording: rr.RecordingStream, tree: UrdfTree, name: str, run: Run, place: Array, **turn: Any
+) -> None:
+    """Log the motion of the root or of the camera's frame in the world."""
+    moves = tree.root_link().name if name == "base" else VIEW
+    columns = rr.Transform3D.columns(
+        translation=place,
+        parent_frame=[frame(tree, WORLD)] * len(place),
+        child_frame=[frame(tree, moves)] * len(place),
+        **turn,
     )
+    index = [axes.at(run.time[shown(run)])]
+    recording.send_columns(f"{origin(tree)}/motion/{name}", indexes=index, columns=columns)
 
 
 def shown(run: Run) -> NDArray[np.intp]:
@@ -457,36 +476,6 @@ def sight() -> Array:
     right = np.cross(ahead, (0.0, 0.0, 1.0))
     right /= np.linalg.norm(right)
     return np.stack((right, np.cross(right, ahead), ahead))
-
-
-def log_cameras(
-    recording: rr.RecordingStream,
-    robots: Sequence[tuple[UrdfTree, Run]],
-    urdf: Path,
-    *,
-    aspect: float = 1.0,
-) -> list[Camera]:
-    """Place the cameras for runs of a robot, and log how they move with a base, over its floor."""
-    drawn, parts, poses = outermost(urdf), list[Iterator[Array]](), list[Array | None]()
-    for tree, run in robots:
-        frames, base = shown(run), run.base_pose
-        moving = None if base is None else base[frames].astype(np.float64)
-        poses.append(moving if len(frames) else None)
-        parts.append(reached(tree, drawn, angles(tree, run, frames), poses[-1]))
-    seen = fitted(chain(*parts), aspect=aspect)
-    cameras = []
-    for (tree, run), pose in zip(robots, poses, strict=True):
-        cameras.append(standing(seen, tree, moves=pose is not None))
-        if pose is not None:  # the camera follows on the floor below the base, without its turns
-            below = rr.Transform3D.columns(
-                translation=pose[:, :3] * ON_FLOOR,
-                parent_frame=[frame(tree, WORLD)] * len(pose),
-                child_frame=[frame(tree, VIEW)] * len(pose),
-            )
-            index = axes.at(run.time[shown(run)])
-            recording.send_columns(f"{origin(tree)}/motion/view", indexes=[index], columns=below)
-            log_floor(recording, tree, cameras[-1], pose)
-    return cameras
 
 
 def standing(camera: Camera, tree: UrdfTree, *, moves: bool) -> Camera:

@@ -18,7 +18,6 @@ from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
 from inspector.report.findings import report, spoken
-from noisemodel import Run
 from noisemodel.files import replacing
 
 APPLICATION = "inspector"
@@ -110,9 +109,13 @@ def write(
         axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
         tree, left = None, _log_findings(recording, analysis)
         if analysis.links is not None:
-            tree = robot.of_run(run, Path(folder))
+            robots = robot.log_robots(recording, {"": run}, Path(folder), aspect=ASPECT)
+            ((tree, seen),) = robots
+            title = "Robot, links coloured by level above 10 Hz"
+            views = (unstable.robot(title, "/robot", seen), 88.0)
+            key = (unstable.drawing(f"/axis/{panels.KEY.name}/right"), 12.0)
             rest = WHOLE - DETAILS - sum(size for _, size in left)
-            left.append((_log_robot(recording, tree, run, Path(folder)), rest))
+            left.append((unstable.beside(views, key), rest))
         details = unstable.tabs(*panels.log_details(recording, analysis, moments))
         over_time = [
             *panels.log_classes(recording, analysis),
@@ -142,16 +145,6 @@ def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tup
         events = unstable.events("Click a time to go there", "/events")
         parts.append((events, EVENTS + EVENT * min(count, 4)))
     return parts
-
-
-def _log_robot(recording: rr.RecordingStream, tree: UrdfTree, run: Run, folder: Path) -> Part:
-    """Log a robot and its motion; it, with the scale of its colours."""
-    assert run.robot is not None
-    robot.log(recording, tree, run)
-    urdf = robot.drawn_file(run.robot, folder)
-    (seen,) = robot.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
-    shown = unstable.robot("Robot, links coloured by level above 10 Hz", "/robot", seen)
-    return unstable.beside((shown, 88.0), (unstable.drawing("/axis/key/right"), 12.0))
 
 
 def _log_spectra(
