@@ -211,9 +211,9 @@ def test_a_class_is_as_long_and_as_loud_as_its_findings(tmp_path):
     assert ok.seconds == pytest.approx((1.9, 1.5))
     assert found.seconds == pytest.approx((0.0, 0.3))
     assert unknown.seconds == pytest.approx((0.0, 0.1))
-    assert np.isnan(found.level.before)
+    assert np.isnan(found.before)
     during = pair.vibration[0][2500:4000]
-    assert found.level.after == pytest.approx(10 * np.log10(np.mean(during**2)), abs=1e-6)
+    assert found.after == pytest.approx(10 * np.log10(np.mean(during**2)), abs=1e-6)
 
 
 def test_motions_that_have_nothing_in_common_are_laid_start_to_start():

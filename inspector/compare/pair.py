@@ -364,19 +364,13 @@ class Level:
     name: str
     before: float
     after: float
+    seconds: tuple[float, float] = (0.0, 0.0)
+    """How long a class lasts before and after, in [s]; where it does not, its level is NaN."""
 
     @property
     def change(self) -> float:
         """By how much it became louder, in [dB]; 0 where it is silent in both."""
         return 0.0 if self.before == self.after else self.after - self.before
-
-
-@dataclass(frozen=True)
-class ClassLevel:
-    """How long, in [s], and how loud, in [dB re 1 rad/s], a class is before and after."""
-
-    seconds: tuple[float, float]
-    level: Level
 
 
 def spectra(pair: Pair, joint: str = "") -> tuple[Spectrogram, Spectrogram]:
@@ -416,20 +410,23 @@ def whole(pair: Pair) -> Level:
     return within(pair, float(pair.time[0]), float(pair.time[-1]) + 1 / pair.rate, "whole")
 
 
-def by_class(pair: Pair) -> tuple[ClassLevel, ...]:
+def by_class(pair: Pair) -> tuple[Level, ...]:
     """How long and how loud each class is; nothing unless both runs were labelled."""
     if pair.before.labels is None or pair.after.labels is None:
         return ()
-    found = []
     others = {name for _, side in pair.sides for *_, name in side.lane}
     names = pair.before.labels.classes
+    found = []
     for name in (*names, *sorted(others - set(names))):
-        before, after = (
-            _class_level(pair, side, fast, name)
-            for (_, side), fast in zip(pair.sides, pair.vibration, strict=True)
-        )
-        level = Level(name, before[1], after[1])
-        found.append(ClassLevel((before[0], after[0]), level))
+        seconds, levels = [], []
+        for (_, side), fast in zip(pair.sides, pair.vibration, strict=True):
+            own = np.array([each[:2] for each in side.lane if each[2] == name]).reshape(-1, 2)
+            first, last = _samples(pair, own[:, 0]), _samples(pair, own[:, 1])
+            energy = np.concatenate(([0.0], np.cumsum(fast**2)))
+            power = np.sum(energy[last] - energy[first]) / max(int(np.sum(last - first)), 1)
+            seconds.append(float(np.sum(own[:, 1] - own[:, 0])))
+            levels.append(_noise_level(float(power)) if len(own) else float("nan"))
+        found.append(Level(name, levels[0], levels[1], (seconds[0], seconds[1])))
     return tuple(found)
 
 
@@ -480,17 +477,6 @@ def shared_links(pair: Pair) -> tuple[str, ...]:
     """The links that both have."""
     assert pair.links is not None
     return tuple(name for name in pair.links[0].links if name in pair.links[1].links)
-
-
-def _class_level(pair: Pair, side: Analysis, fast: Array, name: str) -> tuple[float, float]:
-    """Duration of a class in a run in [s], and its level in [dB re 1 rad/s]."""
-    own = np.array([(start, stop) for start, stop, label in side.lane if label == name])
-    if not len(own):
-        return 0.0, float("nan")
-    first, last = _samples(pair, own[:, 0]), _samples(pair, own[:, 1])
-    energy = np.concatenate(([0.0], np.cumsum(fast**2)))
-    power = np.sum(energy[last] - energy[first]) / max(int(np.sum(last - first)), 1)
-    return float(np.sum(own[:, 1] - own[:, 0])), _noise_level(float(power))
 
 
 def _samples(pair: Pair, time: Array) -> NDArray[np.intp]:
@@ -627,12 +613,7 @@ def _parts(pair: Pair) -> Iterator[str]:
     found = sorted(changes(pair), key=lambda change: (KINDS.index(change.kind), change.start))
     if found:
         events = [
-            (
-                f"**{c.kind}**",
-                spoken(c.label),
-                f"{c.start:.2f} to {c.stop:.2f}",
-                *_numbers(c.level),
-            )
+            (f"**{c.kind}**", spoken(c.label), f"{c.start:.2f} to {c.stop:.2f}", *_numbers(c.level))
             for c in found
         ]
         title = "finding" if labelled(pair) else "annotated"
@@ -642,11 +623,7 @@ def _parts(pair: Pair) -> Iterator[str]:
     if classes := by_class(pair):
         yield "#### Classes"
         rows = [
-            (
-                spoken(each.level.name),
-                *(f"{seconds:.1f}" for seconds in each.seconds),
-                *_numbers(each.level),
-            )
+            (spoken(each.name), *(f"{seconds:.1f}" for seconds in each.seconds), *_numbers(each))
             for each in classes
             if any(each.seconds)
         ]
