@@ -18,19 +18,9 @@ from inspector import colors
 from inspector.levels import LINKS, SPECTRUM, amplitudes, extremes, in_bands, window_length
 from inspector.live.labels import Labeller, Windows
 from inspector.live.sink import Sink
-from inspector.recording import axes, unstable
+from inspector.recording import axes, panels, unstable
 from inspector.recording import robot as scene
 from inspector.recording.axes import Label, Panel, log_events, scalars, style_lines
-from inspector.recording.panels import (
-    BANDS,
-    FOUND,
-    JOINTS_PER_PLOT,
-    LINE_WIDTH,
-    ROW,
-    UNITS,
-    band_axis,
-    readable,
-)
 from inspector.recording.unstable import TIMELINE, Camera, Part
 from inspector.report.findings import spoken
 from noiseclassifier import UNKNOWN, Event, Labels
@@ -109,14 +99,14 @@ class SpectrogramStream:
         self._length = window_length(rate)
         self._hop = max(1, self._length // 4)
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
-        self.edges = np.geomspace(self._frequency[0], self._frequency[-1], BANDS + 1)
+        self.edges = np.geomspace(self._frequency[0], self._frequency[-1], panels.BANDS + 1)
         self._windows, self._gap = Windows(self._length, self._hop), False
 
     def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
         """Take samples; centres of windows in [s], and levels, shape (columns, bands)."""
         windows, whole, since = self._windows.push(velocity, valid)
         if not len(windows):
-            return np.empty(0), np.empty((0, BANDS))
+            return np.empty(0), np.empty((0, panels.BANDS))
         # In a window, slow motion is a line all but: what is left of it is below 10 Hz.
         ramp = np.arange(self._length) - (self._length - 1) / 2
         slope = windows @ ramp / (ramp @ ramp)
@@ -127,7 +117,7 @@ class SpectrogramStream:
         level = np.clip(SPECTRUM.place(level), 0.0, 1.0).T
         starts = self._hop * np.arange(-1 if self._gap else 0, len(windows))
         if self._gap:  # a dark one ends it
-            level = np.concatenate((np.zeros((1, BANDS)), level))
+            level = np.concatenate((np.zeros((1, panels.BANDS)), level))
         self._gap = False
         return np.asarray(end - (since - starts - self._length / 2) / self._rate), level
 
@@ -369,7 +359,9 @@ class Drawing:
         self._hop, self._length, classes = labeller.hop, labeller.length, labeller.classes
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
-        self._classes = Panel("class", ROW * len(self._rows) + axes.AXIS) if classes else None
+        self._classes = (
+            Panel("class", panels.ROW * len(self._rows) + axes.AXIS) if classes else None
+        )
         self._lane, self._lane_end = "", 0.0  # class of the latest frame, and until when it lasts
         self._drawn, self._told = "", ""  # class and findings that are drawn
         self._start: float | None = None  # time of the first sample
@@ -378,7 +370,7 @@ class Drawing:
         self._plots = {
             kind: _plots(kind, len(joint_names))
             for kind in widths
-            if kind.removesuffix("_desired") in UNITS
+            if kind.removesuffix("_desired") in panels.UNITS
         }
         for kind, plots in self._plots.items():
             desired = kind.endswith("_desired")
@@ -399,12 +391,12 @@ class Drawing:
         edges = self._spectrogram.edges
         bands = rr.SeriesLines(
             names=[f"{centre:.0f} Hz" for centre in np.sqrt(edges[:-1] * edges[1:]).tolist()],
-            widths=[LINE_WIDTH] * BANDS,
+            widths=[panels.LINE_WIDTH] * panels.BANDS,
             aggregation_policy="Off",
             interpolation_mode="StepAfter",
         )
         recording.log(BANDS_PATH, bands, static=True)
-        left = band_axis(SPECTROGRAM_PANEL, edges, "spectrum,\nloudest\njoint")
+        left = panels.band_axis(SPECTROGRAM_PANEL, edges, "spectrum,\nloudest\njoint")
         axes.log_beside(recording, SPECTROGRAM_PANEL, left, SPECTRUM)
         if self._classes is None:
             return
@@ -413,7 +405,7 @@ class Drawing:
         shades = [self._colours[name] for name in self._rows]
         names = [spoken(name) for name in self._rows]
         unstable.style_bands(recording, FOUND_PATH, names, shades, unstable.COPIES)
-        named = axes.row_labels(names, list(map(readable, shades)))
+        named = axes.row_labels(names, list(map(panels.readable, shades)))
         axes.log_beside(recording, self._classes, named, nothing)
 
     def begin(self, time: float, signals: Mapping[str, Array]) -> None:
@@ -589,7 +581,7 @@ class Drawing:
             measured = kind.removesuffix("_desired")
             for number, path in enumerate(plots, start=1):
                 which = f" {number}" if len(plots) > 1 else ""
-                paths.setdefault(f"{measured}{which} [{UNITS[measured]}]", []).append(path)
+                paths.setdefault(f"{measured}{which} [{panels.UNITS[measured]}]", []).append(path)
         views = {
             title: unstable.plot(title, "/joints", own, legend=True, **shown)
             for title, own in paths.items()
@@ -613,7 +605,7 @@ def _heat_map(level: Array) -> list[Any]:
 
 def _found(shown: Mask) -> Iterable[Any]:
     """Columns of bands in rows of classes, drawn where a class is shown, shape (points, rows)."""
-    count, (upper, lower) = shown.shape[1], FOUND
+    count, (upper, lower) = shown.shape[1], panels.FOUND
     middles = axes.TOP * (1.0 - (np.arange(count) + (upper + lower) / 2) / count)
     bands = np.where(shown, middles, np.nan).repeat(unstable.COPIES, axis=1)
     return unstable.band_columns(bands, axes.TOP * (lower - upper) / 2 / count)
@@ -623,8 +615,8 @@ def _plots(kind: str, joints: int) -> dict[str, slice]:
     """The entities of a signal, each with the columns of eight joints."""
     end = "_desired" if kind.endswith("_desired") else ""
     return {
-        f"/joints/{kind.removesuffix('_desired')}/{first // JOINTS_PER_PLOT}{end}": slice(
-            first, first + JOINTS_PER_PLOT
+        f"/joints/{kind.removesuffix('_desired')}/{first // panels.JOINTS_PER_PLOT}{end}": slice(
+            first, first + panels.JOINTS_PER_PLOT
         )
-        for first in range(0, joints, JOINTS_PER_PLOT)
+        for first in range(0, joints, panels.JOINTS_PER_PLOT)
     }
