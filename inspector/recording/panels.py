@@ -468,9 +468,10 @@ def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> list[
     if not run.joint_names:
         return []
     time, level = analysis.joint_levels
-    stop = float(run.time[-1]) + 1.0 / run.rate
-    scale, edges = levels.JOINTS.following(level), np.append(time, stop)
-    return [_log_strips(recording, "joints", analysis, edges, level, run.joint_names, scale)]
+    edges = np.append(time, float(run.time[-1]) + 1.0 / run.rate)
+    scale, which = levels.JOINTS.following(level), chosen(analysis, time, level)
+    title, names = "Joints above 10 Hz", run.joint_names
+    return [_log_strip(recording, "joints", title, edges, level, names, which, scale)]
 
 
 BEFORE, AFTER, SAME = (86, 180, 233), (240, 160, 30), (62, 68, 80)
@@ -492,11 +493,12 @@ CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
 
 def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
     """Log by how much each joint is louder than its reference: the eight that are most."""
-    which = beside.loudest(SHOWN)
-    own, level = [beside.joints[place] for place in which], beside.by_joint[:, which].T
     edges = np.append(beside.time - HOP / 2, beside.time[-1] + HOP / 2)
-    title, unit = "Over the reference", ", over the reference [dB]"
-    return _log_strip(recording, "over", title, edges, level, own, CHANGE, unit, SHADES)
+    which, title, unit = beside.loudest(SHOWN), "Over the reference", ", over the reference [dB]"
+    level, names = beside.by_joint, beside.joints
+    return _log_strip(
+        recording, "over", title, edges, level, names, which, CHANGE, unit, shades=SHADES
+    )
 
 
 def log_links(
@@ -516,7 +518,8 @@ def log_links(
     axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
     edges = np.append(time, noise.time[-1] + width / 2)
-    return _log_strips(recording, "links", analysis, edges, level, noise.links, scale)
+    title, which = "Links above 10 Hz", chosen(analysis, time, level)
+    return _log_strip(recording, "links", title, edges, level, noise.links, which, scale)
 
 
 def log_robot_levels(
@@ -529,22 +532,6 @@ def log_robot_levels(
     robot.log_colours(recording, tree, time, colours, rest=scale.colours(np.array([-np.inf])))
 
 
-def _log_strips(
-    recording: rr.RecordingStream,
-    name: str,
-    analysis: Analysis,
-    edges: Array,
-    level: Array,
-    names: Sequence[str],
-    scale: Scale,
-) -> Timed:
-    """Log levels, shape (columns, rows), of those that vibrate most."""
-    which = chosen(analysis, edges[:-1], level)
-    own, title = [names[index] for index in which], f"{name.capitalize()} above 10 Hz"
-    unit = f" [{scale.unit}]"
-    return _log_strip(recording, name, title, edges, level[:, which].T, own, scale, unit)
-
-
 def _log_strip(
     recording: rr.RecordingStream,
     name: str,
@@ -552,20 +539,24 @@ def _log_strip(
     edges: Array,
     level: Real,
     names: Sequence[str],
+    which: Sequence[int],
     scale: Scale,
-    unit: str,
+    unit: str = "",
+    *,
     shades: int = axes.SHADES,
 ) -> Timed:
-    panel, path = Panel(name, STRIP_ROW * len(names) + axes.AXIS), f"/strips/{name}"
+    """Log levels, shape (columns, rows), of some rows."""
+    own = [names[index] for index in which]
+    panel, path = Panel(name, STRIP_ROW * len(own) + axes.AXIS), f"/strips/{name}"
     axes.log_levels(
         recording,
         panel,
         edges,
-        level,
+        level[:, which].T,
         scale,
-        axes.row_labels(names),
+        axes.row_labels(own),
         path=path,
-        names=[f"{each}{unit}" for each in names],
+        names=[f"{each}{unit or f' [{scale.unit}]'}" for each in own],
         width=STRIP_WIDTH,
         lines=STROKES,
         shades=shades,
