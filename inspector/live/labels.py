@@ -83,18 +83,11 @@ def noise_signal(name: str, motion: Array, base: int, joints: int) -> Array:
 
 
 class Labeller:
-    """Labels frames as they become complete, or gives the reason why it does not.
-
-    Attributes:
-        model: Name of the model that labels; empty without one.
-        remark: Why there are no labels, or at which other rate; empty if neither.
-        classes: What can be predicted; nothing without a model.
-        length: Duration of a frame, in [s]; 0 without a model.
-        hop: Time from one frame to the next, in [s]; 0 without a model.
-    """
+    """Labels frames as they become complete, or remarks why it does not, or at which rate."""
 
     def __init__(self, library: Library, rate: float, widths: Mapping[str, int]) -> None:
         self.rate, self.remark, self.model = rate, "", ""
+        # Without a model there are no classes; duration of frames, from one to the next, in [s].
         self.classes, self.length, self.hop = tuple[str, ...](), 0.0, 0.0
         self._stream: nc.Stream | None = None
         self._decimator: Decimator | None = None

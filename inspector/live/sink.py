@@ -39,23 +39,13 @@ MEMORY = "2GB"
 
 
 class Sink:
-    """A recording with its sinks.
-
-    Args:
-        save: File to write, whole when it is closed; None writes none.
-
-    Attributes:
-        recording: What to log into.
-        where: Its sinks, in words.
-        saved: Whether a file is written.
-        gone: Whether there was a viewer that is there no more.
-        late: How far the viewer was behind at the last check, if more than ``LATE``, in [s].
-    """
+    """A recording with its sinks: a file, which is whole once it is closed, a viewer, or both."""
 
     def __init__(
         self, save: Path | None = None, connect: str | None = None, *, overwrite: bool = False
     ) -> None:
-        self.saved, self.gone, self.late = save is not None, False, 0.0
+        self.saved, self.gone = save is not None, False  # gone: there was a viewer
+        self.late = 0.0  # how far it was behind at the last check, if more than `LATE`, in [s]
         self._address = (HOST, PORT)
         self._checked = time.monotonic()
         self._asked: float | None = None  # since when the viewer lacks what had been sent by then
