@@ -136,8 +136,6 @@ def log_of(
     Args:
         stated: What states the rate, and the rate, in [Hz].
         joints: Names of the columns of measured signals, by "", and of desired ones, by "_desired".
-        controller: Type of the controller that follows the commands.
-        not_read: Names of what the file holds besides.
     """
     arrays = dict(_unpacked(arrays))
     options = options.for_columns(path, [*arrays])
@@ -150,29 +148,22 @@ def log_of(
     arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
     samples = len(arrays[motion[0]])
     state, targets, remarks, measured = _state(arrays, roles, options, controller)
-    stamps = Stamps.counted(samples)
-    if time:
-        stamps = stamps_of(path, time, arrays[time], options.rate)
-    columns = any(arrays[name].ndim == 1 for name in motion)
-    if stamps.unit == SAMPLES and not columns:
+    stamps = stamps_of(path, time, arrays[time], options.rate) if time else Stamps.counted(samples)
+    columns = any(arrays[name].ndim == 1 for name in motion)  # whose rate is found later
+    if stamps.unit == SAMPLES and (not columns or (stated[1] and not options.rate)):
+        measured = (None, None) if columns else measured
         stamps = counted_stamps(path, stamps, options, *measured, stated)
-    elif stamps.unit == SAMPLES and stated[1] and not options.rate:
-        stamps = counted_stamps(path, stamps, options, None, None, stated)
     base, still = _base_of_isaac(arrays, roles, stamps)
     suggested = (*state, *base, *targets)
-    if RELATIVE_TO in roles and not any(STATES.fullmatch(name) for name in roles):
-        remarks.append(RELATIVE)
-
-    def is_column(name: str, each: NDArray[Any]) -> bool:  # whose name may tell its joint
-        return each.ndim == 1 and bool(column_signal(name) or array_signal(name))
-
+    rows = [name for name, each in arrays.items() if each.ndim == 1]
+    single = {name for name in rows if column_signal(name) or array_signal(name)}
     fields = tuple(
         Field(
             name,
             floats(each.reshape(samples, -1)),
             stamps,
             joints=_joints(joints or {}, name, roles, each.size // samples, suggested),
-            signal="" if roles[name] not in SIGNALS or is_column(name, each) else roles[name],
+            signal=roles[name] if roles[name] in SIGNALS and name not in single else "",
             source=path.name,
             rank=0 if STATES.fullmatch(name) else 1,
         )
@@ -386,22 +377,25 @@ def _state(
         measured[signal] = None if values is None else floats(values)
     position, velocity = measured["position"], measured["velocity"]
     targets, remarks = list[Entry](), list[str]()
-    given = {entry.signal for entry in options.entries} | set(roles.values())
     commands = [n for n, what in roles.items() if what == COMMAND and arrays[n].ndim == 2]
-    if position is None or "position_desired" in given or not commands:
-        return state, targets, remarks, (position, velocity)
+    if "position_desired" in {*roles.values(), *(entry.signal for entry in options.entries)}:
+        commands = []
     for name in sorted(commands, key=lambda name: "processed" not in name):
         command = arrays[name]
-        if len(command) == len(position) and (count := followed(command, position)):
+        if position is None or len(command) != len(position):
+            continue
+        if count := followed(command, position):
             part = name if count == command.shape[1] else f"{name}[0:{count}]"
             targets.append(Entry("position_desired", "", part))
             break
-    else:
+    if commands and position is not None and not targets:
         to = f", they are the input of a controller of type {controller}" if controller else ""
         remarks.append(
             f"{listed(commands)} not taken as desired positions: {place} does not follow{to};"
             f" --map position_desired={commands[0]} takes it"
         )
+    if RELATIVE_TO in roles and not any(STATES.fullmatch(name) for name in roles):
+        remarks.append(RELATIVE)
     return state, targets, remarks, (position, velocity)
 
 
