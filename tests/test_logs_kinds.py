@@ -597,6 +597,20 @@ def test_a_mat_file_with_numbers_of_an_unknown_type_is_one_line(tmp_path):
         read_log(tmp_path / "a.mat")
 
 
+def test_a_mat_file_of_cells_of_a_shape_that_no_array_has_is_one_line(tmp_path):
+    from scipy.io import savemat
+
+    cells = np.empty((1,) * 32, dtype=object)
+    cells[(0,) * 32] = np.arange(3.0)
+    savemat(tmp_path / "a.mat", {"c": cells})
+    data = (tmp_path / "a.mat").read_bytes()
+    ones = np.ones(32, dtype="<i4")
+    shape = np.concatenate(([0], np.full(31, 2**31 - 1))).astype("<i4")
+    (tmp_path / "a.mat").write_bytes(data.replace(ones.tobytes(), shape.tobytes(), 1))
+    with pytest.raises(InspectorError, match="damaged or cut off"):
+        read_log(tmp_path / "a.mat")
+
+
 def test_logsout_of_simulink_says_how_to_save_numbers(tmp_path):
     import h5py
 

@@ -679,6 +679,8 @@ def _variables(path: Path) -> dict[str, NDArray[Any]]:
         raise LogError(path, "damaged: a variable is cut off") from error
     except (ArchiveError, OSError) as error:
         raise LogError(path, one_line(error)) from error
+    except ValueError as error:  # a shape that no array has
+        raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
     check_numbers(path, found, objects)
     return found
 
