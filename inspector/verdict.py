@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 EXPECTED = (InspectorError, nc.ModelsError, nm.NoiseModelError)
 """The errors that are printed in one line; all others are bugs."""
+UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
 KIND = "noise-classify-state/"
 FORMAT = f"{KIND}2"
 PATIENCE = 2.0

@@ -15,7 +15,7 @@ import pytest
 from commandline import call
 
 import inspector
-from inspector.reference import alignment, judging, store
+from inspector.reference import judging, store
 from inspector.reference.levels import decoded, encoded, levels, octaves
 from inspector.reference.store import Reference
 
@@ -511,10 +511,10 @@ def test_levels_are_kept_in_half_decibels():
 
 def test_a_motion_is_aligned_with_itself_delayed():
     motion = np.cumsum(np.random.default_rng(1).normal(size=(200, 3)), axis=0) / 10
-    (same,) = alignment.align(motion, [motion])
+    (same,) = judging.align(motion, [motion])
     np.testing.assert_array_equal(same.frame, np.arange(200))
     late = np.concatenate((np.repeat(motion[:1], 8, axis=0), motion))
-    (found,) = alignment.align(late, [motion])
+    (found,) = judging.align(late, [motion])
     np.testing.assert_array_equal(found.frame[8:], np.arange(200))
     assert found.residual.max() == pytest.approx(0.0, abs=1e-6)
 

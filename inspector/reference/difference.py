@@ -18,10 +18,10 @@ from inspector.errors import worst as worst_code
 from inspector.library import Library
 from inspector.logs.read import Source, sources
 from inspector.reference.judging import Comparison, Kind, compare, same_motion
-from inspector.reference.levels import HOP, Levels
+from inspector.reference.levels import HOP, SIGNALS, Levels
 from inspector.reference.store import Reference, levels_of, of_runs
 from inspector.reference.verdicts import References
-from inspector.verdict import EXPECTED, Evidence, Verdict, classify_files
+from inspector.verdict import END, EXPECTED, UNREAD, Evidence, Verdict, classify_files
 from noiseclassifier import Event
 from noiseclassifier.matching import match
 from noisemodel.parallel import Jobs
@@ -45,25 +45,18 @@ class Outcome(StrEnum):
     BETTER = "better"
 
 
+ORDER = list(Outcome)
 BROKEN = (Outcome.MISSING, Outcome.RENAMED, Outcome.FROZEN, Outcome.CUT)
 """What fails whatever the levels are."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding that only one side has, or that is louder.
-
-    Attributes:
-        kind: "new", "louder" or "resolved".
-        over: Its loudest exceedance over the other side, in [dB]; None by the general model.
-        level: Level of that cell, in [dB re 1 rad/s].
-    """
+    """A finding that only one side has ("new" or "resolved"), or that is "louder"."""
 
     kind: str
     run: Path
     event: Event
-    over: float | None
-    level: float | None
     evidence: Evidence
 
 
@@ -71,20 +64,15 @@ class Finding:
 class Change:
     """How much louder a joint is in an octave after the change.
 
-    Attributes:
-        signal: "velocity" or "tracking error".
-        band: The octave, in [Hz].
-        change: Median over the runs of its loudest exceedance over all runs before, in [dB].
-        low: The same of the quietest run.
-        high: The same of the loudest run.
+    It is the loudest exceedance of a run over all runs before: median, least and most of the runs.
     """
 
     joint: str
-    signal: str
-    band: tuple[float, float]
-    change: float
-    low: float
-    high: float
+    signal: str  # of SIGNALS
+    band: tuple[float, float]  # [Hz]
+    change: float  # [dB]
+    low: float  # [dB]
+    high: float  # [dB]
 
     def __str__(self) -> str:
         low, high = self.band
@@ -94,29 +82,19 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A scenario before and after.
-
-    Attributes:
-        reason: Of the outcome, in a line.
-        margin: From how many decibels over the runs before on it is louder.
-        score: Median over the runs after of their largest score, in [dB]; None without.
-        changes: By joint, signal and octave, the largest first.
-        findings: New ones first.
-        remarks: What is not compared, and why.
-        worst: The run after whose score is the largest, as it compares; None without.
-    """
+    """A scenario before and after."""
 
     name: str
     outcome: Outcome
-    reason: str
+    reason: str  # of the outcome, in a line
     before: tuple[Path, ...] = ()
     after: tuple[Path, ...] = ()
-    margin: float = 0.0
-    score: float | None = None
-    changes: tuple[Change, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    remarks: tuple[str, ...] = ()
-    worst: Comparison | None = field(default=None, repr=False)
+    margin: float = 0.0  # from which it is louder than the runs before, in [dB]
+    score: float | None = None  # median over the runs after of their largest score, in [dB]
+    changes: tuple[Change, ...] = ()  # the largest first
+    findings: tuple[Finding, ...] = ()  # new ones first
+    remarks: tuple[str, ...] = ()  # what is not compared, and why
+    worst: Comparison | None = field(default=None, repr=False)  # of the run with the largest score
 
     @property
     def new(self) -> tuple[Finding, ...]:
@@ -136,46 +114,30 @@ class Failed:
 
 @dataclass(frozen=True)
 class Gate:
-    """What fails.
-
-    Attributes:
-        new: Whether new or louder findings do.
-        worse: Whether a scenario that is worse does.
-        broken: Whether scenarios that are missing, renamed, frozen or cut do.
-        failed: Whether files that cannot be read do; they always do if there are no others.
-    """
+    """What fails: new or louder findings, scenarios that are worse or broken, files not read."""
 
     new: bool = False
     worse: bool = True
     broken: bool = True
-    failed: bool = True
+    failed: bool = True  # they always do if there are no others
 
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """What became of all scenarios.
-
-    Attributes:
-        rows: The scenarios, the worst first.
-        margin: Least margin, in [dB].
-        picture: Of the worst scenario, if one is drawn.
-        picture_url: Where that will be published.
-    """
+    """What became of all scenarios, the worst first."""
 
     rows: tuple[Row, ...]
     failed: tuple[Failed, ...] = ()
     gate: Gate = field(default_factory=Gate)
-    margin: float = 0.0
-    picture: Path | None = None
-    picture_url: str = ""
+    margin: float = 0.0  # the least one, in [dB]
+    picture: Path | None = None  # of the worst scenario
+    picture_url: str = ""  # where that will be published
 
     @property
     def outcome(self) -> Outcome:
         """The worst of all scenarios."""
-        order = list(Outcome)
-        return min(
-            (row.outcome for row in self.rows), key=order.index, default=Outcome.INCONCLUSIVE
-        )
+        found = (row.outcome for row in self.rows)
+        return min(found, key=ORDER.index, default=Outcome.INCONCLUSIVE)
 
     @property
     def alone(self) -> tuple[Row, ...]:
@@ -205,6 +167,22 @@ class Difference:
         return worst_code([*told, *bad])
 
 
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """The runs of one side that can be compared, and the verdicts on them beside the other."""
+
+    reference: Reference
+    levels: Sequence[Levels]
+    verdicts: Mapping[Path, Verdict]
+
+    @property
+    def names(self) -> list[str]:
+        return sorted({each.name for each in self.levels})
+
+    def named(self, name: str) -> list[Levels]:
+        return [each for each in self.levels if each.name == name]
+
+
 def difference(
     before: Path,
     after: Path,
@@ -221,46 +199,42 @@ def difference(
         jobs: How many runs to work on at once.
     """
     failed: list[Failed] = []
-    found = [sources([path])[0] for path in (before, after)]
-    alone = all(not path.is_dir() for path in (before, after))
-    sides = [
-        _measured(side, path, failed) for side, path in zip(found, (before, after), strict=True)
-    ]
-    if alone:  # two files that are named themselves are a pair
-        sides[1] = [replace(each, name=sides[0][0].name) for each in sides[1] if sides[0]]
-    references = [
-        Reference(path, of_runs(side)) for path, side in zip((before, after), sides, strict=True)
-    ]
+    paths = before, after
+    found = [sources([path])[0] for path in paths]
+    levels = [_measured(own, path, failed) for own, path in zip(found, paths, strict=True)]
+    if not before.is_dir() and not after.is_dir():  # two files that are named themselves are a pair
+        levels[1] = [replace(each, name=levels[0][0].name) for each in levels[1] if levels[0]]
+    references = [Reference(path, of_runs(own)) for path, own in zip(paths, levels, strict=True)]
     verdicts: list[dict[Path, Verdict]] = []
-    for place, own in enumerate(found):
-        other = references[1 - place]
-        measured = {Path(each.run): each for each in sides[place]}
-        runs = [each for each in own if each.shown in measured]
-        of = {each.shown: other.path for each in runs}
-        beside = References({other.path: other}, of, measured)
+    for own, other, measured in zip(found, reversed(references), levels, strict=True):
+        known = {Path(each.run): each for each in measured}
+        runs = [each for each in own if each.shown in known]
+        beside = References({other.path: other}, {each.shown: other.path for each in runs}, known)
         classified = classify_files(runs, library, unknown=unknown, reference=beside, jobs=jobs)
         verdicts.append({each.path: each for each in classified})
         failed += [
             Failed(each.path, each.message, each.status, each.trace)
-            for each in verdicts[place].values()
-            if each.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR)
+            for each in verdicts[-1].values()
+            if each.status in UNREAD
         ]
     broken = {each.path for each in failed}
-    sides = [[each for each in side if Path(each.run) not in broken] for side in sides]
-    rows = _rows(references[0], sides, verdicts, margin)
-    if (
-        sides[0]
-        and sides[1]
-        and all(row.outcome in (Outcome.MISSING, Outcome.ADDED) for row in rows)
-    ):
-        examples = [", ".join(sorted({each.name for each in side})[:3]) for side in sides]
+    sides = [
+        _Side(reference, [each for each in own if Path(each.run) not in broken], of)
+        for reference, own, of in zip(references, levels, verdicts, strict=True)
+    ]
+    rows = _rows(sides[0], sides[1], margin)
+    result = Difference(
+        tuple(sorted(rows, key=lambda row: (ORDER.index(row.outcome), not row.new, row.name))),
+        tuple(failed),
+        margin=margin,
+    )
+    if sides[0].levels and sides[1].levels and len(result.alone) == len(rows):
+        first, second = (", ".join(side.names[:3]) for side in sides)
         raise InspectorError(
             f"{before} and {after} have no run in common, neither by name nor by motion"
-            f" ({examples[0]} and {examples[1]})"
+            f" ({first} and {second})"
         )
-    order = list(Outcome)
-    rows.sort(key=lambda row: (order.index(row.outcome), not row.new, row.name))
-    return Difference(tuple(rows), tuple(failed), margin=margin)
+    return result
 
 
 def _measured(runs: Sequence[Source], root: Path, failed: list[Failed]) -> list[Levels]:
@@ -272,83 +246,72 @@ def _measured(runs: Sequence[Source], root: Path, failed: list[Failed]) -> list[
         except EXPECTED as error:
             failed.append(Failed(each.shown, without_path(error, each.path)))
         except Exception as error:  # a bug that one run shows must not hide changes of others
-            problem = f"{type(error).__name__}: {error}"
-            failed.append(
-                Failed(each.shown, problem, Status.INTERNAL_ERROR, traceback.format_exc())
-            )
+            problem, trace = f"{type(error).__name__}: {error}", traceback.format_exc()
+            failed.append(Failed(each.shown, problem, Status.INTERNAL_ERROR, trace))
     return found
 
 
-def _rows(
-    reference: Reference,
-    sides: Sequence[Sequence[Levels]],
-    verdicts: Sequence[Mapping[Path, Verdict]],
-    margin: float,
-) -> list[Row]:
+def _paths(runs: Sequence[Levels]) -> tuple[Path, ...]:
+    return tuple(Path(each.run) for each in runs)
+
+
+def _rows(before: _Side, after: _Side, margin: float) -> list[Row]:
     """A row for each scenario of either side."""
-    names = [sorted({each.name for each in side}) for side in sides]
-    runs = [
-        {name: [each for each in side if each.name == name] for name in names[place]}
-        for place, side in enumerate(sides)
-    ]
     rows = []
-    come = [name for name in names[1] if name not in names[0]]
-    for name in names[0]:
-        before = runs[0][name]
-        if name in runs[1]:
-            after, verdict = runs[1][name], None
-        else:
-            renamed = next((n for n in come if same_motion(runs[1][n][-1], before[-1])), "")
-            if not renamed:
-                reason = f"{len(before)} before, none after"
-                paths = tuple(Path(each.run) for each in before)
-                rows.append(Row(name, Outcome.MISSING, reason, paths))
+    come = [name for name in after.names if name not in before.names]
+    for name in before.names:
+        runs, to, given = before.named(name), name, None
+        if name not in after.names:
+            last = runs[-1]
+            to = next((n for n in come if same_motion(after.named(n)[-1], last)), "")
+            if not to:
+                reason = f"{len(runs)} before, none after"
+                rows.append(Row(name, Outcome.MISSING, reason, _paths(runs)))
                 continue
-            come.remove(renamed)
-            after, verdict = runs[1][renamed], (Outcome.RENAMED, f"is called {renamed} after")
-        rows.append(_row(name, before, after, reference, verdicts, margin, verdict))
+            come.remove(to)
+            given = Outcome.RENAMED, f"is called {to} after"
+        rows.append(_row(name, runs, after.named(to), before, after, margin, given))
     for name in come:
-        after = runs[1][name]
-        findings = tuple(_findings(after, verdicts[1], (), NEW))
-        paths = tuple(Path(each.run) for each in after)
-        rows.append(Row(name, Outcome.ADDED, "only after", (), paths, findings=findings))
+        runs = after.named(name)
+        findings = tuple(_findings(runs, after.verdicts, (), NEW))
+        rows.append(Row(name, Outcome.ADDED, "only after", (), _paths(runs), findings=findings))
     return rows
 
 
 def _row(
     name: str,
-    before: Sequence[Levels],
-    after: Sequence[Levels],
-    reference: Reference,
-    verdicts: Sequence[Mapping[Path, Verdict]],
+    earlier: Sequence[Levels],
+    later: Sequence[Levels],
+    before: _Side,
+    after: _Side,
     least: float,
     given: tuple[Outcome, str] | None,
 ) -> Row:
-    """Compare a scenario."""
-    own = [each for each in reference.scenarios if each.name == name] or list(reference.scenarios)
-    found = [compare(replace(each, name=name), own) for each in after]
-    back = [compare(replace(each, name=name), of_runs(tuple(after))).worst for each in before]
+    """Compare a scenario; what became of it may be given."""
+    scenarios, others = before.reference.scenarios, of_runs(later)
+    own = tuple(each for each in scenarios if each.name == name) or scenarios
+    found = [compare(replace(each, name=name), own) for each in later]
+    back = [compare(replace(each, name=name), others).worst for each in earlier]
     margin = max([least, *(each.margins[Kind.REPETITIONS].db for each in found if each.scenarios)])
     scores = [each.worst for each in found if each.scenarios and np.isfinite(each.worst)]
     changes = _changes(found)
-    earlier = [event for each in before for event in verdicts[0][Path(each.run)].events]
+    events = [event for each in earlier for event in before.verdicts[Path(each.run)].events]
+    outcome, reason = given or _outcome(found, back, scores, margin, changes, after.verdicts)
     findings = [
-        *_findings(after, verdicts[1], earlier, NEW),
-        *_findings(before, verdicts[0], (), RESOLVED),
+        *_findings(later, after.verdicts, events, NEW),
+        *_findings(earlier, before.verdicts, (), RESOLVED),
     ]
-    outcome, reason = given or _outcome(found, back, scores, margin, changes, verdicts[1])
-    remarks = dict.fromkeys(remark for each in found for remark in each.remarks)
     return Row(
         name,
         outcome,
         reason,
-        tuple(Path(each.run) for each in before),
-        tuple(Path(each.run) for each in after),
+        _paths(earlier),
+        _paths(later),
         margin,
         median(scores) if scores else None,
         changes,
         tuple(findings),
-        tuple(remarks),
+        tuple(dict.fromkeys(remark for each in found for remark in each.remarks)),
         max(found, key=lambda each: np.nan_to_num(each.worst, nan=-np.inf), default=None),
     )
 
@@ -365,8 +328,8 @@ def _outcome(
     for each in found:
         known = verdicts[Path(each.run.run)].beside
         for what, why in known.failures if known else ():
-            kind = Outcome.CUT if what.startswith("end") else Outcome.FROZEN
-            if kind is Outcome.CUT or what.startswith("motion from"):
+            if what == END or what.startswith("motion from"):
+                kind = Outcome.CUT if what == END else Outcome.FROZEN
                 return kind, f"{Path(each.run.run).name} lacks the {what}: {why}"
     if not scores:
         return Outcome.INCONCLUSIVE, "the runs after make another motion"
@@ -386,21 +349,21 @@ def _changes(found: Sequence[Comparison]) -> tuple[Change, ...]:
     known = [each for each in found if each.scenarios]
     if not known:
         return ()
-    joints = [j for j in known[0].joints if all(j in each.joints for each in known)]
     octaves = [o for o in known[0].octaves if all(o in each.octaves for each in known)]
+    tops = []
+    for each in known:
+        over = np.nan_to_num(each.over, nan=-np.inf)
+        # One frame alone is no evidence.
+        top = np.minimum(over[:-1], over[1:]).max(axis=0, initial=-np.inf)
+        tops.append(top[:, :, [each.octaves.index(o) for o in octaves]])
     changes = []
-    for joint in joints:
-        for signal, word in enumerate(("velocity", "tracking error")):
-            for octave in octaves:
-                tops = []
-                for each in known:
-                    cell = each.over[
-                        :, each.joints.index(joint), signal, each.octaves.index(octave)
-                    ]
-                    pairs = np.minimum(cell[:-1], cell[1:])  # one frame alone is no evidence
-                    tops.append(float(np.nanmax(pairs)) if np.isfinite(pairs).any() else np.nan)
-                if np.isfinite(tops).all():
-                    changes.append(Change(joint, word, octave, median(tops), min(tops), max(tops)))
+    for joint in [j for j in known[0].joints if all(j in each.joints for each in known)]:
+        rows = [top[each.joints.index(joint)] for each, top in zip(known, tops, strict=True)]
+        for place, cells in enumerate(np.stack(rows, axis=-1).reshape(-1, len(rows)).tolist()):
+            if np.isfinite(cells).all():
+                signal, octave = divmod(place, len(octaves))
+                of = (joint, SIGNALS[signal], octaves[octave])
+                changes.append(Change(*of, median(cells), min(cells), max(cells)))
     return tuple(sorted(changes, key=lambda each: -each.change))
 
 
@@ -412,14 +375,12 @@ def _findings(
 ) -> list[Finding]:
     """Findings of runs that the other side does not have as loud."""
     found = []
-    for run in runs:
-        path = Path(run.run)
+    for path in _paths(runs):
         for event in verdicts[path].events:
             known = verdicts[path].evidence.get(event)
             if known is None or known.excused:
                 continue
             alike = [other for other in earlier if other.label == event.label]
             there = bool(match([event], alike, collar=4 * HOP))
-            named = LOUDER if there else kind
-            found.append(Finding(named, path, event, known.db, known.level, known))
+            found.append(Finding(LOUDER if there else kind, path, event, known))
     return found

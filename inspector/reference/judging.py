@@ -9,36 +9,60 @@ By moment, the first evidence that there is decides:
 A cell is a joint's velocity or tracking error in an octave. Its exceedance is its level over the
 loudest of the references within 0.15 s, both above a floor. The score of a frame is the mean of its
 two largest exceedances, or a neighbour's score if this is lower: one frame alone is no evidence.
+
+Repetitions are aligned by dynamic time warping of positions. The path may begin and end anywhere
+(open ends), and runs at half to twice the repetition's speed: its frame advances by 0, 1 or 2 with
+each frame of the run, never twice by 0 in a row but before the repetition's start and after its
+end, where a longer run may stay. So each row of costs follows from the row before, for all
+repetitions at once.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
 from math import prod
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector.reference.alignment import Aligned, align
-from inspector.reference.levels import HOP, SIGNALS, Levels
+from inspector.reference.levels import HOP, SIGNALS, Levels, Octaves
+from inspector.verdict import Evidence
 from noisemodel.types import Array
+
+PAD = 20
+"""Frames for which a repetition is held before its start and after its end: delays."""
+STEP_COST = 1e-3
+"""Cost of a frame that is skipped or held, in squared standard deviations of the motion."""
+OUTSIDE = 0.36
+"""Largest cost of a frame before the start or after the end, in squared standard deviations."""
+STEPS = np.array([1, 1, 2, 2, 0])
+"""Frames by which a path advances, by the code in `came`: odd codes come from a frame that was
+held; the last one waits at an end."""
+LARGEST = 4_000_000
+"""Cells of a matrix of costs; of longer runs every second frame is aligned, and so on."""
+STILL = 0.05
+"""Added to the standard deviation of each joint's positions, in [rad]: what is no motion."""
+SLOPE = (0.85, 1.18)
+"""Speeds of a repetition within which levels are comparable."""
+REACH = 10
+"""Frames to each side over which that speed is taken."""
+RESIDUAL = 0.6
+"""Difference of positions up to which two moments are of one motion, in standard deviations."""
 
 NEIGHBOURS = 3
 """Frames to each side among which a reference may be loudest."""
 FLOOR = 3e-3
 """Root mean square below which nothing is compared, in [rad/s]: less is hardly ever detectable."""
-FLOOR_SHARE = 0.1
-"""The same as a share of the loudest level of the joint's octave in the references."""
+FLOOR_SHARE, OTHERS_FLOOR = 0.1, 0.3
+"""The same as a share of the loudest level of the joint's octave in the references, and beside
+other motions, whose contacts are at other speeds."""
 CELLS = 2
 """Largest cells whose mean is the score of a frame."""
-RESIDUAL = 0.6
-"""Difference of positions up to which two moments are of one motion, in standard deviations."""
 NEAR, NEAREST = 1.0, 60
 """Difference of speeds up to which moments of other motions count, in standard deviations; how
 many of them are the reference."""
-OTHERS_FLOOR = 0.3
-"""`FLOOR_SHARE` beside other motions, whose contacts are at other speeds."""
 APART = 1.0
 """Time from which moments of one motion stand for moments of another, in [s]."""
 ROWS, LEVELS = 256, 8192
@@ -61,6 +85,8 @@ LONGER, SHARE_LONGER = 0.5, 0.1
 ALIKE = 0.9
 """Share of the best one's from which another scenario is of the same motion, too."""
 
+Real32 = NDArray[np.float32]
+
 
 class Kind(StrEnum):
     """Kinds of evidence, the best first."""
@@ -75,27 +101,16 @@ KINDS = tuple(Kind)
 
 @dataclass(frozen=True)
 class Expected:
-    """What is expected of a scenario: a finding that is wanted, or waived until a day.
-
-    Attributes:
-        label: Class of the finding; any if empty.
-        start: Earliest onset, in [s].
-        stop: Latest end, in [s].
-        joints: Joints that may be the loudest; any if empty.
-        loudest: Highest level of a cell, in [dB re 1 rad/s]; any if None.
-        required: Whether the finding has to be there.
-        reason: Why.
-        until: The last day of a waiver; None of a finding that is wanted.
-    """
+    """A finding that a scenario wants, or waives until a day; what is not stated is any."""
 
     label: str = ""
-    start: float = float("-inf")
-    stop: float = float("inf")
-    joints: tuple[str, ...] = ()
-    loudest: float | None = None
+    start: float = float("-inf")  # earliest onset, in [s]
+    stop: float = float("inf")  # latest end, in [s]
+    joints: tuple[str, ...] = ()  # one of which is the loudest
+    loudest: float | None = None  # highest level of a cell, in [dB re 1 rad/s]
     required: bool = False
     reason: str = ""
-    until: date | None = None
+    until: date | None = None  # last day of a waiver
 
     def covers(self, label: str, start: float, stop: float) -> bool:
         """Whether it is about a finding of a class that lasts from onset to end."""
@@ -104,24 +119,14 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A motion with its accepted repetitions.
-
-    Attributes:
-        repetitions: Levels of the repetitions, the newest last; one at least.
-        scores: Leave-one-out scores, in [dB].
-        elsewhere: Scores by other moments, in [dB]: how well other motions predict.
-        required: Whether a log must exist.
-        at_least: How many logs must exist.
-        renamed_from: Names that it had.
-        reason: Why it was accepted.
-    """
+    """A motion with its accepted repetitions, the newest last; one at least."""
 
     name: str
     repetitions: tuple[Levels, ...]
-    scores: tuple[float, ...] = ()
-    elsewhere: tuple[float, ...] = ()
+    scores: tuple[float, ...] = ()  # leave-one-out, in [dB]
+    elsewhere: tuple[float, ...] = ()  # by other moments, in [dB]: how well other motions predict
     required: bool = True
-    at_least: int = 1
+    at_least: int = 1  # logs that must exist if it is required
     renamed_from: tuple[str, ...] = ()
     wanted: tuple[Expected, ...] = ()
     waived: tuple[Expected, ...] = ()
@@ -148,17 +153,11 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Margin:
-    """From how many decibels over the reference on a moment is a finding.
-
-    Attributes:
-        db: The margin, in [dB].
-        scores: Leave-one-out scores that it is from; empty if it is assumed.
-        repetitions: Repetitions that the run is compared with.
-    """
+    """From how many decibels over the reference on a moment is a finding."""
 
     db: float
-    scores: tuple[float, ...] = ()
-    repetitions: int = 0
+    scores: tuple[float, ...] = ()  # that it is from; empty if it is assumed
+    repetitions: int = 0  # with which the run is compared
 
     def __str__(self) -> str:
         return f"margin {self.db:.1f} dB{'' if self.scores else ' assumed'}"
@@ -178,11 +177,7 @@ class Margin:
 
 
 def margin_of(scores: Sequence[float], repetitions: int) -> Margin:
-    """The margin by the scores of fault-free runs.
-
-    Args:
-        scores: Leave-one-out scores, in [dB].
-    """
+    """The margin by the leave-one-out scores of fault-free runs, in [dB]."""
     found = np.sort([score for score in scores if np.isfinite(score)])
     if len(found) < 2:
         return Margin(ASSUMED_DB, (), repetitions)
@@ -193,36 +188,59 @@ def margin_of(scores: Sequence[float], repetitions: int) -> Margin:
     return Margin(max(LEAST_DB, float(db)), tuple(found.tolist()), repetitions)
 
 
-@dataclass(frozen=True)
-class Exceedance:
-    """A stretch that is louder than its reference.
-
-    Attributes:
-        start: When it begins, in [s].
-        stop: When it ends, in [s].
-        peak: Time of its loudest exceedance, in [s].
-        db: That, over the reference, in [dB].
-        level: Level of that cell, in [dB re 1 rad/s].
-        signal: "velocity" or "tracking error".
-        octave: In [Hz].
-    """
+class Exceedance(NamedTuple):
+    """A stretch that is louder than its reference, in [s], and its loudest exceedance."""
 
     start: float
     stop: float
-    peak: float
-    db: float
-    level: float
-    joint: str
-    signal: str
-    octave: tuple[float, float]
-    kind: Kind
+    evidence: Evidence
 
-    def __str__(self) -> str:
-        low, high = self.octave
-        return (
-            f"{self.db:.1f} dB over {self.kind} at {self.peak:.2f} s, {self.joint}, {self.signal},"
-            f" {low:.0f} to {high:.0f} Hz"
+
+@dataclass(frozen=True)
+class Cells:
+    """Joints and octaves that are compared."""
+
+    joints: tuple[str, ...]
+    octaves: Octaves
+
+    @classmethod
+    def shared(cls, run: Levels, others: Sequence[Levels]) -> "Cells":
+        """Those of a run that all others have."""
+        return cls(
+            tuple(j for j in run.joints if all(j in each.joints for each in others)),
+            tuple(o for o in run.octaves if all(o in each.octaves for each in others)),
         )
+
+    def unknown(self, frames: int, part: slice = slice(None)) -> Real32:
+        """Levels of which nothing is known yet, shape (frames, joints, 2, octaves)."""
+        shape = (frames, len(self.joints[part]), len(SIGNALS), len(self.octaves))
+        return np.full(shape, np.nan, dtype=np.float32)
+
+    def of(self, run: Levels, part: slice = slice(None)) -> Real32:
+        """Levels of a run; NaN of those that it lacks."""
+        found, joints = self.unknown(len(run.level), part), self.joints[part]
+        places = [(to, run.joints.index(j)) for to, j in enumerate(joints) if j in run.joints]
+        bands = [
+            (to, run.octaves.index(o)) for to, o in enumerate(self.octaves) if o in run.octaves
+        ]
+        if places and bands:
+            to, at = np.array(places).T
+            into, of = np.array(bands).T
+            found[:, to[:, None], :, into] = run.level[:, at[:, None], :, of]
+        return found
+
+    def parts(self, *runs: Levels) -> Iterator[slice]:
+        """Joints that are compared at once: of long runs, all levels take several times as much."""
+        count = max(1, LEVELS // max(1, *(len(each.level) for each in runs)))
+        return (slice(first, first + count) for first in range(0, len(self.joints), count))
+
+    def noise(self, run: Levels) -> Array:
+        """Level of a run's velocities, all joints and octaves, shape (frames,); NaN without any."""
+        power = np.zeros(len(run.guide))
+        for part in self.parts(run):
+            level = self.of(run, part)[:, :, 0]
+            power += np.nansum(10.0 ** (level / 10), axis=(1, 2), dtype=np.float64)
+        return np.asarray(10 * np.log10(np.where(power > 0.0, power, np.nan)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,11 +267,11 @@ class Comparison:
 
     run: Levels
     joints: tuple[str, ...]
-    octaves: tuple[tuple[float, float], ...]
+    octaves: Octaves
     scenarios: tuple[str, ...]
     repetitions: int
     kind: NDArray[np.int8]
-    over: NDArray[np.float32]
+    over: Real32
     score: Array
     margins: Mapping[Kind, Margin]
     exceedances: tuple[Exceedance, ...]
@@ -270,7 +288,7 @@ class Comparison:
     @property
     def noise(self) -> Array:
         """Level of the run's noise in the joints and octaves that are compared, as in the band."""
-        return _noise(self.run, self.joints, self.octaves)
+        return Cells(self.joints, self.octaves).noise(self.run)
 
     @property
     def time(self) -> Array:
@@ -278,7 +296,7 @@ class Comparison:
         return self.run.time
 
     @property
-    def by_joint(self) -> NDArray[np.float32]:
+    def by_joint(self) -> Real32:
         """Loudest exceedance of each joint, shape (frames, joints), in [dB]; NaN without reference.
 
         A heat map of it shows where the run is louder than its reference.
@@ -313,44 +331,40 @@ class Comparison:
         return bool(inside.any() and np.isfinite(self.score[inside]).all())
 
     def __str__(self) -> str:
-        parts = [
-            f"{self.share(kind):.0%} by {self._words(kind)}" for kind in KINDS if self.share(kind)
-        ]
-        return "; ".join(parts)
-
-    def _words(self, kind: Kind) -> str:
-        if kind is Kind.GENERAL:
-            return "the general model alone"
-        if kind is Kind.OTHER_MOTIONS:
-            return f"other motions of this robot ({self.margins[kind]})"
-        count = f"{self.repetitions} repetition{'s' * (self.repetitions != 1)}"
-        return f"{count} of {' and '.join(self.scenarios)} ({self.margins[kind]})"
+        number = f"{self.repetitions} repetition{'s' * (self.repetitions != 1)}"
+        words = {
+            Kind.REPETITIONS: f"{number} of {' and '.join(self.scenarios)}",
+            Kind.OTHER_MOTIONS: "other motions of this robot",
+            Kind.GENERAL: "the general model alone",
+        }
+        shown = [kind for kind in KINDS if self.share(kind)]
+        by = {kind: f" ({self.margins[kind]})" if kind in self.margins else "" for kind in shown}
+        return "; ".join(f"{self.share(kind):.0%} by {words[kind]}{by[kind]}" for kind in shown)
 
 
 def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     """Compare a run with its reference."""
     known = [each for each in scenarios if robot_fits(run, each)]
-    joints, octaves, remarks = _common(run, known, scenarios)
+    cells, remarks = _common(run, known, scenarios)
     frames = len(run.guide)
-    over = _unknown(frames, joints, octaves)
-    kind = np.full(frames, KINDS.index(Kind.GENERAL), dtype=np.int8)
-    score = np.full(frames, np.nan)
+    over, kind = cells.unknown(frames), np.full(frames, KINDS.index(Kind.GENERAL), dtype=np.int8)
     margins: dict[Kind, Margin] = {}
     matched: list[Scenario] = []
-    quieter, slope, count, band = 0.0, float("nan"), 0, np.full((frames, 2), np.nan)
-    if frames and joints and octaves:
-        matched, aligned, told = _matching(run, known, joints)
+    references: list[Levels] = []
+    quieter, slope, band = 0.0, float("nan"), np.full((frames, 2), np.nan)
+    if frames and cells.joints and cells.octaves:
+        matched, aligned, told = _matching(run, known, cells.joints)
         remarks += told
         references = _repetitions(matched)
-        count = len(references)
         if references:
-            quieter = _quieter(run, references, aligned, joints, octaves)
-            band = _band(references, aligned, joints, octaves)
-            over, covered = _over_repetitions(run, references, aligned, joints, octaves)
+            quieter = _quieter(run, references, aligned, cells)
+            band = _band(references, aligned, cells)
+            over, covered = _over_repetitions(run, references, aligned, cells)
             kind[covered] = KINDS.index(Kind.REPETITIONS)
             scores = [score for scenario in known for score in scenario.scores]
-            margins[Kind.REPETITIONS] = margin_of(scores, count)
-            slope = float(np.nanmedian([each.slope for each in aligned]))
+            margins[Kind.REPETITIONS] = margin_of(scores, len(references))
+            slopes = [each.slope for each in aligned if np.isfinite(each.slope)]
+            slope = float(np.median(slopes)) if slopes else slope
             longest = max(each.duration for each in references)
             if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
                 remarks.append(
@@ -358,26 +372,26 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
                     " compared with other motions"
                 )
         left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
-        others = _repetitions([each for each in known if each not in matched])
-        if len(left) and (others or references):
-            found = _over_others(run, left, others or references, joints, octaves)
+        others = _repetitions([each for each in known if each not in matched]) or references
+        if len(left) and others:
+            found = _over_others(run, left, others, cells)
             covered = np.isfinite(_largest(found.reshape(len(left), -1)))
             over[left[covered]] = found[covered]
             kind[left[covered]] = KINDS.index(Kind.OTHER_MOTIONS)
             scores = [score for scenario in known for score in scenario.elsewhere]
             margins[Kind.OTHER_MOTIONS] = margin_of(scores, 0)
-        score = scores_of(over)
+    score = scores_of(over)
     return Comparison(
         run,
-        joints,
-        octaves,
+        cells.joints,
+        cells.octaves,
         tuple(each.name for each in matched),
-        count,
+        len(references),
         kind,
         over,
         score,
         margins,
-        _exceedances(run, joints, octaves, over, score, kind, margins),
+        _exceedances(run, cells, over, score, kind, margins),
         quieter,
         slope,
         band,
@@ -388,15 +402,13 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
 def leave_one_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
     """Score of each repetition by the others, in [dB], if they cover it."""
     found = []
-    for place, run in enumerate(repetitions):
-        others = [each for other, each in enumerate(repetitions) if other != place]
-        shared = [each for each in others if set(run.joints) & set(each.joints)]
-        if shared:
-            joints = tuple(j for j in run.joints if all(j in each.joints for each in shared))
-            octaves = tuple(o for o in run.octaves if all(o in each.octaves for each in shared))
-            aligned = _aligned(run, shared, joints)
-            over, _ = _over_repetitions(run, shared, aligned, joints, octaves)
-            found.append(_top(scores_of(over)))
+    for run in repetitions:
+        others = [each for each in repetitions if each is not run]
+        others = [each for each in others if set(run.joints) & set(each.joints)]
+        cells = Cells.shared(run, others)
+        aligned = _aligned(run, others, cells.joints)
+        if aligned:
+            found.append(_top(scores_of(_over_repetitions(run, others, aligned, cells)[0])))
     return tuple(score for score in found if np.isfinite(score))
 
 
@@ -404,39 +416,14 @@ def leave_one_moment_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
     """Score of each repetition by other moments of all, as if these were other motions, in [dB]."""
     found = []
     for run in repetitions:
-        joints = tuple(j for j in run.joints if all(j in each.joints for each in repetitions))
-        octaves = tuple(o for o in run.octaves if all(o in each.octaves for each in repetitions))
-        if joints and octaves and len(run.guide):
-            rows = np.arange(len(run.guide))
-            over = _over_others(run, rows, repetitions, joints, octaves, apart=APART)
+        cells, rows = Cells.shared(run, repetitions), np.arange(len(run.guide))
+        if cells.joints and cells.octaves and len(rows):
+            over = _over_others(run, rows, repetitions, cells, apart=APART)
             found.append(_top(scores_of(over)))
     return tuple(score for score in found if np.isfinite(score))
 
 
-def scores_of(over: NDArray[np.float32]) -> Array:
-    """Score of each frame, shape (frames,), in [dB]; NaN without reference."""
-    flat, own = over.reshape(len(over), -1), np.full(len(over), np.nan)
-    if not flat.size:
-        return own
-    for first in range(0, len(flat), ROWS):
-        known = flat[first : first + ROWS]
-        known = np.where(np.isnan(known), -np.inf, known)
-        top = -np.partition(-known, min(CELLS, known.shape[1]) - 1, axis=1)[:, :CELLS]
-        finite = np.isfinite(top).all(axis=1)
-        own[first : first + ROWS] = np.where(finite, top.mean(axis=1), np.nan)
-    around = np.fmax(np.append(np.nan, own[:-1]), np.append(own[1:], np.nan))
-    return np.asarray(np.where(np.isnan(own), np.nan, np.fmin(own, around)))
-
-
-def _top(score: Array) -> float:
-    known = score[np.isfinite(score)]
-    return float(known.max()) if len(known) else float("nan")
-
-
-def _largest(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Largest along the last axis; NaN where all are."""
-    lowered = np.where(np.isnan(values), -np.inf, values).max(axis=-1, initial=-np.inf)
-    return np.where(np.isfinite(lowered), lowered, np.nan).astype(np.float32)
+# --- which runs belong together
 
 
 def robot_fits(run: Levels, scenario: Scenario) -> bool:
@@ -448,87 +435,51 @@ def robot_fits(run: Levels, scenario: Scenario) -> bool:
 
 def _common(
     run: Levels, known: Sequence[Scenario], accepted: Sequence[Scenario]
-) -> tuple[tuple[str, ...], tuple[tuple[float, float], ...], list[str]]:
+) -> tuple[Cells, list[str]]:
     """Joints and octaves that can be compared, and what cannot."""
     if not known:
         newest = [each.repetitions[-1] for each in accepted]
-        robots = {each.robot for each in newest} - {""}
-        if not run.robot or not robots or run.robot in robots:  # then the joints are others
-            robots = {_joints(each) for each in newest}
-            own = _joints(run)
-        else:
-            own = run.robot
+        robots, own = {each.robot for each in newest} - {""}, run.robot
+        if not own or not robots or own in robots:  # then the joints are others
+            own, *others = (
+                f"joints {', '.join(each.joints[:3])}{', …' * (len(each.joints) > 3)}"
+                for each in (run, *newest)
+            )
+            robots = set(others)
         there = ", ".join(sorted(robots)) or "nothing"
-        return (), (), [f"no reference: it is of {there}, and the run of {own}"]
+        return Cells((), ()), [f"no reference: it is of {there}, and the run of {own}"]
     every = _repetitions(known)
-    joints = tuple(j for j in run.joints if any(j in each.joints for each in every))
-    octaves = tuple(o for o in run.octaves if any(o in each.octaves for each in every))
+    cells = Cells(
+        tuple(j for j in run.joints if any(j in each.joints for each in every)),
+        tuple(o for o in run.octaves if any(o in each.octaves for each in every)),
+    )
     remarks = []
-    if len(joints) < len(run.joints):
-        lacking = [joint for joint in run.joints if joint not in joints]
+    if lacking := [joint for joint in run.joints if joint not in cells.joints]:
         remarks.append(f"no reference for joints {', '.join(lacking[:5])}")
-    if len(octaves) < len(run.octaves):
+    if len(cells.octaves) < len(run.octaves):
         rates = sorted({each.rate for each in every})
         shown = ", ".join(f"{rate:g}" for rate in rates[:3])
         remarks.append(
-            f"compared up to {octaves[-1][1] if octaves else 0:.0f} Hz: the run has"
+            f"compared up to {cells.octaves[-1][1] if cells.octaves else 0:.0f} Hz: the run has"
             f" {run.rate:g} Hz, the reference {shown} Hz"
         )
-    return joints, octaves, remarks
-
-
-def _joints(run: Levels) -> str:
-    return f"joints {', '.join(run.joints[:3])}{', …' * (len(run.joints) > 3)}"
-
-
-def _view(
-    run: Levels, joints: Sequence[str], octaves: Sequence[tuple[float, float]]
-) -> NDArray[np.float32]:
-    """Levels by some joints and octaves; NaN of those that the run lacks."""
-    found = _unknown(len(run.level), joints, octaves)
-    places = [(to, run.joints.index(j)) for to, j in enumerate(joints) if j in run.joints]
-    bands = [(to, run.octaves.index(o)) for to, o in enumerate(octaves) if o in run.octaves]
-    if places and bands:
-        to, at = np.array(places).T
-        into, of = np.array(bands).T
-        found[:, to[:, None], :, into] = run.level[:, at[:, None], :, of]
-    return found
-
-
-def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> list[Aligned]:
-    """Where the run lies in each of the others, by the joints that all have; nothing without one.
-
-    Positions count from zero if some are integrated.
-    """
-    shared = [j for j in joints if all(j in each.joints for each in (run, *others))]
-    if not shared:
-        return []
-    every = [
-        np.asarray(each.guide[:, [each.joints.index(j) for j in shared]], dtype=np.float64)
-        for each in (run, *others)
-    ]
-    if any(each.guided_by.endswith("velocities") for each in (run, *others)):
-        every = [
-            guide - each.first[[each.joints.index(j) for j in shared]]
-            for guide, each in zip(every, (run, *others), strict=True)
-        ]
-    return align(every[0], every[1:])
+    return cells, remarks
 
 
 def _matching(
     run: Levels, known: Sequence[Scenario], joints: Sequence[str]
-) -> tuple[list[Scenario], list[Aligned], list[str]]:
+) -> tuple[list[Scenario], "list[Aligned]", list[str]]:
     """Scenarios of the run's motion, of several the one with its name; all their repetitions."""
     usable = [each for each in known if len(each.repetitions[-1].guide)]
     named = [each for each in usable if run.name in each.names]
     aligned = _aligned(run, _repetitions(named), joints)
     # A run that lies on the motion of its name needs no other scenario.
     newest = np.cumsum([len(each.repetitions) for each in named], dtype=int) - 1
-    if named and aligned and all(_share(aligned[place]) >= SAME_NAME for place in newest):
+    if named and aligned and all(aligned[place].share >= SAME_NAME for place in newest):
         return named, aligned, []
     aligned = _aligned(run, [each.repetitions[-1] for each in usable], joints)
     # Nothing is aligned where no joint is shared.
-    pairs = [(each, _share(own)) for each, own in zip(usable, aligned, strict=False)]
+    pairs = [(each, own.share) for each, own in zip(usable, aligned, strict=False)]
     best = max((share for _, share in pairs), default=0.0)
     found = [each for each, share in pairs if share >= max(SAME_MOTION, ALIKE * best)]
     named = [each for each, share in pairs if run.name in each.names and share >= SAME_NAME]
@@ -544,16 +495,11 @@ def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
     return [each for scenario in scenarios for each in scenario.repetitions]
 
 
-def _share(aligned: Aligned) -> float:
-    """Share of a run that lies on a motion."""
-    return float(np.mean(aligned.residual <= RESIDUAL))
-
-
 def share_of_motion(run: Levels, other: Levels) -> float:
     """Share of a run that lies on the motion of another."""
     if not len(run.guide) or not len(other.guide) or not set(run.joints) & set(other.joints):
         return 0.0
-    return _share(*_aligned(run, [other], run.joints))
+    return _aligned(run, [other], run.joints)[0].share
 
 
 def same_motion(run: Levels, other: Levels) -> bool:
@@ -561,9 +507,37 @@ def same_motion(run: Levels, other: Levels) -> bool:
     return run.robot == other.robot and share_of_motion(run, other) > SAME_MOTION
 
 
-def floor_of(
-    references: Sequence[NDArray[np.float32]], share: float = FLOOR_SHARE
-) -> NDArray[np.float32]:
+# --- exceedances
+
+
+def scores_of(over: Real32) -> Array:
+    """Score of each frame, shape (frames,), in [dB]; NaN without reference."""
+    own = np.full(len(over), np.nan)
+    if not over.size:
+        return own
+    flat = over.reshape(len(over), -1)
+    for first in range(0, len(flat), ROWS):
+        known = flat[first : first + ROWS]
+        known = np.where(np.isnan(known), -np.inf, known)
+        top = -np.partition(-known, min(CELLS, known.shape[1]) - 1, axis=1)[:, :CELLS]
+        finite = np.isfinite(top).all(axis=1)
+        own[first : first + ROWS] = np.where(finite, top.mean(axis=1), np.nan)
+    around = np.fmax(np.append(np.nan, own[:-1]), np.append(own[1:], np.nan))
+    return np.asarray(np.where(np.isnan(own), np.nan, np.fmin(own, around)))
+
+
+def _top(score: Array) -> float:
+    known = score[np.isfinite(score)]
+    return float(known.max()) if len(known) else float("nan")
+
+
+def _largest(values: Real32) -> Real32:
+    """Largest along the last axis; NaN where all are."""
+    lowered = np.where(np.isnan(values), -np.inf, values).max(axis=-1, initial=-np.inf)
+    return np.where(np.isfinite(lowered), lowered, np.nan).astype(np.float32)
+
+
+def _floor(references: Sequence[Real32], share: float = FLOOR_SHARE) -> Real32:
     """Power below which nothing is compared, shape (joints, 2, octaves), in [rad²/s²]."""
     loudest = np.full(references[0].shape[1:], -np.inf)
     for level in references:
@@ -574,12 +548,12 @@ def floor_of(
     return np.maximum(FLOOR**2, share**2 * power).astype(np.float32)
 
 
-def _raised(level: NDArray[np.float32], floor: NDArray[np.float32]) -> NDArray[np.float32]:
+def _raised(level: Real32, floor: Real32) -> Real32:
     """Levels with the floor added, in [dB]."""
     return np.asarray(10 * np.log10(10 ** (level / 10) + floor), dtype=np.float32)
 
 
-def _spread(level: NDArray[np.float32]) -> NDArray[np.float32]:
+def _spread(level: Real32) -> Real32:
     """The loudest within some frames to each side; NaN where none is known."""
     loud = level.copy()
     for shift in range(1, NEIGHBOURS + 1):
@@ -588,37 +562,20 @@ def _spread(level: NDArray[np.float32]) -> NDArray[np.float32]:
     return loud
 
 
-def _parts(joints: Sequence[str], *runs: Levels) -> list[slice]:
-    """Joints that are compared at once: of long runs, all levels take several times the memory."""
-    count = max(1, LEVELS // max(1, *(len(each.level) for each in runs)))
-    return [slice(first, first + count) for first in range(0, len(joints), count)]
-
-
-def _unknown(
-    frames: int, joints: Sequence[str], octaves: Sequence[tuple[float, float]]
-) -> NDArray[np.float32]:
-    """Cells of which nothing is known yet."""
-    return np.full((frames, len(joints), len(SIGNALS), len(octaves)), np.nan, dtype=np.float32)
-
-
 def _over_repetitions(
-    run: Levels,
-    references: Sequence[Levels],
-    aligned: Sequence[Aligned],
-    joints: Sequence[str],
-    octaves: Sequence[tuple[float, float]],
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    run: Levels, references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells
+) -> tuple[Real32, NDArray[np.bool_]]:
     """Exceedance over the loudest repetition, NaN without one, and frames that one covers."""
-    over = _unknown(len(run.guide), joints, octaves)
-    covered = np.any([path.residual <= RESIDUAL for path in aligned], axis=0)
-    for part in _parts(joints, run, *references):
-        views = [_view(each, joints[part], octaves) for each in references]
-        floor, loudest = floor_of(views), _unknown(len(over), joints[part], octaves)
+    over = cells.unknown(len(run.guide))
+    covered = np.any([path.same for path in aligned], axis=0)
+    for part in cells.parts(run, *references):
+        views = [cells.of(each, part) for each in references]
+        floor, loudest = _floor(views), cells.unknown(len(over), part)
         for view, path in zip(views, aligned, strict=True):
             loud = _spread(view)[path.frame]
-            loud[path.residual > RESIDUAL] = np.nan
+            loud[~path.same] = np.nan
             loudest = np.fmax(loudest, loud)
-        own = _raised(_view(run, joints[part], octaves), floor) - _raised(loudest, floor)
+        own = _raised(cells.of(run, part), floor) - _raised(loudest, floor)
         over[covered, part] = own[covered]
     return over, covered
 
@@ -627,42 +584,23 @@ def _over_others(
     run: Levels,
     rows: NDArray[np.int64],
     references: Sequence[Levels],
-    joints: Sequence[str],
-    octaves: Sequence[tuple[float, float]],
+    cells: Cells,
     apart: float = 0.0,
-) -> NDArray[np.float32]:
+) -> Real32:
     """Exceedance over moments of other motions with about the same speeds; NaN without one.
 
     Velocities contain the desired motion, which is another one: tracking errors count where they
     are known.
     """
-    shared = [j for j in joints if all(j in each.joints for each in references)]
-    found = _unknown(len(rows), joints, octaves)
+    found = cells.unknown(len(rows))
+    shared = [j for j in cells.joints if all(j in each.joints for each in references)]
     if not shared:
         return found
-    speed = np.concatenate(
-        [each.speed[:, [each.joints.index(j) for j in shared]] for each in references]
-    )
-    time = np.concatenate([each.time - each.start for each in references])
-    thin = -(-len(speed) // POOL)
-    speed, time = speed[::thin], time[::thin]
-    scale = speed.std(axis=0) + 0.05
-    wanted = run.speed[rows][:, [run.joints.index(j) for j in shared]] / scale
-    speed = speed / scale
-    near = np.empty((len(rows), min(NEAREST, len(speed))), dtype=np.int32)
-    close = np.empty(near.shape, dtype=bool)
-    for first in range(0, len(rows), ROWS):
-        own = slice(first, first + ROWS)
-        part = wanted[own]
-        square = (part**2).mean(1)[:, None] + (speed**2).mean(1) - 2 * part @ speed.T / len(scale)
-        if apart:
-            when = run.time[rows[own]] - run.start
-            square[np.abs(when[:, None] - time) < apart] = np.inf
-        near[own] = np.argpartition(square, near.shape[1] - 1, axis=1)[:, :NEAREST]
-        close[own] = np.take_along_axis(square, near[own], axis=1) <= NEAR**2
-    for place, joint in enumerate(joints):
-        views = [_view(each, [joint], octaves) for each in references]
-        floor, mine = floor_of(views, OTHERS_FLOOR), _view(run, [joint], octaves)
+    near, close, thin = _nearest(run, rows, references, shared, apart)
+    for place in range(len(cells.joints)):
+        part = slice(place, place + 1)
+        views = [cells.of(each, part) for each in references]
+        floor, mine = _floor(views, OTHERS_FLOOR), cells.of(run, part)
         level = np.concatenate([_spread(view) for view in views])[::thin, 0]
         level[np.isnan(level)] = -np.inf
         for first in range(0, len(rows), ROWS):
@@ -677,58 +615,68 @@ def _over_others(
     return found
 
 
-def _quieter(
+def _nearest(
     run: Levels,
+    rows: NDArray[np.int64],
     references: Sequence[Levels],
-    aligned: Sequence[Aligned],
     joints: Sequence[str],
-    octaves: Sequence[tuple[float, float]],
+    apart: float,
+) -> tuple[NDArray[np.int32], NDArray[np.bool_], int]:
+    """Moments of references with the nearest speeds, whether they are near, and every how many."""
+    speed = np.concatenate(
+        [each.speed[:, [each.joints.index(j) for j in joints]] for each in references]
+    )
+    time = np.concatenate([each.time - each.start for each in references])
+    thin = -(-len(speed) // POOL)
+    speed, time = speed[::thin], time[::thin]
+    scale = speed.std(axis=0) + 0.05
+    wanted = run.speed[rows][:, [run.joints.index(j) for j in joints]] / scale
+    speed = speed / scale
+    near = np.empty((len(rows), min(NEAREST, len(speed))), dtype=np.int32)
+    close = np.empty(near.shape, dtype=bool)
+    for first in range(0, len(rows), ROWS):
+        own = slice(first, first + ROWS)
+        part = wanted[own]
+        square = (part**2).mean(1)[:, None] + (speed**2).mean(1) - 2 * part @ speed.T / len(scale)
+        if apart:
+            when = run.time[rows[own]] - run.start
+            square[np.abs(when[:, None] - time) < apart] = np.inf
+        near[own] = np.argpartition(square, near.shape[1] - 1, axis=1)[:, :NEAREST]
+        close[own] = np.take_along_axis(square, near[own], axis=1) <= NEAR**2
+    return near, close, thin
+
+
+def _quieter(
+    run: Levels, references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells
 ) -> float:
     """By how much the run is quieter than each repetition in its loudest joint, in [dB]."""
-    parts, margins = _parts(joints, run, *references), []
-    floors, own = [], _unknown(len(run.guide), joints, octaves)
+    parts, own = list(cells.parts(run, *references)), cells.unknown(len(run.guide))
+    floors, margins = [], []
     for part in parts:
-        floors.append(floor_of([_view(each, joints[part], octaves) for each in references]))
-        own[:, part] = _raised(_spread(_view(run, joints[part], octaves)), floors[-1])
+        floors.append(_floor([cells.of(each, part) for each in references]))
+        own[:, part] = _raised(_spread(cells.of(run, part)), floors[-1])
     for repetition, path in zip(references, aligned, strict=True):
-        over, same = _unknown(len(run.guide), joints, octaves), path.residual <= RESIDUAL
+        over = cells.unknown(len(run.guide))
         for part, floor in zip(parts, floors, strict=True):
-            level = _raised(_view(repetition, joints[part], octaves)[path.frame], floor)
-            over[same, part] = (level - own[:, part])[same]
+            level = _raised(cells.of(repetition, part)[path.frame], floor)
+            over[path.same, part] = (level - own[:, part])[path.same]
         margins.append(_top(scores_of(over)))
-    known = [each for each in margins if np.isfinite(each)]
-    return max(0.0, min(known)) if known else 0.0
+    return max(0.0, min((each for each in margins if np.isfinite(each)), default=0.0))
 
 
-def _noise(run: Levels, joints: Sequence[str], octaves: Sequence[tuple[float, float]]) -> Array:
-    """Level of the velocities of all joints in all octaves, shape (frames,); NaN where none is."""
-    power = np.zeros(len(run.guide))
-    for part in _parts(joints, run):
-        level = _view(run, joints[part], octaves)[:, :, 0]
-        power += np.nansum(10.0 ** (level / 10), axis=(1, 2), dtype=np.float64)
-    return np.asarray(10 * np.log10(np.where(power > 0.0, power, np.nan)))
-
-
-def _band(
-    references: Sequence[Levels],
-    aligned: Sequence[Aligned],
-    joints: Sequence[str],
-    octaves: Sequence[tuple[float, float]],
-) -> Array:
+def _band(references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells) -> Array:
     """Quietest and loudest repetition at each frame of the run, shape (frames, 2)."""
     low = high = np.full(len(aligned[0].frame), np.nan)
     for each, path in zip(references, aligned, strict=True):
-        noise = _noise(each, joints, octaves)[path.frame]
-        noise[path.residual > RESIDUAL] = np.nan
+        noise = np.where(path.same, cells.noise(each)[path.frame], np.nan)
         low, high = np.fmin(low, noise), np.fmax(high, noise)
     return np.stack((low, high), axis=1)
 
 
 def _exceedances(
     run: Levels,
-    joints: Sequence[str],
-    octaves: Sequence[tuple[float, float]],
-    over: NDArray[np.float32],
+    cells: Cells,
+    over: Real32,
     score: Array,
     kind: NDArray[np.int8],
     margins: Mapping[Kind, Margin],
@@ -737,25 +685,158 @@ def _exceedances(
     loud = np.flatnonzero(np.nan_to_num(score, nan=-np.inf) > limit)
     if not len(loud):
         return ()
-    groups = np.split(loud, np.flatnonzero(np.diff(loud) * HOP > GAP) + 1)
     time, found = run.time, []
-    for group in groups:
-        cells = np.nan_to_num(over[group], nan=-np.inf)
-        frame, joint, signal, octave = map(int, np.unravel_index(cells.argmax(), cells.shape))
+    for group in np.split(loud, np.flatnonzero(np.diff(loud) * HOP > GAP) + 1):
+        exceeded = np.nan_to_num(over[group], nan=-np.inf)
+        place = np.unravel_index(exceeded.argmax(), exceeded.shape)
+        frame, joint, signal, octave = map(int, place)
         row = group[frame]
-        level = _view(run, joints, octaves)[row, joint, signal, octave]
-        found.append(
-            Exceedance(
-                # A frame reaches 0.1 s to each side; what is loud in it begins about its middle.
-                float(max(run.start, time[group[0]] - HOP)),
-                float(min(run.start + run.duration, time[group[-1]] + HOP)),
-                float(time[row]),
-                float(cells.max()),
-                float(level),
-                joints[joint],
-                SIGNALS[signal],
-                octaves[octave],
-                KINDS[kind[row]],
-            )
+        level = cells.of(run, slice(joint, joint + 1))[row, 0, signal, octave]
+        evidence = Evidence(
+            KINDS[kind[row]].value,
+            round(float(exceeded.max()), 2),
+            round(float(time[row]), 4),
+            cells.joints[joint],
+            SIGNALS[signal],
+            cells.octaves[octave],
+            round(float(level), 2),
         )
+        # A frame reaches 0.1 s to each side; what is loud in it begins about its middle.
+        start = max(run.start, time[group[0]] - HOP)
+        stop = min(run.start + run.duration, time[group[-1]] + HOP)
+        found.append(Exceedance(float(start), float(stop), evidence))
     return tuple(found)
+
+
+# --- alignment
+
+
+@dataclass(frozen=True, eq=False)
+class Aligned:
+    """Where each frame of a run lies in a repetition.
+
+    Attributes:
+        frame: Frame of the repetition, shape (frames,).
+        residual: Largest difference of positions in any joint, in standard deviations of the
+            motion, shape (frames,); infinite where the speeds differ too much.
+        inside: Whether the frame is one of the repetition, not before its start or after its end.
+    """
+
+    frame: NDArray[np.int64]
+    residual: Array
+    inside: NDArray[np.bool_]
+
+    @property
+    def same(self) -> NDArray[np.bool_]:
+        """Whether the frame is of the same motion."""
+        return np.asarray(self.residual <= RESIDUAL)
+
+    @property
+    def share(self) -> float:
+        """Share of the run that lies on the motion."""
+        return float(np.mean(self.same))
+
+    @property
+    def slope(self) -> float:
+        """Speed of the run divided by the repetition's."""
+        moved = np.flatnonzero(self.inside)
+        if len(moved) < 2:
+            return float("nan")
+        first, last = int(moved[0]), int(moved[-1])
+        return float(self.frame[last] - self.frame[first]) / (last - first)
+
+
+def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> list[Aligned]:
+    """Where the run lies in each of the others, by the joints that all have; nothing without one.
+
+    Positions count from zero if some are integrated.
+    """
+    runs = (run, *others)
+    shared = [j for j in joints if all(j in each.joints for each in runs)]
+    if not shared:
+        return []
+    places = [[each.joints.index(j) for j in shared] for each in runs]
+    guides = [each.guide[:, at].astype(np.float64) for each, at in zip(runs, places, strict=True)]
+    if any(each.guided_by.endswith("velocities") for each in runs):
+        firsts = [each.first[at] for each, at in zip(runs, places, strict=True)]
+        guides = [guide - first for guide, first in zip(guides, firsts, strict=True)]
+    return align(guides[0], guides[1:])
+
+
+def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:
+    """Find the frames of repetitions that belong to each frame of a run.
+
+    Args:
+        run: Slow positions, shape (frames, joints).
+        repetitions: The same of each repetition, with the same joints.
+    """
+    if not len(repetitions):
+        return []
+    scale = np.stack([each.std(axis=0) for each in repetitions]).max(axis=0) + STILL
+    run = run / scale
+    held = [np.pad(each / scale, ((PAD, PAD), (0, 0)), mode="edge") for each in repetitions]
+    thin = int(np.ceil(np.sqrt(len(run) * max(map(len, held)) / LARGEST)))
+    paths = _paths(run[::thin], [each[::thin] for each in held], -(-PAD // thin))
+    if thin > 1:
+        at = np.arange(len(run)) / thin
+        paths = [np.round(np.interp(at, np.arange(len(p)), p * thin)).astype(int) for p in paths]
+    found = []
+    for path, other, repetition in zip(paths, held, repetitions, strict=True):
+        path = np.clip(path, 0, len(other) - 1)
+        residual = np.abs(run - other[path]).max(axis=1)
+        inside = (path >= PAD) & (path < PAD + len(repetition))
+        residual[inside & ~_comparable(path)] = np.inf
+        found.append(Aligned(np.clip(path - PAD, 0, len(repetition) - 1), residual, inside))
+    return found
+
+
+def _comparable(path: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether run and repetition are about equally fast around each frame."""
+    frames = np.arange(len(path))
+    low, high = np.maximum(frames - REACH, 0), np.minimum(frames + REACH, len(path) - 1)
+    slope = (path[high] - path[low]) / np.maximum(high - low, 1)
+    # One frame more or less is rounding.
+    slack = 1.0 / np.maximum(high - low, 1)
+    return np.asarray((slope >= SLOPE[0] - slack) & (slope <= SLOPE[1] + slack))
+
+
+def _paths(run: Array, held: Sequence[Array], pad: int) -> list[NDArray[np.int64]]:
+    """Frame of each repetition for each frame of a run; so many are before and after it."""
+    count, width, rows = len(held), max(map(len, held)), len(run)
+    distance = np.full((rows, count, width), np.inf, dtype=np.float32)
+    for place, other in enumerate(held):
+        square = (run**2).mean(axis=1)[:, None] + (other**2).mean(axis=1)
+        square -= 2 * run @ other.T / run.shape[1]
+        for outside in (slice(pad), slice(-pad, None)):
+            square[:, outside] = np.minimum(square[:, outside], OUTSIDE)
+        distance[:, place, : len(other)] = np.maximum(square, 0.0)
+    edges = np.array([[0, len(other) - 1] for other in held]) + width * np.arange(count)[:, None]
+    # moved: the path came from another frame; stayed: from the same one, which it may only once.
+    moved = distance[0] + STEP_COST * np.abs(np.arange(width) - pad)
+    stayed = np.full((count, width), np.inf)
+    came = np.zeros((rows, count, width), dtype=np.uint8)
+    # Two columns before the first frame, so that the frames before one are parts of these.
+    before = np.full((count, width + 2), np.inf)
+    was_held = np.zeros((count, width + 2), dtype=np.uint8)
+    for row in range(1, rows):
+        np.minimum(moved, stayed, out=before[:, 2:])
+        np.less(stayed, moved, out=was_held[:, 2:])
+        one, two = before[:, 1:-1], before[:, :-2] + STEP_COST
+        came[row] = np.where(two < one, 2 + was_held[:, :-2], was_held[:, 1:-1])
+        stayed = distance[row] + moved + STEP_COST
+        moved = distance[row] + np.minimum(one, two)
+        at_edges, steps = moved.ravel(), came[row].ravel()
+        longer = stayed.ravel()[edges] < at_edges[edges]
+        at_edges[edges[longer]] = stayed.ravel()[edges[longer]]
+        steps[edges[longer]] = len(STEPS) - 1
+    stay = stayed.min(axis=1) < moved.min(axis=1)
+    at = np.where(stay, stayed.argmin(axis=1), moved.argmin(axis=1))
+    path = np.zeros((rows, count), dtype=np.int64)
+    for row in range(rows - 1, -1, -1):
+        path[row] = at
+        if row:
+            code = came[row, np.arange(count), at]
+            step = np.where(stay, 0, STEPS[code])
+            stay = np.where(stay, False, code % 2 == 1)
+            at = at - step
+    return list(path.T)

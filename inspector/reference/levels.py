@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy import fft
 from numpy.typing import NDArray
 
 from noisemodel import Run
@@ -29,49 +30,40 @@ PIECE, LONGEST = 3.0, 3600.0
 LATEST = 2
 """Pieces of a stream that are compared while it runs."""
 SIGNALS = ("velocity", "tracking error")
+GUIDES = {
+    "position_desired": "desired positions",
+    "velocity_desired": "desired velocities",
+    "position": "measured positions",
+    "velocity": "measured velocities",
+}
+"""What the slow motion is taken from, the best first."""
 LEAST_DB, STEP_DB, ABSENT = -100.0, 0.5, 255
 """What code 0 of a stored level stands for, the step between codes, and the code of no level."""
 
 Codes = NDArray[np.uint8]
+Octaves = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """The levels of a run.
+    """The levels of a run."""
 
-    Attributes:
-        name: Its scenario: from its meta, or the name of its file without a number at the end.
-        run: Its file, as people read it.
-        sha256: SHA-256 of its file; empty if it has none.
-        robot: The robot that it names; empty without.
-        joints: Names of the joints.
-        rate: In [Hz].
-        start: Time of the first sample, in [s].
-        duration: In [s].
-        octaves: Lower and upper edges, in [Hz].
-        level: Shape (frames, joints, 2, octaves), in [dB re 1 rad/s]; NaN in gaps, and of tracking
-            errors that are not known.
-        guide: Slow positions, shape (frames, joints), in [rad] or [m].
-        guided_by: What these are: desired positions, or what stands in for them.
-        pace: Slow measured speed, root mean square over the joints, shape (frames,), in [rad/s].
-        origin: Slow positions at the start of the stream that it is a part of, shape (joints,), in
-            [rad] or [m]; None of a whole run.
-    """
-
-    name: str
-    run: str
-    sha256: str
-    robot: str
+    name: str  # its scenario
+    run: str  # its file, as people read it
+    sha256: str  # of its file; empty without
+    robot: str  # that it names; empty without
     joints: tuple[str, ...]
-    rate: float
-    start: float
-    duration: float
-    octaves: tuple[tuple[float, float], ...]
+    rate: float  # [Hz]
+    start: float  # [s]
+    duration: float  # [s]
+    octaves: Octaves  # lower and upper edges, in [Hz]
+    # Shape (frames, joints, 2, octaves), in [dB re 1 rad/s]; NaN in gaps, and of tracking errors
+    # that are not known.
     level: NDArray[np.float32]
-    guide: NDArray[np.float32]
-    guided_by: str
-    pace: NDArray[np.float32]
-    origin: NDArray[np.float32] | None = None
+    guide: NDArray[np.float32]  # slow positions, shape (frames, joints), in [rad] or [m]
+    guided_by: str  # what these are, of `GUIDES`
+    pace: NDArray[np.float32]  # slow speed, rms over the joints, shape (frames,), in [rad/s]
+    origin: NDArray[np.float32] | None = None  # first of the guide of the stream it is a part of
 
     @property
     def first(self) -> NDArray[np.float32]:
@@ -93,7 +85,7 @@ class Levels:
         return np.asarray(np.gradient(self.guide.astype(np.float64), HOP, axis=0))
 
 
-def octaves(rate: float) -> tuple[tuple[float, float], ...]:
+def octaves(rate: float) -> Octaves:
     """Edges of the octaves at a rate, in [Hz]; the last one may be cut, to half of its width."""
     top, found, low = HIGHEST * rate, [], LOWEST
     while low * 1.5 <= top:
@@ -103,11 +95,7 @@ def octaves(rate: float) -> tuple[tuple[float, float], ...]:
 
 
 def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Levels:
-    """Measure the levels of a run.
-
-    Args:
-        run: The run; what stays in its file is read piece by piece.
-    """
+    """Measure the levels of a run; what stays in its file is read piece by piece."""
     bands = octaves(run.rate)
     of_sample = np.floor(np.arange(len(run.time)) / (run.rate * HOP) + 1e-9).astype(np.int64)
     count = int(of_sample[-1]) + 1
@@ -125,7 +113,7 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
     level[_framed(np.convolve(lost, np.ones(BINS + 1))[:count], frames) > 0] = np.nan
     level[:, ~_has_desired(run), 1] = np.nan
     guide, guided_by = _guide(run, of_sample, count, lost)
-    moved = _means(run.velocity, of_sample, count)
+    moved = _framed(_means(run.velocity, of_sample, count), frames) / BINS
     return Levels(
         name,
         file,
@@ -139,7 +127,7 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
         level,
         (_framed(guide, frames) / BINS).astype(np.float32),
         guided_by,
-        np.sqrt(np.mean(np.square(_framed(moved, frames) / BINS), axis=1)).astype(np.float32),
+        np.sqrt(np.mean(np.square(moved), axis=1)).astype(np.float32),
     )
 
 
@@ -147,8 +135,6 @@ class LevelStream:
     """Measures the levels of a run while it comes, 3 s at a time, so that no sample is kept.
 
     Args:
-        rate: In [Hz].
-        robot: The robot's name; empty without.
         tell: Called with the levels of the last 6 s after every 3 s, a second later.
     """
 
@@ -186,8 +172,7 @@ class LevelStream:
         names = ["velocity"]
         names += [n for n in ("velocity_desired", "position") if n in signals][:1]
         known = valid & np.isfinite(signals[names[-1]]).all(axis=1)
-        edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(valid)]
-        for first, stop in pairwise(edges):
+        for first, stop in pairwise([0, *np.flatnonzero(lost[1:] > 0) + 1, len(valid)]):
             self._add_gap(int(lost[first]), {n: signals[n].shape[1] for n in names})
             self._add({n: signals[n][first:stop] for n in names}, known[first:stop])
 
@@ -232,13 +217,12 @@ class LevelStream:
             self._parts = self._parts[-LATEST:]
         for name, values in signals.items():
             new = np.where(valid[:, None], values, 0.0).astype(np.float32)
-            held = self._held.get(name)
-            self._held[name] = new if held is None else np.concatenate((held, new))
+            self._held[name] = np.concatenate((self._held.get(name, new[:0]), new))
         self._valid = np.concatenate((self._valid, valid))
         bins, around = round(PIECE / HOP), round(SETTLING / HOP)
         # Filters need a second of samples to each side.
-        while len(self._valid) > self._samples(self._before + bins + BINS + around):
-            self._measure(self._samples(self._before + bins + BINS + around), bins)
+        while len(self._valid) > (enough := self._samples(self._before + bins + BINS + around)):
+            self._measure(enough, bins)
             drop = self._samples(self._before + bins - around)
             self._held = {name: values[drop:] for name, values in self._held.items()}
             self._valid, self._before = self._valid[drop:], around
@@ -249,7 +233,6 @@ class LevelStream:
     def _measure(self, samples: int, frames: int | None) -> None:
         """Measure frames of the first samples that are held; all that there are if None."""
         valid = self._valid[:samples]
-        taken = slice(self._before, None if frames is None else self._before + frames)
         signals: dict[str, Any] = {name: each[:samples] for name, each in self._held.items()}
         run = Run(
             time=np.arange(samples) / self._rate,
@@ -268,6 +251,7 @@ class LevelStream:
             if not found.guided_by.endswith("velocities"):
                 step = 2 * np.pi * np.round(step / (2 * np.pi))
             guide = (guide + step).astype(np.float32)
+        taken = slice(self._before, None if frames is None else self._before + frames)
         part = replace(found, guide=guide[taken], level=level[taken], pace=found.pace[taken])
         if len(part.guide):
             self._origin = part.guide[0] if self._origin is None else self._origin
@@ -301,11 +285,9 @@ def _has_desired(run: Run) -> NDArray[np.bool_]:
 
 
 def _energies(
-    run: Run, bands: tuple[tuple[float, float], ...], of_sample: NDArray[np.int64], count: int
+    run: Run, bands: Octaves, of_sample: NDArray[np.int64], count: int
 ) -> NDArray[np.float32]:
     """Energy of each bin, shape (bins, joints, 2, octaves)."""
-    from numpy import fft
-
     joints, settling = len(run.joint_names), round(SETTLING * run.rate)
     energy = np.zeros((count, 2 * joints, len(bands)), np.float32)
     before = np.zeros((2 * joints, settling))
@@ -362,12 +344,9 @@ def _guide(
     run: Run, of_sample: NDArray[np.int64], count: int, lost: NDArray[np.bool_]
 ) -> tuple[Array, str]:
     """Mean slow positions in bins, and what they are."""
-    named = ("position_desired", "velocity_desired", "position", "velocity")
-    signal = next(each for each in named if getattr(run, each) is not None)
-    values, names = getattr(run, signal), run.joint_names
-    if signal.endswith("desired"):
-        names = run.desired_joint_names
-    means = _means(values, of_sample, count)
+    signal = next(each for each in GUIDES if getattr(run, each) is not None)
+    names = run.desired_joint_names if signal.endswith("desired") else run.joint_names
+    means = _means(getattr(run, signal), of_sample, count)
     known = np.flatnonzero(~lost)
     if len(known) and lost.any():
         every = np.arange(count)
@@ -380,9 +359,7 @@ def _guide(
     for place, joint in enumerate(run.joint_names):
         if joint in names:
             guide[:, place] = means[:, names.index(joint)]
-    words = {"position_desired": "desired positions", "position": "measured positions"}
-    words |= {"velocity_desired": "desired velocities", "velocity": "measured velocities"}
-    return guide, words[signal]
+    return guide, GUIDES[signal]
 
 
 def _means(values: Real, of_sample: NDArray[np.int64], count: int) -> Array:

@@ -14,7 +14,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from datetime import date, datetime
+from datetime import date
 from functools import lru_cache
 from math import isfinite
 from pathlib import Path
@@ -37,7 +37,7 @@ from inspector.reference.judging import (
     share_of_motion,
 )
 from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encoded, levels, octaves
-from inspector.text import counted
+from inspector.text import counted, natural
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_toml, text_of, toml_shown
 from noisemodel import NoiseModelError, OutputError, Run, runfile
@@ -54,6 +54,23 @@ CALIBRATED = 3
 """Repetitions from which the margin beside other motions is taken."""
 REPETITION = re.compile(r"(?P<name>.+?)[-_./](?:run|rep|take|seed)?[-_.]?\d+")
 """Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
+KEYS = (
+    *("name", "robot", "required", "at_least", "renamed_from", "accepted", "by", "reason"),
+    *("duration_s", "margin_db", "scores_db", "elsewhere_db", "joints", "loudest_db", "levels"),
+    *("sha256", "repetition", "wanted", "waive"),
+)
+REPETITION_KEYS = ("run", "sha256", "rate_hz", "start_s", "duration_s", "guided_by", "joints")
+EXPECTED_KEYS = ("class", "time_s", "joints", "loudest_db", "required", "until", "reason")
+"""What a scenario of the store may hold, its repetitions, and what it wants and waives."""
+KINDS = {
+    str: "a text",
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    date: "a date such as 2027-01-31",
+}
+NEEDED = object()
+"""Default of a value that has to be there."""
 
 
 class StoreError(FileError):
@@ -116,13 +133,7 @@ class Reference:
         return next(own, None) or next(former, None)
 
 
-def find(run: Path) -> Path | None:
-    """The store that is nearest to a run: beside it, or beside a folder above it.
-
-    The search ends at the top of a repository.
-    """
-    folder = run if run.is_dir() else run.parent
-    return _nearest(folder.resolve())
+# --- runs by scenario
 
 
 @lru_cache(maxsize=4096)
@@ -137,6 +148,14 @@ def _nearest(folder: Path) -> Path | None:
         if (each / ".git").exists():
             break
     return None
+
+
+def find(run: Path) -> Path | None:
+    """The store that is nearest to a run: beside it, or beside a folder above it.
+
+    The search ends at the top of a repository.
+    """
+    return _nearest((run if run.is_dir() else run.parent).resolve())
 
 
 def scenario_of(run: Run, path: Path, root: Path | None = None) -> str:
@@ -187,16 +206,10 @@ def of_runs(runs: Sequence[Levels]) -> tuple[Scenario, ...]:
             name = Path(run.run).stem or name
         groups[name].append(replace(run, name=name))
     return tuple(
-        calibrated(Scenario(name, tuple(sorted(each, key=_natural)[-NEWEST:])))
+        calibrated(Scenario(name, tuple(sorted(each, key=lambda run: natural(run.run))[-NEWEST:])))
         for name, each in sorted(groups.items())
         if each
     )
-
-
-def _natural(run: Levels) -> list[tuple[int, str]]:
-    """Sorts files by their numbers: pick-9 before pick-10."""
-    parts = re.split(r"(\d+)", run.run)
-    return [(int(each), "") if each.isdigit() else (0, each) for each in parts]
 
 
 def calibrated(scenario: Scenario) -> Scenario:
@@ -208,6 +221,9 @@ def calibrated(scenario: Scenario) -> Scenario:
         scores=tuple(round(score, 2) for score in scores),
         elsewhere=tuple(round(score, 2) for score in elsewhere),
     )
+
+
+# --- accepting
 
 
 def accept_into(
@@ -231,11 +247,11 @@ def accept_into(
     Returns:
         The store as it is now, and by the names of scenarios what changed.
     """
+    home = folder.absolute().parent
     with _alone_in(folder):
         there = os.path.lexists(folder / NAME)
-        reference = Reference.load(folder) if there else Reference(folder, stored=True)
-        kept = {each.name: each for each in reference.scenarios}
-        found = of_runs([replace(each, run=_from_store(each.run, folder)) for each in runs])
+        kept = {each.name: each for each in (Reference.load(folder).scenarios if there else ())}
+        found = of_runs([replace(each, run=_within(each.run, home)) for each in runs])
         names, changes = {each.name for each in found}, []
         for new in found:
             facts: dict[str, Any] = {"accepted": date.today(), "by": by, "reason": reason}
@@ -243,7 +259,7 @@ def accept_into(
             old = kept.get(new.name)
             if old is None and renames:
                 others = [each for each in kept.values() if each.name not in names]
-                old = _former(new, others, folder.absolute().parent)
+                old = next((each for each in others if _renamed(each, new, home)), None)
                 if old is not None:
                     del kept[old.name]
                     facts["renamed_from"] = (*old.renamed_from, old.name)
@@ -275,13 +291,16 @@ def _alone_in(folder: Path) -> Iterator[None]:
         os.close(held)
 
 
-def _former(new: Scenario, others: Sequence[Scenario], home: Path) -> Scenario | None:
-    """The scenario that a new one is under another name: its motion is the same, its logs gone."""
-    for each in others:
-        gone = not any((home / one.run).exists() for one in each.repetitions)
-        if gone and same_motion(new.repetitions[-1], each.repetitions[-1]):
-            return each
-    return None
+def _within(run: str, home: Path) -> str:
+    """Path of a run relative to the folder that the store is in, so that it moves with it."""
+    path = Path(run).absolute()
+    return path.relative_to(home).as_posix() if path.is_relative_to(home) else run
+
+
+def _renamed(old: Scenario, new: Scenario, home: Path) -> bool:
+    """Whether a scenario has got another name: its logs are gone, its motion is the new one's."""
+    gone = not any((home / each.run).exists() for each in old.repetitions)
+    return gone and same_motion(new.repetitions[-1], old.repetitions[-1])
 
 
 def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Scenario, str]:
@@ -297,7 +316,7 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
         not each.exceedances and each.scenarios and each.quieter <= _margin(old) for each in over
     )
     repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
-    own = {**facts, "wanted": old.wanted if same else facts["wanted"], "waived": old.waived}
+    own = {**facts, "wanted": old.wanted if same else facts["wanted"]}
     changed = calibrated(replace(old, name=new.name, repetitions=repetitions, **own))
     worst = max((each.worst for each in over if isfinite(each.worst)), default=float("nan"))
     words = f"{counted(len(fresh), 'repetition')} {'added' if same else 'replace the accepted'}"
@@ -305,6 +324,10 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
     if not any(set(each.joints) & set(old.repetitions[-1].joints) for each in fresh):
         told = ", of a robot with other joints"
     return changed, f"{words}{told}, {len(repetitions)} kept"
+
+
+def _margin(scenario: Scenario) -> float:
+    return margin_of(scenario.scores, len(scenario.repetitions)).db
 
 
 def wanted_in(
@@ -316,24 +339,22 @@ def wanted_in(
         for event in events.get(run.run, ()):
             inside = (run.time >= event.start - TOLERANCE) & (run.time <= event.stop + TOLERANCE)
             level = np.nan_to_num(run.level[inside], nan=LEAST_DB)
-            joint, top = "", LEAST_DB
-            if level.size:
-                joint = run.joints[int(level.max(axis=(0, 2, 3)).argmax())]
-                top = float(level.max())
+            loud = [run.joints[int(level.max(axis=(0, 2, 3)).argmax())]] if level.size else []
+            top = float(level.max(initial=LEAST_DB))
             start, stop = event.start - run.start - TOLERANCE, event.stop - run.start + TOLERANCE
             known = spans[run.name, event.label]
             same = next((each for each in known if start < each[1] and stop > each[0]), None)
             if same is None:
-                known.append([start, stop, {joint}, top])
+                known.append([start, stop, {*loud}, top])
             else:
                 same[:2] = min(start, same[0]), max(stop, same[1])
-                same[2].add(joint)
+                same[2] |= {*loud}
                 same[3] = max(top, same[3])
     found: dict[str, list[Expected]] = defaultdict(list)
     for (name, label), known in spans.items():
         for start, stop, joints, top in known:
             span = round(start, 2), round(stop, 2)
-            found[name].append(Expected(label, *span, tuple(sorted(joints - {""})), round(top, 1)))
+            found[name].append(Expected(label, *span, tuple(sorted(joints)), round(top, 1)))
     return found
 
 
@@ -352,8 +373,7 @@ def who() -> str:
         return ""
 
 
-def _margin(scenario: Scenario) -> float:
-    return margin_of(scenario.scores, len(scenario.repetitions)).db
+# --- writing
 
 
 def save(reference: Reference, folder: Path) -> None:
@@ -366,8 +386,8 @@ def save(reference: Reference, folder: Path) -> None:
     names: set[str] = set()
     for scenario in reference.scenarios:
         name = _file_name(scenario.name, names)
-        digest = _write_levels(folder / name, scenario)
-        lines += ["", *_scenario_lines(scenario, name, digest)]
+        sha256 = _write_levels(folder / name, scenario)
+        lines += ["", *_lines(scenario, name, sha256)]
     with replacing(folder / NAME, overwrite=True) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
     for path in folder.glob("*.npz"):  # of scenarios that were renamed
@@ -379,16 +399,9 @@ def _holds_levels(path: Path) -> bool:
     """Whether a file is one of `_write_levels`: runs may lie in the folder, too."""
     try:
         with zipfile.ZipFile(path) as archive:
-            arrays = archive.namelist()
+            return {"level_0.npy", "guide_0.npy"} <= set(archive.namelist())
     except (OSError, zipfile.BadZipFile):
         return False
-    return "level_0.npy" in arrays and "guide_0.npy" in arrays
-
-
-def _from_store(run: str, folder: Path) -> str:
-    """Path of a run relative to the folder that the store is in, so that it moves with it."""
-    home, path = folder.absolute().parent, Path(run).absolute()
-    return path.relative_to(home).as_posix() if path.is_relative_to(home) else run
 
 
 def _file_name(name: str, taken: set[str]) -> str:
@@ -413,13 +426,12 @@ def _write_levels(path: Path, scenario: Scenario) -> str:
         return hashlib.sha256(temporary.read_bytes()).hexdigest()
 
 
-def _scenario_lines(scenario: Scenario, file: str, digest: str) -> Iterator[str]:
+def _lines(scenario: Scenario, file: str, sha256: str) -> list[str]:
+    """A scenario as TOML."""
     newest = scenario.repetitions[-1]
-    low, high = scenario.duration
     loud = newest.level.reshape(len(newest.level), len(newest.joints), -1)
-    top = np.where(np.isnan(loud), -np.inf, loud).max(axis=(0, 2), initial=-np.inf)
-    yield "[[scenario]]"
-    facts: dict[str, Any] = {
+    top = np.where(np.isnan(loud), -np.inf, loud).max(axis=(0, 2), initial=LEAST_DB)
+    facts = {
         "name": scenario.name,
         "robot": newest.robot,
         "required": scenario.required,
@@ -428,18 +440,17 @@ def _scenario_lines(scenario: Scenario, file: str, digest: str) -> Iterator[str]
         "accepted": scenario.accepted or date.today(),
         "by": scenario.by,
         "reason": scenario.reason,
-        "duration_s": [round(low, 3), round(high, 3)],
+        "duration_s": [round(each, 3) for each in scenario.duration],
         "margin_db": round(_margin(scenario), 1),
         "scores_db": list(scenario.scores),
         "elsewhere_db": list(scenario.elsewhere),
         "joints": list(newest.joints),
-        "loudest_db": [round(float(max(each, -100.0)), 1) for each in top],
+        "loudest_db": [round(each, 1) for each in top.tolist()],
         "levels": file,
-        "sha256": digest,
+        "sha256": sha256,
     }
-    yield from (f"{key} = {_toml(value)}" for key, value in facts.items())
+    lines = _table("scenario", facts)
     for each in scenario.repetitions:
-        yield "[[scenario.repetition]]"
         facts = {
             "run": each.run,
             "sha256": each.sha256,
@@ -447,22 +458,29 @@ def _scenario_lines(scenario: Scenario, file: str, digest: str) -> Iterator[str]
             "start_s": each.start,
             "duration_s": each.duration,
             "guided_by": each.guided_by,
+            "joints": list(each.joints) if each.joints != newest.joints else None,
         }
-        if each.joints != newest.joints:
-            facts["joints"] = list(each.joints)
-        yield from (f"{key} = {_toml(value)}" for key, value in facts.items())
-    for table, entries in (("wanted", scenario.wanted), ("waive", scenario.waived)):
+        lines += _table("scenario.repetition", facts)
+    for name, entries in (("wanted", scenario.wanted), ("waive", scenario.waived)):
         for entry in entries:
-            yield f"[[scenario.{table}]]"
-            facts = {"class": entry.label} if entry.label else {}
-            if isfinite(entry.start) or isfinite(entry.stop):
-                facts["time_s"] = [entry.start, entry.stop]
-            facts |= {"joints": list(entry.joints)} if entry.joints else {}
-            facts |= {"loudest_db": entry.loudest} if entry.loudest is not None else {}
-            facts |= {"required": True} if entry.required else {}
-            facts |= {"until": entry.until} if entry.until else {}
-            facts |= {"reason": entry.reason} if entry.reason else {}
-            yield from (f"{key} = {_toml(value)}" for key, value in facts.items())
+            bounded = isfinite(entry.start) or isfinite(entry.stop)
+            facts = {
+                "class": entry.label or None,
+                "time_s": [entry.start, entry.stop] if bounded else None,
+                "joints": list(entry.joints) or None,
+                "loudest_db": entry.loudest,
+                "required": entry.required or None,
+                "until": entry.until,
+                "reason": entry.reason or None,
+            }
+            lines += _table(f"scenario.{name}", facts)
+    return lines
+
+
+def _table(name: str, facts: Mapping[str, object]) -> list[str]:
+    """A table of an array as lines of TOML, without what is None."""
+    known = {key: value for key, value in facts.items() if value is not None}
+    return [f"[[{name}]]", *(f"{key} = {_toml(value)}" for key, value in known.items())]
 
 
 def line_of(scenario: str, folder: Path) -> int:
@@ -483,6 +501,9 @@ def _toml(value: object) -> str:
     return text.replace("\x7f", "\\u007f")
 
 
+# --- reading
+
+
 def _read(folder: Path) -> Reference:
     """Read a store."""
     path = folder / NAME
@@ -501,176 +522,150 @@ def _read(folder: Path) -> Reference:
     rows = content.pop("scenario", [])
     if content or not isinstance(rows, list) or len(rows) > MOST_SCENARIOS:
         raise StoreError(path, "expected a format and entries [[scenario]] alone")
-    scenarios = [
-        _Row(path, f"[[scenario]] {place}", row).scenario() for place, row in enumerate(rows, 1)
-    ]
-    names = [each.name for each in scenarios]
-    if len(set(names)) < len(names):
+    scenarios = tuple(
+        _scenario(_Row(path, f"[[scenario]] {place}", row, KEYS))
+        for place, row in enumerate(rows, 1)
+    )
+    if len({each.name for each in scenarios}) < len(scenarios):
         raise StoreError(path, "two scenarios have one name")
-    return Reference(folder, tuple(scenarios), stored=True)
+    return Reference(folder, scenarios, stored=True)
 
 
-EXPECTED_KEYS = ("class", "time_s", "joints", "loudest_db", "required", "until", "reason")
-KEYS = (
-    *("name", "robot", "required", "at_least", "renamed_from", "accepted", "by", "reason"),
-    *("duration_s", "margin_db", "scores_db", "elsewhere_db", "joints", "loudest_db", "levels"),
-    *("sha256", "repetition", "wanted", "waive"),
-)
-REPETITION_KEYS = ("run", "sha256", "rate_hz", "start_s", "duration_s", "guided_by", "joints")
-
-
-@dataclass(frozen=True)
 class _Row:
     """A table of the store; errors name it."""
 
-    path: Path
-    where: str
-    content: Any
+    def __init__(self, path: Path, where: str, content: Any, keys: Sequence[str]) -> None:
+        self.path, self.where, self.content = path, where, content
+        if not isinstance(content, dict):
+            raise self.error("expected a table")
+        for key in content:
+            if key not in keys:
+                raise self.error(f"no {key!r}; there are {', '.join(keys)}")
 
     def error(self, problem: str) -> StoreError:
         return StoreError(self.path, f"{self.where}: {problem}")
 
-    def check(self, known: Sequence[str]) -> None:
-        if not isinstance(self.content, dict):
-            raise self.error("expected a table")
-        for key in self.content:
-            if key not in known:
-                raise self.error(f"no {key!r}; there are {', '.join(known)}")
-
-    def get(self, key: str, kind: type, default: Any = None) -> Any:
-        value = self.content.get(key, default)
+    def get(self, key: str, kind: type, default: Any = NEEDED) -> Any:
+        if key not in self.content and default is not NEEDED:
+            return default
+        value = self.content.get(key)
         if kind is float and type(value) is int:
             value = float(value)
-        endless = isinstance(value, float) and not isfinite(value)
-        if type(value) is not kind or endless:
-            words = {str: "a text", float: "a number", int: "a whole number", bool: "true or false"}
-            told = "is missing" if key not in self.content else f"= {toml_shown(value)}"
-            raise self.error(f"{key} {told}, expected {words.get(kind, kind.__name__)}")
+        if type(value) is not kind or (isinstance(value, float) and not isfinite(value)):
+            told = f"= {toml_shown(value)}" if key in self.content else "is missing"
+            raise self.error(f"{key} {told}, expected {KINDS[kind]}")
         return value
 
-    def listed(self, key: str, kind: type, *, needed: bool = False) -> tuple[Any, ...]:
-        values = self.content.get(key, None if needed else [])
+    def listed(self, key: str, kind: type, default: Any = ()) -> tuple[Any, ...]:
+        values = self.content.get(key, default)
         numbers = (int, float) if kind is float else (kind,)
+        if values is default:
+            return ()
         if not isinstance(values, list) or not all(type(each) in numbers for each in values):
             raise self.error(f"{key} = {toml_shown(values)}, expected a list")
         return tuple(map(kind, values))
 
-    def day(self, key: str) -> date | None:
-        given = self.content.get(key)
-        if given is None or (isinstance(given, date) and not isinstance(given, datetime)):
-            return given
-        raise self.error(f"{key} = {toml_shown(given)}, expected a date such as 2027-01-31")
-
-    def tables(self, key: str) -> Iterator["_Row"]:
+    def rows(self, key: str, keys: Sequence[str]) -> list["_Row"]:
         rows = self.content.get(key, [])
         if not isinstance(rows, list):
             raise self.error(f"{key}: expected entries that begin with [[scenario.{key}]]")
-        for place, row in enumerate(rows, 1):
-            yield _Row(self.path, f"{self.where}, [[scenario.{key}]] {place}", row)
+        where = f"{self.where}, [[scenario.{key}]]"
+        return [_Row(self.path, f"{where} {n}", row, keys) for n, row in enumerate(rows, 1)]
 
-    def scenario(self) -> Scenario:
-        self.check(KEYS)
-        joints = self.listed("joints", str, needed=True)
-        repetitions = self.levels(joints)
-        return Scenario(
-            self.get("name", str),
-            repetitions,
-            self.listed("scores_db", float),
-            self.listed("elsewhere_db", float),
-            self.get("required", bool, True),
-            self.get("at_least", int, 1),
-            self.listed("renamed_from", str),
-            tuple(row.expected(waiver=False) for row in self.tables("wanted")),
-            tuple(row.expected(waiver=True) for row in self.tables("waive")),
-            self.day("accepted"),
-            self.get("by", str, ""),
-            self.get("reason", str, ""),
-        )
 
-    def expected(self, *, waiver: bool) -> Expected:
-        self.check(EXPECTED_KEYS)
-        until = self.day("until")
-        if waiver and (until is None or not self.content.get("reason")):
-            raise self.error("needs 'until' and 'reason'")
-        span = self.content.get("time_s", [float("-inf"), float("inf")])
-        numbers = isinstance(span, list) and all(type(each) in (int, float) for each in span)
-        if not numbers or len(span) != 2 or not span[0] < span[1]:
-            raise self.error(f"time_s = {toml_shown(span)}, expected [from, to] in seconds")
-        loudest = self.get("loudest_db", float) if "loudest_db" in self.content else None
-        return Expected(
-            self.get("class", str, ""),
-            float(span[0]),
-            float(span[1]),
-            self.listed("joints", str),
-            loudest,
-            self.get("required", bool, False),
-            self.get("reason", str, ""),
-            until,
-        )
+def _scenario(row: _Row) -> Scenario:
+    repetitions = _levels(row)
+    return Scenario(
+        row.get("name", str),
+        repetitions,
+        row.listed("scores_db", float),
+        row.listed("elsewhere_db", float),
+        row.get("required", bool, True),
+        row.get("at_least", int, 1),
+        row.listed("renamed_from", str),
+        tuple(map(_expected, row.rows("wanted", EXPECTED_KEYS))),
+        tuple(map(_waiver, row.rows("waive", EXPECTED_KEYS))),
+        row.get("accepted", date, None),
+        row.get("by", str, ""),
+        row.get("reason", str, ""),
+    )
 
-    def levels(self, joints: tuple[str, ...]) -> tuple[Levels, ...]:
-        """Levels of the repetitions, from the .npz, whose hash is checked."""
-        file = self.get("levels", str)
-        if not re.fullmatch(r"[\w.~-]+\.npz", file, re.ASCII):
-            raise self.error(f"levels = {toml_shown(file)}, expected the name of an .npz beside it")
-        path = self.path.parent / file
-        rows = list(self.tables("repetition"))
-        if not 1 <= len(rows) <= NEWEST:
-            raise self.error(f"{len(rows)} repetitions, expected 1 to {NEWEST}")
-        try:
-            if not path.is_file():
-                raise StoreError(path, "no such file, or no regular one; accept the runs again")
-            with path.open("rb") as stream:
-                digest = hashlib.file_digest(stream, "sha256").hexdigest()
-            if digest != self.get("sha256", str):
-                raise StoreError(
-                    path, f"was changed, or does not belong to {NAME}; accept the runs again"
-                )
-            arrays = runfile.read_npz(path)
-        except (OSError, runfile.ArchiveError) as error:
-            raise StoreError(path, f"cannot be read ({error})") from error
-        return tuple(
-            row.repetition(path, arrays, number, joints, self) for number, row in enumerate(rows)
-        )
 
-    def repetition(
-        self,
-        path: Path,
-        arrays: Mapping[str, Any],
-        number: int,
-        joints: tuple[str, ...],
-        of: "_Row",
-    ) -> Levels:
-        self.check(REPETITION_KEYS)
-        joints = self.listed("joints", str) or joints
-        rate = self.get("rate_hz", float)
+def _waiver(row: _Row) -> Expected:
+    if row.get("until", date, None) is None or not row.content.get("reason"):
+        raise row.error("needs 'until' and 'reason'")
+    return _expected(row)
+
+
+def _expected(row: _Row) -> Expected:
+    until = row.get("until", date, None)
+    span = row.content.get("time_s", [float("-inf"), float("inf")])
+    numbers = isinstance(span, list) and all(type(each) in (int, float) for each in span)
+    if not numbers or len(span) != 2 or not span[0] < span[1]:
+        raise row.error(f"time_s = {toml_shown(span)}, expected [from, to] in seconds")
+    return Expected(
+        row.get("class", str, ""),
+        float(span[0]),
+        float(span[1]),
+        row.listed("joints", str),
+        row.get("loudest_db", float, None),
+        row.get("required", bool, False),
+        row.get("reason", str, ""),
+        until,
+    )
+
+
+def _levels(row: _Row) -> tuple[Levels, ...]:
+    """Levels of the repetitions, from the .npz, whose hash is checked."""
+    row.get("joints", list)
+    file, joints = row.get("levels", str), row.listed("joints", str)
+    if not re.fullmatch(r"[\w.~-]+\.npz", file, re.ASCII):
+        raise row.error(f"levels = {toml_shown(file)}, expected the name of an .npz beside it")
+    path = row.path.parent / file
+    rows = row.rows("repetition", REPETITION_KEYS)
+    if not 1 <= len(rows) <= NEWEST:
+        raise row.error(f"{len(rows)} repetitions, expected 1 to {NEWEST}")
+    try:
+        if not path.is_file():
+            raise StoreError(path, "no such file, or no regular one; accept the runs again")
+        with path.open("rb") as stream:
+            sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+        if sha256 != row.get("sha256", str):
+            raise StoreError(
+                path, f"was changed, or does not belong to {NAME}; accept the runs again"
+            )
+        arrays = runfile.read_npz(path)
+    except (OSError, runfile.ArchiveError) as error:
+        raise StoreError(path, f"cannot be read ({error})") from error
+    found = []
+    for number, each in enumerate(rows):
+        own = each.listed("joints", str) or joints
+        rate = each.get("rate_hz", float)
         if not 0 < rate < 1e7:
-            raise self.error(f"rate_hz = {rate:g}, expected a rate")
+            raise each.error(f"rate_hz = {rate:g}, expected a rate")
         bands = octaves(rate)
-        nothing = np.empty(0)
-        named = ("level", "guide", "pace")
-        found = [np.asarray(arrays.get(f"{name}_{number}", nothing)) for name in named]
-        frames = found[2].size
-        shapes = ((frames, len(joints), len(SIGNALS), len(bands)), (frames, len(joints)), (frames,))
-        fit = all(
-            each.shape == shape and each.dtype.kind == kind
-            for each, shape, kind in zip(found, shapes, "uff", strict=True)
-        )
-        finite = fit and all(np.isfinite(each).all() for each in found[1:])
-        if not finite or len(set(joints)) < len(joints):
+        names = (f"{name}_{number}" for name in ("level", "guide", "pace"))
+        level, guide, pace = (np.asarray(arrays.get(name, np.empty(0))) for name in names)
+        shape = (pace.size, len(own), len(SIGNALS), len(bands))
+        fit = (level.shape, guide.shape, pace.shape) == (shape, shape[:2], shape[:1])
+        fit = fit and level.dtype.kind + guide.dtype.kind + pace.dtype.kind == "uff"
+        finite = fit and bool(np.isfinite(guide).all() and np.isfinite(pace).all())
+        if not finite or len(set(own)) < len(own):
             raise StoreError(path, f"its arrays do not belong to {NAME}; accept the runs again")
-        return Levels(
-            of.get("name", str),
-            self.get("run", str, ""),
-            self.get("sha256", str, ""),
-            of.get("robot", str, ""),
-            joints,
+        measured = Levels(
+            row.get("name", str),
+            each.get("run", str, ""),
+            each.get("sha256", str, ""),
+            row.get("robot", str, ""),
+            own,
             rate,
-            self.get("start_s", float, 0.0),
-            self.get("duration_s", float),
+            each.get("start_s", float, 0.0),
+            each.get("duration_s", float),
             bands,
-            decoded(found[0].astype(np.uint8)),
-            found[1].astype(np.float32),
-            self.get("guided_by", str, ""),
-            found[2].astype(np.float32),
+            decoded(level.astype(np.uint8)),
+            guide.astype(np.float32),
+            each.get("guided_by", str, ""),
+            pace.astype(np.float32),
         )
+        found.append(measured)
+    return tuple(found)

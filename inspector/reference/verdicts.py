@@ -27,7 +27,7 @@ from inspector.reference.judging import (
 )
 from inspector.reference.levels import HOP, Levels, levels
 from inspector.reference.store import NAME, Reference, find, line_of, scenario_of
-from inspector.verdict import END, LOG, Beside, Evidence, Missing, Ruled, Ruling, Verdict
+from inspector.verdict import END, LOG, UNREAD, Beside, Evidence, Missing, Ruled, Ruling, Verdict
 from noiseclassifier import UNKNOWN, Event, Labels
 
 LOUDER = "louder"
@@ -39,28 +39,19 @@ while these make three tenths of their usual speed."""
 
 @dataclass(frozen=True)
 class References:
-    """The reference of each run, to be applied where a run is classified.
-
-    Attributes:
-        loaded: References by their path.
-        of: Path of the reference of each run that has one.
-        measured: Levels of the runs that are measured already.
-    """
+    """The reference of each run, to be applied where a run is classified."""
 
     loaded: Mapping[Path, Reference] = field(default_factory=dict)
-    of: Mapping[Path, Path] = field(default_factory=dict)
-    measured: Mapping[Path, Levels] = field(default_factory=dict)
+    of: Mapping[Path, Path] = field(default_factory=dict)  # of runs that have one
+    measured: Mapping[Path, Levels] = field(default_factory=dict)  # of runs, as far as they are
 
     @classmethod
     def found(
         cls, runs: Iterable[Path], given: Path | None = None, reading: Reading | None = None
     ) -> "References":
         """Load the given reference, or the nearest store of each run."""
-        of = {run: given or find(run) for run in runs}
-        known = {run: path for run, path in of.items() if path is not None}
-        return cls(
-            {path: Reference.load(path, reading) for path in dict.fromkeys(known.values())}, known
-        )
+        of = {run: path for run in runs if (path := given or find(run)) is not None}
+        return cls({path: Reference.load(path, reading) for path in dict.fromkeys(of.values())}, of)
 
     def __call__(self, analysis: Analysis, verdict: Verdict) -> tuple[Verdict, Comparison | None]:
         """Add the evidence of the reference to the verdict on a run, and compare them."""
@@ -79,13 +70,12 @@ class References:
 
     def __str__(self) -> str:
         """What a batch that resumes must find unchanged: the levels of each reference."""
-        every = [
-            each
-            for one in self.loaded.values()
-            for scenario in one.scenarios
+        text = " ".join(
+            f"{each.name} {each.sha256}"
+            for reference in self.loaded.values()
+            for scenario in reference.scenarios
             for each in scenario.repetitions
-        ]
-        text = " ".join(f"{each.name} {each.sha256}" for each in every)
+        )
         return hashlib.sha256(text.encode()).hexdigest()
 
     def remarks(self, today: date) -> list[str]:
@@ -106,34 +96,28 @@ class References:
 
     def absent(self, verdicts: Sequence[Verdict], folders: Iterable[Path]) -> list[Verdict]:
         """Verdicts on stores whose required scenarios have too few logs."""
-        found = []
-        given = [folder.resolve() for folder in folders]
+        found, given = [], [folder.resolve() for folder in folders]
         for path, reference in self.loaded.items():
             top = path.resolve().parent
-            asked = [each for each in given if reference.stored]
             own = [each for each in verdicts if self.of.get(each.path) == path]
             names = Counter(
                 name
                 for each in own
                 for name in (each.beside.scenarios if each.beside else (each.scenario,))
             )
-            missing = tuple(
-                Missing(
-                    f"{LOG}{each.name}",
-                    reason=f"{names[each.name]} of {each.at_least} logs"
-                    if names[each.name]
-                    else f"no log; it had {len(each.repetitions)}",
-                    line=line_of(each.name, path),
-                )
-                for each in reference.scenarios
-                if each.required
-                and names[each.name] < each.at_least
-                and any(_asked(each, folder, top) for folder in asked)
-            )
+            missing = []
+            for each in reference.scenarios if reference.stored else ():
+                number = names[each.name]
+                lacks = each.required and number < each.at_least
+                if lacks and any(_asked(each, folder, top) for folder in given):
+                    reason = f"no log; it had {len(each.repetitions)}"
+                    reason = f"{number} of {each.at_least} logs" if number else reason
+                    line = line_of(each.name, path)
+                    missing.append(Missing(f"{LOG}{each.name}", reason=reason, line=line))
             if missing:
-                store = path / NAME
+                store, status = path / NAME, Status.FINDINGS
                 found.append(
-                    Verdict(store, Status.FINDINGS, missing=missing, expectations=str(store))
+                    Verdict(store, status, missing=tuple(missing), expectations=str(store))
                 )
         return found
 
@@ -160,17 +144,11 @@ def _asked(scenario: Scenario, folder: Path, top: Path) -> bool:
 
 @dataclass(frozen=True)
 class Gate:
-    """Findings that fail a run.
+    """Findings that fail a run."""
 
-    Attributes:
-        classes: Those of these classes, of all unless given.
-        min_score: Those of at least this score, if given; some models have negative ones.
-        min_duration: Those that last at least so long, in [s].
-    """
-
-    classes: tuple[str, ...] = ()
-    min_score: float | None = None
-    min_duration: float = 0.0
+    classes: tuple[str, ...] = ()  # all unless given
+    min_score: float | None = None  # some models have negative ones
+    min_duration: float = 0.0  # [s]
 
     def reason(self, event: Event) -> str:
         """Say why a finding does not fail a run; empty if it does."""
@@ -201,32 +179,27 @@ def beside(
     name what no finding does.
     """
     events, evidence = _events(verdict.events, labels, comparison)
-    localisations = {
-        event: found for event, found in verdict.localisations.items() if event in evidence
-    }
-    shares = {str(kind): round(comparison.share(kind), 4) for kind in Kind}
+    margins = comparison.margins
+    least = margins[Kind.REPETITIONS].db if Kind.REPETITIONS in margins else float("inf")
+    quieter = comparison.quieter if comparison.quieter > least else 0.0
+    peaks = zip(comparison.joints, comparison.peaks.tolist(), strict=True)
     known = Beside(
         path=str(reference.path),
         scenarios=comparison.scenarios,
         repetitions=comparison.repetitions,
-        shares=shares,
-        margins={str(kind): round(each.db, 2) for kind, each in comparison.margins.items()},
+        shares={str(kind): round(comparison.share(kind), 4) for kind in Kind},
+        margins={str(kind): round(each.db, 2) for kind, each in margins.items()},
         worst=_known(comparison.worst),
-        joints={
-            joint: round(float(peak), 2)
-            for joint, peak in zip(comparison.joints, comparison.peaks, strict=True)
-            if np.isfinite(peak)
-        },
-        quieter=round(comparison.quieter, 2) if comparison.quieter > _least(comparison) else 0.0,
+        joints={joint: round(peak, 2) for joint, peak in peaks if np.isfinite(peak)},
+        quieter=round(quieter, 2),
         speed=_known(comparison.slope),
         failures=tuple(_failures(comparison, reference)),
-        words=_words(comparison),
-        bounds={str(kind): each.bound for kind, each in comparison.margins.items()},
+        words=_words(comparison, quieter),
+        bounds={str(kind): each.bound for kind, each in margins.items()},
     )
-    covered = shares[Kind.GENERAL] < 1.0
-    failing = any(not each.excused for each in evidence.values())
+    covered = known.shares[Kind.GENERAL] < 1.0
     status = verdict.status
-    if failing:
+    if any(not each.excused for each in evidence.values()):
         status = Status.FINDINGS
     elif status is Status.FINDINGS or (status is Status.CANNOT_TELL and covered):
         status = Status.OK
@@ -236,9 +209,9 @@ def beside(
         events=events,
         evidence=evidence,
         beside=known,
-        localisations=localisations,
+        localisations={of: each for of, each in verdict.localisations.items() if of in evidence},
         scenario=verdict.scenario or comparison.run.name,
-        orders={event: found for event, found in verdict.orders.items() if event in evidence},
+        orders={of: each for of, each in verdict.orders.items() if of in evidence},
     )
 
 
@@ -253,15 +226,10 @@ def _known(value: float) -> float | None:
     return round(value, 3) if np.isfinite(value) else None
 
 
-def _least(comparison: Comparison) -> float:
-    known = comparison.margins.get(Kind.REPETITIONS)
-    return known.db if known else float("inf")
-
-
-def _words(comparison: Comparison) -> str:
+def _words(comparison: Comparison, quieter: float) -> str:
     parts = [str(comparison)]
-    if comparison.quieter > _least(comparison):
-        parts.append(f"{comparison.quieter:.1f} dB quieter than each repetition")
+    if quieter:
+        parts.append(f"{quieter:.1f} dB quieter than each repetition")
     slope = comparison.slope
     if np.isfinite(slope) and abs(slope - 1) > 0.02:
         parts.append(f"aligned at {slope:.2f} of its speed")
@@ -287,28 +255,16 @@ def _events(
         near = [event.start for event in absorbed if abs(event.start - start) <= 4 * HOP]
         label, score, novel = _named(labels, each, absorbed)
         event = Event(label, min(near, default=start), stop, score, novel)
-        evidence = Evidence(
-            each.kind.value,
-            round(each.db, 2),
-            round(each.peak, 4),
-            each.joint,
-            each.signal,
-            each.octave,
-            round(each.level, 2),
-        )
-        found.append((event, evidence))
+        found.append((event, each.evidence))
+    references = "other motions of this robot"
+    if comparison.scenarios:
+        references = f"{comparison.repetitions} of {' and '.join(comparison.scenarios)}"
     for event in left:
         covered = comparison.covered(event.start, event.stop)
-        excused = f"as loud as {_references(comparison)}" if covered else ""
+        excused = f"as loud as {references}" if covered else ""
         found.append((event, Evidence(Kind.GENERAL.value, excused=excused)))
     found.sort(key=lambda pair: (pair[0].start, pair[0].stop))
     return tuple(event for event, _ in found), dict(found)
-
-
-def _references(comparison: Comparison) -> str:
-    if not comparison.scenarios:
-        return "other motions of this robot"
-    return f"{comparison.repetitions} of {' and '.join(comparison.scenarios)}"
 
 
 def _named(
@@ -375,14 +331,12 @@ def judge(
     gate: Gate | None = None,
     today: date,
 ) -> Verdict:
-    """Apply what a reference wants and waives, and a gate, to what was found in a run.
+    """Apply what a reference wants and waives on a day, and a gate, to what was found in a run.
 
     Args:
-        reference: Its reference, if there is one.
         gate: The findings that fail a run, all unless given; missing ones always do.
-        today: The day on which waivers are still valid or not.
     """
-    if verdict.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
+    if verdict.status in UNREAD:
         return verdict
     rulings = {
         event: Ruled(Ruling.AS_REFERENCE, each.excused)
@@ -392,11 +346,9 @@ def judge(
     missing: list[Missing] = []
     if reference is not None and verdict.beside is not None:
         missing += [Missing(what, reason=why) for what, why in verdict.beside.failures]
-        for name in verdict.beside.scenarios:
-            scenario = reference.named(name)
-            if scenario is not None:
-                rulings |= _expected(verdict, scenario, rulings, today)
-                missing += _lacking(verdict, scenario)
+        for scenario in filter(None, map(reference.named, verdict.beside.scenarios)):
+            rulings = _expected(verdict, scenario, today) | rulings
+            missing += _lacking(verdict, scenario)
     for event in verdict.events:
         known = rulings.get(event, Ruled())
         reason = gate.reason(event) if gate and known.ruling.fails else ""
@@ -416,16 +368,16 @@ def judge(
     return judged
 
 
-def _expected(
-    verdict: Verdict, scenario: Scenario, rulings: Mapping[Event, Ruled], today: date
-) -> dict[Event, Ruled]:
+def _spans(verdict: Verdict, scenario: Scenario) -> dict[Event, tuple[str, float, float]]:
+    """Class, onset and end of each finding, as if the run began when the scenario does."""
+    begin = verdict.begin - scenario.repetitions[-1].start
+    return {each: (each.label, each.start - begin, each.stop - begin) for each in verdict.events}
+
+
+def _expected(verdict: Verdict, scenario: Scenario, today: date) -> dict[Event, Ruled]:
     """Rulings by what a scenario wants and waives."""
     found: dict[Event, Ruled] = {}
-    begin = verdict.begin - scenario.repetitions[-1].start
-    for event in verdict.events:
-        if event in rulings:
-            continue
-        span = event.label, event.start - begin, event.stop - begin
+    for event, span in _spans(verdict, scenario).items():
         evidence = verdict.evidence.get(event, Evidence(Kind.GENERAL.value))
         for each in scenario.wanted:
             if each.covers(*span) and (not each.joints or evidence.joint in each.joints):
@@ -436,23 +388,17 @@ def _expected(
                     found[event] = Ruled(reason=why)
         for each in scenario.waived:
             if each.covers(*span) and each.until is not None:
+                expired = Ruled(Ruling.EXPIRED, f"{each.until}, {each.reason}")
                 valid = today <= each.until
-                ruling = Ruling.WAIVED if valid else Ruling.EXPIRED
-                found[event] = Ruled(
-                    ruling, each.reason if valid else f"{each.until}, {each.reason}"
-                )
+                found[event] = Ruled(Ruling.WAIVED, each.reason) if valid else expired
     return found
 
 
 def _lacking(verdict: Verdict, scenario: Scenario) -> list[Missing]:
     """Findings that a scenario requires and the run does not have."""
-    begin = verdict.begin - scenario.repetitions[-1].start
+    spans = _spans(verdict, scenario).values()
     return [
         Missing(each.label or "a finding", each.start, each.stop, each.reason)
         for each in scenario.wanted
-        if each.required
-        and not any(
-            each.covers(event.label, event.start - begin, event.stop - begin)
-            for event in verdict.events
-        )
+        if each.required and not any(each.covers(*span) for span in spans)
     ]

@@ -4,7 +4,6 @@ An analysis has findings and annotations, which recordings and pages show; a ver
 of which some may not count. Both are localised by the same words.
 """
 
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,14 +13,13 @@ from inspector.analysis import Analysis
 from inspector.errors import Status
 from inspector.localisation.localise import fault_links, has_stages
 from inspector.localisation.stage import Localisation
+from inspector.reference.store import REPETITION
 from inspector.text import counted
-from inspector.verdict import Verdict
+from inspector.verdict import UNREAD, Verdict
 from noiseclassifier import UNKNOWN, Event
 from noiseclassifier.labels import interval
 from noisemodel import Block
 
-REPETITION = re.compile(r"(?P<name>.+?)[-_.](?:run|rep|take|seed)?[-_.]?\d+")
-"""Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
 TOGETHER = 0.25
 """Onsets this close, of one class or joint in repetitions, are one row, in [s]: the hop of frames
 is 0.1 s or 0.2 s."""
@@ -35,7 +33,6 @@ WORDS = {
 """How people read a status."""
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}
 """How people count them."""
-UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
 LEAST = 0.05
 """Joints with a smaller share are left out."""
 PRECISE = 10.0

@@ -26,7 +26,6 @@ from inspector.reference.difference import LOUDER, NEW, RESOLVED, Difference
 from inspector.report.findings import (
     COUNTED,
     TOGETHER,
-    UNREAD,
     WORDS,
     Group,
     each_missing,
@@ -40,7 +39,7 @@ from inspector.report.findings import (
     told,
 )
 from inspector.text import counted, program_version
-from inspector.verdict import Verdict, counts, exit_status
+from inspector.verdict import UNREAD, Verdict, counts, exit_status
 
 ANNOTATIONS = 10
 """GitHub silently drops what goes beyond ten of a kind per step."""
@@ -602,7 +601,7 @@ def _told(of: diff.Row) -> list[str]:
     """What is new in a scenario, a line each; without levels there, what became of it first."""
     found = [*_folded(of, NEW), *_folded(of, LOUDER)]
     worse = of.outcome is diff.Outcome.WORSE
-    if worse and any(each.over is not None for each in of.new):
+    if worse and any(each.evidence.db is not None for each in of.new):
         return found
     return [of.reason, *(str(each) for each in of.changes[:1] if worse), *found]
 
@@ -623,11 +622,12 @@ def _folded(of: diff.Row, kind: str) -> list[str]:
     lines = []
     for group in groups[:MOST_OF_KIND]:
         (label, _), *_ = Counter(each.event.label for each in group).most_common(1)
-        worst = max(group, key=lambda each: -math.inf if each.over is None else each.over)
+        exceed = [-math.inf if each.evidence.db is None else each.evidence.db for each in group]
+        worst = group[exceed.index(max(exceed))]
         start, stop, known = worst.event.start, worst.event.stop, worst.evidence
         when = f"{start:.2f} s" if stop - start < SHORT else f"{start:.2f}-{stop:.2f} s"
         band = f"{known.octave[0]:.0f}-{known.octave[1]:.0f} Hz" if known.octave else ""
-        over = "" if worst.over is None else f"{worst.over:+.0f} dB"
+        over = "" if known.db is None else f"{known.db:+.0f} dB"
         several = f"{len({each.run for each in group})} of {runs} runs" if runs > 1 else ""
         parts = [f"{label} {when}", known.joint, band, over, several]
         lines.append(f"{kind}: {', '.join(filter(None, parts))}")
@@ -705,8 +705,8 @@ def _finding_as_dict(each: diff.Finding) -> dict[str, Any]:
         "label": each.event.label,
         "start": round(each.event.start, 6),
         "stop": round(each.event.stop, 6),
-        "level_db": each.level,
-        "change_db": each.over,
+        "level_db": each.evidence.level,
+        "change_db": each.evidence.db,
     }
 
 

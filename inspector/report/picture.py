@@ -250,11 +250,11 @@ def _over(axes: "Axes", beside: Comparison) -> None:
         vmax=MOST_OVER_DB,
         shading="nearest",
     )
-    for each in beside.exceedances:
-        if each.joint in joints:
-            row = joints.index(each.joint)
-            axes.plot([each.start, each.stop], [row, row], color=INK, linewidth=1.5)
-            axes.plot(each.peak, row, "o", color=INK, markersize=4)
+    for start, stop, evidence in beside.exceedances:
+        if evidence.joint in joints and evidence.peak is not None:
+            row = joints.index(evidence.joint)
+            axes.plot([start, stop], [row, row], color=INK, linewidth=1.5)
+            axes.plot(evidence.peak, row, "o", color=INK, markersize=4)
     axes.set_yticks(rows, list(map(_short, joints)), parse_math=False)
     axes.invert_yaxis()
     axes.set_title("joints over the reference", fontsize=9, loc="left")
