@@ -89,12 +89,7 @@ class Ruling(StrEnum):
 
 @dataclass(frozen=True)
 class Ruled:
-    """What became of a finding, and why.
-
-    Attributes:
-        ruling: What became of it.
-        reason: Why, in a few words; may be empty.
-    """
+    """What became of a finding, and why, in a few words."""
 
     ruling: Ruling = Ruling.FOUND
     reason: str = ""
@@ -112,21 +107,13 @@ LOG, END = "log of ", "end of the run"
 
 @dataclass(frozen=True)
 class Missing:
-    """A finding that is required and was not found.
-
-    Attributes:
-        label: Its class; several are joined by " or ".
-        start: The earliest onset, in [s]; None if any.
-        stop: The latest onset, in [s]; None if any.
-        reason: Why it is required; may be empty.
-        line: Of the file that requires it, from 1; 0 if that is not known.
-    """
+    """A finding that is required and was not found, and why it is required."""
 
     label: str
-    start: float | None = None
-    stop: float | None = None
+    start: float | None = None  # earliest onset, in [s]; None if any
+    stop: float | None = None  # latest one
     reason: str = ""
-    line: int = 0
+    line: int = 0  # of the file that requires it, from 1; 0 if that is not known
 
     def __str__(self) -> str:
         when = "" if self.start is None else f" from {self.start:.2f} s to {self.stop:.2f} s"
@@ -155,27 +142,16 @@ class Missing:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a finding is known by.
+    """What a finding is known by."""
 
-    Attributes:
-        kind: "repetitions" of this motion, "other motions" of this robot, or the "general" model.
-        db: Loudest exceedance over the reference, in [dB]; None by the general model.
-        peak: When that is, in [s].
-        joint: Its joint.
-        signal: "velocity" or "tracking error".
-        octave: Its octave, in [Hz].
-        level: Its level, in [dB re 1 rad/s].
-        excused: Why the finding does not count; empty if it does.
-    """
-
-    kind: str
-    db: float | None = None
-    peak: float | None = None
+    kind: str  # "repetitions", "other motions" of this robot, or the "general" model
+    db: float | None = None  # loudest exceedance over the reference; None by the general model
+    peak: float | None = None  # when that is, in [s]
     joint: str = ""
-    signal: str = ""
-    octave: tuple[float, float] | None = None
-    level: float | None = None
-    excused: str = ""
+    signal: str = ""  # "velocity" or "tracking error"
+    octave: tuple[float, float] | None = None  # [Hz]
+    level: float | None = None  # [dB re 1 rad/s]
+    excused: str = ""  # why the finding does not count; empty if it does
 
     def __str__(self) -> str:
         if self.db is None or self.octave is None:
@@ -202,132 +178,74 @@ class Evidence:
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Evidence":
         """Read what `as_dict` wrote."""
-        band = content["band_hz"]
-        return cls(
-            str(content["kind"]),
-            content["over_db"] and float(content["over_db"]),
-            content["peak"] and float(content["peak"]),
-            str(content["joint"] or ""),
-            str(content["signal"] or ""),
-            (float(band[0]), float(band[1])) if band else None,
-            content["level_db"] and float(content["level_db"]),
-            str(content.get("excused", "")),
-        )
+        numbers = (content[name] for name in ("over_db", "peak", "level_db"))
+        db, peak, level = (None if each is None else float(each) for each in numbers)
+        joint, signal = (str(content[name] or "") for name in ("joint", "signal"))
+        excused = str(content.get("excused", ""))
+        band = _pair(content["band_hz"])
+        return cls(str(content["kind"]), db, peak, joint, signal, band, level, excused)
+
+
+def _pair(band: Any) -> tuple[float, float] | None:
+    """A band of JSON, in [Hz]."""
+    return (float(band[0]), float(band[1])) if band else None
 
 
 @dataclass(frozen=True)
 class Beside:
-    """How a run compares with its reference, see `inspector.reference`.
+    """How a run compares with its reference, named as in JSON; see `inspector.reference`."""
 
-    Attributes:
-        path: The reference.
-        scenarios: Names of the scenarios whose motion it makes.
-        repetitions: How many accepted repetitions these have.
-        shares: Share of the run by kind of evidence.
-        margins: From how many decibels on a moment is a finding, by kind of evidence.
-        bounds: What is known of the margins, by kind of evidence, a sentence or two each.
-        worst: Largest score of a frame over the reference, in [dB]; None without one.
-        joints: Loudest exceedance of each joint that is compared, in [dB].
-        quieter: By how much it is quieter than each repetition, in [dB]; 0 if it is not.
-        speed: Its speed divided by the repetitions'; None without.
-        failures: What it lacks of its scenario, and why.
-        words: The evidence, in a line.
-    """
-
-    path: str
-    scenarios: tuple[str, ...] = ()
-    repetitions: int = 0
-    shares: Mapping[str, float] = field(default_factory=dict)
-    margins: Mapping[str, float] = field(default_factory=dict)
-    bounds: Mapping[str, str] = field(default_factory=dict)
-    worst: float | None = None
-    joints: Mapping[str, float] = field(default_factory=dict)
-    quieter: float = 0.0
-    speed: float | None = None
-    failures: tuple[tuple[str, str], ...] = ()
-    words: str = ""
+    path: str  # the reference
+    scenarios: tuple[str, ...] = ()  # whose motion it makes
+    repetitions: int = 0  # that these have
+    shares: Mapping[str, float] = field(default_factory=dict)  # of the run, by kind of evidence
+    margins_db: Mapping[str, float] = field(default_factory=dict)  # by kind of evidence
+    bounds: Mapping[str, str] = field(default_factory=dict)  # what is known of these margins
+    over_db: float | None = None  # largest score of a frame; None without one
+    joints_db: Mapping[str, float] = field(default_factory=dict)  # their loudest exceedance
+    quieter_db: float = 0.0  # than each repetition; 0 if it is not
+    speed: float | None = None  # divided by the repetitions'; None without
+    failures: tuple[tuple[str, str], ...] = ()  # what it lacks of its scenario, and why
+    words: str = ""  # the evidence, in a line
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Beside":
-        """Read what `as_dict` wrote."""
-        known = {UNITS_GONE.get(name, name): value for name, value in content.items()}
-        known["scenarios"] = tuple(map(str, known["scenarios"]))
-        known["failures"] = tuple((str(what), str(why)) for what, why in known["failures"])
-        return cls(**known)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The comparison as a run of ``noise-verdict/3`` has it."""
-        names = {short: name for name, short in UNITS_GONE.items()}
-        return {names.get(name, name): value for name, value in asdict(self).items()}
-
-
-UNITS_GONE = {
-    "margins_db": "margins",
-    "over_db": "worst",
-    "joints_db": "joints",
-    "quieter_db": "quieter",
-}
-"""Names of `Beside` by those that JSON has, which state the unit."""
+        """Read what a verdict has as its reference."""
+        scenarios = tuple(map(str, content["scenarios"]))
+        failures = tuple((str(what), str(why)) for what, why in content["failures"])
+        return cls(**{**content, "scenarios": scenarios, "failures": failures})
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found in one file.
-
-    Attributes:
-        path: The file.
-        status: The outcome.
-        model: Name of the model that labelled, empty if none could.
-        events: Findings, in order.
-        message: A line that says more, may be empty.
-        localisations: The localisation of each finding, where it is known.
-        model_sha256: SHA-256 of the model's file, empty without.
-        orders: Of the findings whose vibration goes with the speed of a joint.
-        beside: How the run compares with its reference; None without one.
-        assumed: What was assumed when its log was read, in a line; empty of a run file.
-        scenario: The scenario that the run names, empty without.
-        duration: Duration of the run, in [s]; 0 if it cannot be read.
-        rate: Its rate, in [Hz]; 0 if it cannot be read.
-        joints: Number of its joints.
-        seconds: How long it took to classify it, in [s].
-        rulings: What became of findings, of those that are not simply found.
-        missing: Required findings that were not found.
-        expectations: The file of expectations that was applied, empty without.
-        ignored: Whether it is left out of the exit status: bad input that is ignored.
-        picture: A picture of the run, if one was drawn.
-        picture_url: Where that will be published, empty if that is not known.
-        lost: Outputs of the run that could not be written, a sentence each.
-        trace: The traceback of an internal error.
-        begin: Time of the run's first sample, in [s].
-        evidence: What each finding is known by, beside a reference.
-    """
+    """What was found in one file; texts are empty where nothing is known."""
 
     path: Path
     status: Status
-    model: str = ""
-    events: tuple[Event, ...] = ()
+    model: str = ""  # that labelled
+    events: tuple[Event, ...] = ()  # findings, in order
     message: str = ""
     localisations: Mapping[Event, "Localisation"] = field(default_factory=dict)
     unknown: Unknown = Unknown.FINDING
-    model_sha256: str = ""
+    model_sha256: str = ""  # of its file
     orders: Mapping[Event, "Order"] = field(default_factory=dict)
     beside: Beside | None = None
-    assumed: str = ""
-    scenario: str = ""
-    duration: float = 0.0
-    rate: float = 0.0
+    assumed: str = ""  # when its log was read, in a line
+    scenario: str = ""  # that the run names
+    duration: float = 0.0  # [s]; 0 if it cannot be read, as the rate
+    rate: float = 0.0  # [Hz]
     joints: int = 0
-    seconds: float = 0.0
-    rulings: Mapping[Event, Ruled] = field(default_factory=dict)
+    seconds: float = 0.0  # that it took to classify it
+    rulings: Mapping[Event, Ruled] = field(default_factory=dict)  # of those not simply found
     missing: tuple[Missing, ...] = ()
-    expectations: str = ""
-    ignored: bool = False
+    expectations: str = ""  # the store that was applied
+    ignored: bool = False  # in the exit status: bad input
     picture: Path | None = None
-    picture_url: str = ""
-    lost: tuple[str, ...] = ()
-    trace: str = ""
-    begin: float = 0.0
-    evidence: Mapping[Event, Evidence] = field(default_factory=dict)
+    picture_url: str = ""  # where that will be published
+    lost: tuple[str, ...] = ()  # outputs that could not be written, a sentence each
+    trace: str = ""  # of an internal error
+    begin: float = 0.0  # time of the first sample, in [s]
+    evidence: Mapping[Event, Evidence] = field(default_factory=dict)  # beside a reference
 
     @property
     def of_run(self) -> bool:
@@ -397,7 +315,7 @@ class Verdict:
                 for missing in self.missing
             ],
             "expectations": self.expectations,
-            "reference": None if self.beside is None else self.beside.as_dict(),
+            "reference": None if self.beside is None else asdict(self.beside),
             "message": self.message,
             "assumed": self.assumed,
             "scenario": self.scenario,
@@ -411,10 +329,8 @@ class Verdict:
         }
 
     def _event_as_dict(self, event: Event) -> dict[str, Any]:
-        ruled, known, order = self.ruled(event), self.localisations.get(event), None
-        if event in self.orders:
-            of = self.orders[event]
-            order = {"joint": of.joint, "periods_per_turn": round(of.periods_per_turn, 1)}
+        ruled, known, of = self.ruled(event), self.localisations.get(event), self.orders.get(event)
+        order = of and {"joint": of.joint, "periods_per_turn": round(of.periods_per_turn, 1)}
         written: dict[str, Any] = {
             "label": event.label,
             "start": round(event.start, 6),
@@ -445,31 +361,23 @@ class Verdict:
 
         events, rulings, known, orders, evidence = [], {}, {}, {}, {}
         for row in content["events"]:
-            event = Event(
-                str(row["label"]),
-                float(row["start"]),
-                float(row["stop"]),
-                float(row["score"]),
-                bool(row["novel"]),
-            )
+            start, stop, score = (float(row[name]) for name in ("start", "stop", "score"))
+            event = Event(str(row["label"]), start, stop, score, bool(row["novel"]))
             events.append(event)
-            ruled = Ruled(Ruling(row["ruling"]), str(row["reason"]))
-            if ruled != Ruled():
+            if (ruled := Ruled(Ruling(row["ruling"]), str(row["reason"]))) != Ruled():
                 rulings[event] = ruled
-            if row["order"]:
-                order = row["order"]
+            if order := row["order"]:
                 orders[event] = Order(str(order["joint"]), float(order["periods_per_turn"]))
             if (by := Evidence.from_dict(row["evidence"])) != Evidence("general"):
                 evidence[event] = by
             if "localisation" in row:
                 found = row["localisation"]
-                low, high = found["band"] or (0.0, 0.0)
                 known[event] = Localisation(
                     str(found["stage"] or ""),
                     str(found["following"] or ""),
                     float(found["lag"] or 0.0),
                     joints=tuple((str(k), float(v)) for k, v in found["joints"].items()),
-                    band=(float(low), float(high)) if found["band"] else None,
+                    band=_pair(found["band"]),
                 )
         missing = tuple(
             Missing(str(each["label"]), each["start"], each["stop"], str(each["reason"]))
@@ -477,11 +385,10 @@ class Verdict:
         )
         " ".join(map(str, missing))  # a number that is none fails here
         texts = ("model", "message", "model_sha256", "assumed", "scenario", "expectations")
-        numbers = ("begin", "duration", "rate", "seconds")
         if not all(isinstance(content[name], str) for name in ("run", *texts)):
             raise TypeError("expected text")
         plain: dict[str, Any] = {name: content[name] for name in texts}
-        plain |= {name: float(content[name]) for name in numbers}
+        numbers = ("begin", "duration", "rate", "seconds")
         return cls(
             Path(content["run"]),
             Status(content["status"]),
@@ -496,7 +403,7 @@ class Verdict:
             joints=int(content["joints"]),
             ignored=not content["counted"],
             picture=None if content["picture"] is None else Path(content["picture"]),
-            **plain,
+            **plain | {name: float(content[name]) for name in numbers},
         )
 
 
@@ -514,7 +421,6 @@ def classify_file(
     Args:
         path: A run file, any log that `inspector import` reads, or one of NoisyTest's two-column
             logs (``*.log``).
-        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         draw: Draws a picture of a file's analysis with its verdict and comparison, which is None
             without a reference, and gives its path.
         reference: Adds the evidence of a reference and gives the comparison with it, see
@@ -565,9 +471,7 @@ def classify_files(
     """Classify many files; one bad file never stops the rest.
 
     Args:
-        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
-        draw: Draws a picture, see `classify_file`; importable for several jobs.
-        reference: Adds the evidence of a reference, see `classify_file`.
+        draw: See `classify_file`, as for the reference; importable for several jobs.
         jobs: How many to work on at once, or the address of a Dask scheduler. A run with which a
             worker dies is an internal error.
         resume: A file that keeps the verdicts; those on unchanged runs are taken from it.
@@ -762,7 +666,7 @@ def resumed(
         file = path.open("a+b")
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
-    with _closing(file):
+    try:
         try:
             _lock(file)
         except OSError as error:
@@ -784,6 +688,9 @@ def resumed(
         if not end:
             append(header)
         yield found, append
+    finally:
+        with suppress(OSError):  # what it could not write has been said by then
+            file.close()
 
 
 def _lock(file: IO[bytes]) -> None:
@@ -818,16 +725,6 @@ def _append(path: Path, file: IO[bytes], content: Mapping[str, Any]) -> None:
         os.fsync(file.fileno())
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
-
-
-@contextmanager
-def _closing(file: IO[bytes]) -> Iterator[None]:
-    """Close a file in the end; what it could not write has been said by then."""
-    try:
-        yield
-    finally:
-        with suppress(OSError):
-            file.close()
 
 
 def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:

@@ -166,7 +166,7 @@ def test_a_history_of_200_commits_names_two_steps_and_a_drift(tmp_path):
             if name == "scan" and 20 <= commit < 30:
                 continue  # a gap
             joints = {"elbow": float(calm[commit]), "wrist": float(value[commit])}
-            beside = Beside("reference", (name,), 3, worst=float(value[commit]), joints=joints)
+            beside = Beside("reference", (name,), 3, over_db=float(value[commit]), joints_db=joints)
             for number in range(2):
                 run = Verdict(Path(f"{name}-{number}.npz"), Status.OK, beside=beside)
                 if name == "pick" and commit >= 60:

@@ -382,10 +382,11 @@ def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
             quiet = NOTHING if len(verdicts) > 1 else ""
             runs.update(filter(None, [re.sub(quiet, "", verdict.message)]))
         if verdict.beside and verbose:
-            runs.update([verdict.beside.words])
+            runs.update(filter(None, [verdict.beside.words]))
         elif verdict.beside:
             parts = verdict.beside.words.split("; ")
-            runs.update(re.sub(AMOUNT, "", each) for each in parts if not re.match(REPEATED, each))
+            parts = [each for each in parts if each and not re.match(REPEATED, each)]
+            runs.update(re.sub(AMOUNT, "", each) for each in parts)
         elif len(verdicts) > 1 and verdict.expectations:
             runs.update([f"by {verdict.expectations}"])
     for message, number in runs.items():
@@ -395,7 +396,7 @@ def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
     if known and not verbose:
         number = len({each.scenarios for each in known})
         fewest, most = (of(each.repetitions for each in known) for of in (min, max))
-        margins = [each.margins.get("repetitions", 0.0) for each in known]
+        margins = [each.margins_db.get("repetitions", 0.0) for each in known]
         many = counted(most, "repetition") if fewest == most else f"{fewest} to {most} repetitions"
         each_of = f"each of {number} scenarios" if number > 1 else " and ".join(known[0].scenarios)
         low, high = f"{min(margins):.1f}", f"{max(margins):.1f}"

@@ -135,8 +135,8 @@ def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
             runs[name][commit] = np.nansum((runs[name][commit], len(group.verdicts)))
             for verdict in group.verdicts:
                 known = verdict.beside
-                levels = {} if known is None or known.worst is None else {"": known.worst}
-                for joint, worst in (levels | dict(known.joints if known else {})).items():
+                levels = {} if known is None or known.over_db is None else {"": known.over_db}
+                for joint, worst in (levels | dict(known.joints_db if known else {})).items():
                     over[name, joint][commit] = np.fmax(over[name, joint][commit], worst)
                 for event in verdict.failing:
                     where = verdict.localisations.get(event)
