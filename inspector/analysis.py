@@ -284,12 +284,7 @@ def analyse_noise(
     name: str = "noise",
     unknown: Unknown = Unknown.FINDING,
 ) -> Analysis:
-    """Label a scalar noise, as NoisyTest's logs hold it.
-
-    Args:
-        time: Uniform, shape (samples,), in [s].
-        noise: Shape (samples,), in [rad/s].
-    """
+    """Label a scalar noise in [rad/s] at uniform times in [s], as NoisyTest's logs hold it."""
     uniform = float(time[0]) + np.arange(len(time)) / nc.nominal_rate(time)
     run = nm.Run(time=uniform, velocity=noise[:, None], joint_names=("noise",))
     empty = Analysis(name=name, status=Status.CANNOT_TELL, run=run, unknown=unknown)
@@ -313,9 +308,8 @@ def analyse_file(
     Args:
         path: A run file, any log that `inspector import` reads, or one that is open already.
         links: Whether to compute the noise link by link, if the run names a robot that is known.
-        kind: Kind of the extended noise, see ``noisemodel.extended``.
+        kind: Kind of the extended noise, see ``noisemodel.noise``.
         terms: Whether to compute the paper's terms A, B and C one by one.
-        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
     """
     opened = path if isinstance(path, Opened) else open_run(path)
     name, digest = opened.source.shown.stem, opened.sha256
@@ -412,19 +406,12 @@ LOUDEST = "loudest"
 
 @dataclass(frozen=True)
 class Moment:
-    """A stretch of a run, and where in it the noise is loudest.
+    """A stretch of a run, and where in it the noise is loudest."""
 
-    Attributes:
-        label: Its class; ``loudest`` where nothing was found or annotated.
-        start: In [s].
-        stop: In [s].
-        peak: Middle of its loudest 50 ms, in [s].
-    """
-
-    label: str
-    start: float
-    stop: float
-    peak: float
+    label: str  # its class; "loudest" where nothing was found or annotated
+    start: float  # [s]
+    stop: float  # [s]
+    peak: float  # middle of its loudest 50 ms, in [s]
 
     @property
     def failure(self) -> bool:
@@ -454,7 +441,9 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
     ]
     stretches = [(failure.label, failure.start, failure.stop) for failure in failures]
     begin, end = float(run.time[0]), float(run.time[-1])
-    time, level = _noise_level(analysis)
+    starts, levels = analysis.noise_level
+    time = (starts + np.append(starts[1:], end + 1.0 / run.rate)) / 2
+    level = np.nan_to_num(levels[:, 0], nan=FLOOR_DB)
     found = []
     for label, start, stop in stretches or [(LOUDEST, begin, end)]:
         inside = np.flatnonzero((time >= start - STEP / 2) & (time <= stop + STEP / 2))
@@ -464,15 +453,6 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
             found.append((float(level[peak]), moment))
     found.sort(key=lambda pair: -pair[0])
     return tuple(moment for _, moment in found[:MOST])
-
-
-def _noise_level(analysis: Analysis) -> tuple[Array, Array]:
-    """Level of the noise above 10 Hz, every 50 ms: middles of the steps and values, in [dB]."""
-    run = analysis.run
-    starts, level = analysis.noise_level
-    stop = float(run.time[-1]) + 1.0 / run.rate
-    middles = (starts + np.append(starts[1:], stop)) / 2
-    return middles, np.nan_to_num(level[:, 0], nan=FLOOR_DB)
 
 
 SHOWN = 8
@@ -493,13 +473,10 @@ def worst_joint(analysis: Analysis) -> int | None:
 
 
 def orders(analysis: Analysis) -> "tuple[str, Spectrogram] | None":
-    """Compute the order spectrogram of the noise over the angle of one joint.
+    """A joint and the order spectrogram of the noise over its angle; None without motion.
 
-    The joint is the first finding's with an order; else the one that vibrates most while it
-    moves.
-
-    Returns:
-        The joint, and its spectrogram, see `inspector.localisation.order`; None without motion.
+    The joint is the first finding's with an order, or else the one that vibrates most while it
+    moves; see `inspector.localisation.order`.
     """
     from inspector.localisation.order import SLOWEST, order_spectrogram
 
@@ -531,9 +508,7 @@ def worst_signal(analysis: Analysis, joint: int | None) -> Array:
 def chosen(analysis: Analysis, time: Array, level: Array) -> list[int]:
     """Columns of those that are loudest during findings, or at any time of a run without.
 
-    Args:
-        time: Starts of the steps, shape (steps,), in [s].
-        level: Shape (steps, columns), in [dB]; NaN in gaps.
+    Times are starts of steps, in [s], and levels of shape (steps, columns), NaN in gaps.
     """
     inside = np.zeros(len(time), dtype=bool)
     for event in analysis.findings:
@@ -548,25 +523,15 @@ KINDS = ("simplified", *nm.KINDS)
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """A run's noise in numbers, by one estimate.
+    """A run's noise in numbers, by one estimate."""
 
-    Attributes:
-        kind: "simplified", or a kind of the extended noise.
-        unit: Of ``rms`` and ``peak``: the square root of the power.
-        rms: Root mean square.
-        peak: Largest value.
-        peak_time: When that is, in [s].
-        shares: Share of each joint or link in the power, largest first; they add up to 1.
-        remarks: What this estimate leaves out, a sentence each.
-    """
-
-    kind: str
-    unit: str
+    kind: str  # "simplified", or a kind of the extended noise
+    unit: str  # of the root mean square and the peak: the square root of the power
     rms: float
     peak: float
-    peak_time: float
-    shares: tuple[tuple[str, float], ...]
-    remarks: tuple[str, ...] = ()
+    peak_time: float  # [s]
+    shares: tuple[tuple[str, float], ...]  # of joints or links in the power, the largest first
+    remarks: tuple[str, ...] = ()  # what this estimate leaves out, a sentence each
 
     def __str__(self) -> str:
         """The levels in lines."""
@@ -578,21 +543,13 @@ class NoiseLevel:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A noise over time.
+    """A noise over time."""
 
-    Attributes:
-        kind: "simplified", or a kind of the extended noise.
-        unit: Of the pressure.
-        power: Power of each part, shape (samples, parts), in [unit²].
-        parts: Joints or links.
-        remarks: What the estimate leaves out, a sentence each.
-    """
-
-    kind: str
-    unit: str
-    power: Array
-    parts: tuple[str, ...]
-    remarks: tuple[str, ...] = ()
+    kind: str  # "simplified", or a kind of the extended noise
+    unit: str  # of the pressure
+    power: Array  # of each part, shape (samples, parts), in [unit²]
+    parts: tuple[str, ...]  # joints or links
+    remarks: tuple[str, ...] = ()  # what it leaves out, a sentence each
 
     @property
     def pressure(self) -> Array:
@@ -620,12 +577,9 @@ def estimate(run: Run, kind: str, *, geometry: str = "auto") -> Estimate:
     noise = nm.extended(
         robot, surface, *robot.configuration(run), kind, q_desired=q_desired, v_desired=v_desired
     )
-    without_geometry = (
-        (f"links without geometry: {', '.join(surface.without_geometry)}",)
-        if surface.without_geometry
-        else ()
-    )
-    return Estimate(kind, "√W", noise.power, noise.names, without_geometry)
+    without = surface.without_geometry
+    remarks = (f"links without geometry: {', '.join(without)}",) if without else ()
+    return Estimate(kind, "√W", noise.power, noise.names, remarks)
 
 
 def noise_level(run: Run, estimate: Estimate) -> NoiseLevel:
@@ -657,16 +611,9 @@ def write_csv(
     """Write time and noises as CSV."""
     columns = np.column_stack((run.time, *(estimate.pressure for estimate in estimates)))
     names = ["time [s]", *(f"{estimate.kind} [{estimate.unit}]" for estimate in estimates)]
+    csv = {"fmt": "%.9g", "delimiter": ",", "comments": "", "encoding": "utf-8"}
     with replacing(path, overwrite=overwrite) as temporary:
-        np.savetxt(
-            temporary,
-            columns[run.mask],
-            fmt="%.9g",
-            delimiter=",",
-            header=",".join(names),
-            comments="",
-            encoding="utf-8",
-        )
+        np.savetxt(temporary, columns[run.mask], header=",".join(names), **csv)
 
 
 def _simplified(run: Run) -> Estimate:

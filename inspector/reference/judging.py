@@ -245,40 +245,25 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A run beside its reference.
-
-    Attributes:
-        joints: Joints that are compared.
-        octaves: Octaves that are compared, in [Hz].
-        scenarios: Names of the scenarios whose motion it is.
-        repetitions: How many repetitions these have.
-        kind: Evidence of each frame, as its place in `KINDS`, shape (frames,).
-        over: Exceedance of each cell, shape (frames, joints, 2, octaves), in [dB]; NaN where there
-            is no reference.
-        score: Of each frame, in [dB]; NaN without reference.
-        margins: By kind of evidence.
-        exceedances: Stretches that are louder, in order of time.
-        quieter: By how much the run is quieter than each repetition, in [dB]; 0 if it is not.
-        slope: Speed of the run divided by the repetitions'; NaN without.
-        band: Level of the noise of the quietest and of the loudest repetition at each frame, shape
-            (frames, 2), in [dB re 1 rad/s]; NaN without.
-        remarks: What is not compared, and why, a sentence each.
-    """
+    """A run beside its reference, in the joints and octaves that are compared."""
 
     run: Levels
     joints: tuple[str, ...]
-    octaves: Octaves
-    scenarios: tuple[str, ...]
-    repetitions: int
-    kind: NDArray[np.int8]
+    octaves: Octaves  # [Hz]
+    scenarios: tuple[str, ...]  # whose motion it is
+    repetitions: int  # that these have
+    kind: NDArray[np.int8]  # evidence of each frame, as its place in `KINDS`, shape (frames,)
+    # Exceedance of each cell, shape (frames, joints, 2, octaves), in [dB]; NaN without reference.
     over: Real32
-    score: Array
+    score: Array  # of each frame, in [dB]; NaN without reference
     margins: Mapping[Kind, Margin]
-    exceedances: tuple[Exceedance, ...]
-    quieter: float = 0.0
-    slope: float = float("nan")
+    exceedances: tuple[Exceedance, ...]  # in order of time
+    quieter: float = 0.0  # than each repetition, in [dB]; 0 if it is not
+    slope: float = float("nan")  # speed divided by the repetitions'; NaN without
+    # Level of the noise of the quietest and of the loudest repetition at each frame, shape
+    # (frames, 2), in [dB re 1 rad/s]; NaN without.
     band: Array = field(default_factory=lambda: np.empty((0, 2)))
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what is not compared, and why, a sentence each
 
     @property
     def empty(self) -> bool:

@@ -85,40 +85,25 @@ OUTCOMES = {
 
 @dataclass(frozen=True)
 class Case:
-    """One case: a run, a scenario, or a file that cannot be read.
-
-    Attributes:
-        path: The file that it is about.
-        status: What became of it, as machines read it; `words` as people do.
-        rank: Sorts cases, the worst first.
-        kind: Type of a failure or an error.
-        sentences: What fails it, a sentence each.
-        message: A line that says more; may be empty.
-        notes: What does not fail it, a sentence each.
-        seconds: How long it took, in [s].
-        quiet: Whether there is nothing to say of it, so that tables leave it out.
-        picture_url: Where its picture will be published; empty if that is not known.
-        timeline: It over time as text, for where there is no picture; may be empty.
-        line: Its line in the file, from 1; 0 without.
-    """
+    """One case: a run, a scenario, or a file that cannot be read."""
 
     name: str
-    path: Path
-    status: str
-    words: str
+    path: Path  # the file that it is about
+    status: str  # what became of it, as machines read it
+    words: str  # and as people do
     outcome: Outcome
-    rank: tuple[float, ...]
-    kind: str
-    sentences: tuple[str, ...] = ()
-    message: str = ""
-    notes: tuple[str, ...] = ()
+    rank: tuple[float, ...]  # sorts cases, the worst first
+    kind: str  # of a failure or an error
+    sentences: tuple[str, ...] = ()  # what fails it
+    message: str = ""  # a line that says more
+    notes: tuple[str, ...] = ()  # what does not fail it, a sentence each
     trace: str = ""
-    seconds: float = 0.0
-    quiet: bool = False
+    seconds: float = 0.0  # that it took
+    quiet: bool = False  # whether tables leave it out
     picture: Path | None = None
-    picture_url: str = ""
-    timeline: str = ""
-    line: int = 0
+    picture_url: str = ""  # where it will be published
+    timeline: str = ""  # as text, for where there is no picture
+    line: int = 0  # in the file, from 1; 0 without
 
     @property
     def told(self) -> str:
