@@ -184,6 +184,16 @@ def test_a_run_that_is_cut_or_frozen_fails_and_says_so(own, simulate):
     assert "missing: motion from 0." in out
 
 
+def test_a_run_shorter_than_a_frame_is_cut_and_nothing_else_is_noted(own, simulate):
+    simulate.run("pick", 9).cut(0.0, 0.15).save(own / "runs" / "pick-4.npz")
+    status, out, err = call("classify", own / "runs" / "pick-4.npz")
+    assert (status, err) == (1, "")
+    assert "missing: end of the run (required: 0.1 of 6.0 s)" in out
+    assert [line for line in out.splitlines() if line.startswith("note:")] == [
+        "note:    a signal of 150 samples is too short: a frame takes 400"
+    ]
+
+
 def test_a_run_longer_than_its_scenario_is_compared_with_it_as_far_as_it_goes(own, simulate):
     parts = simulate.run("pick", 9), simulate.run("wave", 9)
     long = {

@@ -16,7 +16,7 @@ from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import column_signal, time_column
 from inspector.logs.read import read_log
 from inspector.reference import store
-from inspector.text import counted, plain
+from inspector.text import counted, natural, plain
 from inspector.training import tune
 from inspector.verdict import classify_file
 from noiseclassifier import jsontext, noisytest
@@ -202,3 +202,8 @@ def test_frequencies_are_rounded_and_have_no_exponent():
         "0.0123", "31.2", "3540", "98800",
     ]  # fmt: skip
     assert plain(12345.6, 4) == "12350"
+
+
+def test_names_sort_by_their_numbers_and_superscripts_are_none():
+    names = ["pick-10", "²1", "pick-9", "a²"]
+    assert sorted(names, key=natural) == ["a²", "pick-9", "pick-10", "²1"]
