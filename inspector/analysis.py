@@ -31,9 +31,6 @@ from inspector.localisation.extent import extent
 from inspector.logs.clocks import without_hold
 from inspector.logs.read import Opened, open_run
 from noiseclassifier import Event
-from noiseclassifier.lasting import HOP as LASTING_HOP
-from noiseclassifier.lasting import MARGIN as LASTING_MARGIN
-from noiseclassifier.lasting import WINDOW as LASTING_WINDOW
 from noiseclassifier.lasting import joined
 from noisemodel import Block, Run
 from noisemodel.files import replacing
@@ -341,7 +338,7 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
     """Add labels to an analysis, with the findings and the status that follow from them."""
     reported = empty.unknown is Unknown.FINDING
     labels = replace(labelled.labels, unknown_is_finding=reported)
-    spans, findings = extents(empty.run, labels, labelled.lasting)
+    spans, findings = extents(empty.run, labels, labelled.lasting, labelled.bursts)
     known = int((labels.label != nc.UNKNOWN).sum())
     return replace(
         empty,
@@ -358,15 +355,17 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
 
 
 def extents(
-    run: nm.Run, labels: nc.Labels, lasting: Sequence[Event] = ()
+    run: nm.Run, labels: nc.Labels, lasting: Sequence[Event] = (), bursts: Sequence[Event] = ()
 ) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
-    """List the findings of labels and of what lasts, as they were found, and from onset to end.
+    """List the findings of labels, of what lasts and of bursts: as found, and from onset to end.
 
     Those that overlap or touch are one, of the class that lasts longer.
     """
     frame, pairs = float(labels.stop[0] - labels.start[0]), list[tuple[Event, Event]]()
     found = [(event, 0.0, frame, labels.step) for event in labels.events()]
-    found += [(event, LASTING_MARGIN, LASTING_WINDOW, LASTING_HOP) for event in lasting]
+    found += [(e, nc.lasting.MARGIN, nc.lasting.WINDOW, nc.lasting.HOP) for e in lasting]
+    # A line fills most of its windows: it begins before the last hop of the first.
+    found += [(e, nc.bursts.MARGIN + nc.bursts.HOP, frame, labels.step) for e in bursts]
     for span, more, length, step in sorted(found, key=lambda each: (each[0].start, each[0].stop)):
         start, stop = extent(run, span.start - more, span.stop + more, frame=length, hop=step)
         own = replace(span, start=start, stop=stop)

@@ -36,6 +36,7 @@ class Labelled:
         remark: What was done to the run before, a sentence; empty if nothing was.
         alarm: Alarm threshold, a probability of any failure; None of a model without one.
         lasting: Oscillations that stand out of any robot's motion, see `noiseclassifier.lasting`.
+        bursts: Oscillations that the rest of the run lacks, see `noiseclassifier.bursts`.
     """
 
     labels: nc.Labels
@@ -43,6 +44,7 @@ class Labelled:
     remark: str = ""
     alarm: float | None = None
     lasting: tuple[nc.Event, ...] = ()
+    bursts: tuple[nc.Event, ...] = ()
 
 
 def folder(kind: str) -> Path:
@@ -136,8 +138,11 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}: {left}."
     start = float(run.time[0])
     lasting = nc.Lasting(run.rate, start=start)
-    labels = classifier.classify_pieces(_watched(run, lasting), run.rate, start=start, whole=True)
+    bursts = nc.Bursts(run.rate, start=start, whole=True)
+    watched = _watched(run, lasting, bursts)
+    labels = classifier.classify_pieces(watched, run.rate, start=start, whole=True)
     lasting.finish()
+    bursts.finish()
     if not (lasting.examined or len(labels.events())) and nc.lasting.MEASURED in signal_names(run):
         raise CannotTellError(
             f"no stretch of {nc.lasting.SHORTEST:g} s without a gap, as it takes to tell what lasts"
@@ -148,14 +153,31 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
             " requires"
         )
     alarm = _alarm(classifier, labels)
-    return _counted(Labelled(labels, name, remark, alarm, lasting.events))
+    return _counted(Labelled(labels, name, remark, alarm, lasting.events, bursts.events))
 
 
-def _watched(run: nm.Run, lasting: nc.Lasting) -> Iterator[tuple[dict[str, Real], Mask]]:
-    """Signals of a run piece by piece, which also goes to what looks for what lasts."""
+def lines(run: nm.Run) -> tuple[tuple[nc.Event, ...], tuple[nc.Event, ...]]:
+    """What lasts in a run, and its bursts."""
+    start = float(run.time[0])
+    lasting, bursts = (
+        nc.Lasting(run.rate, start=start),
+        nc.Bursts(run.rate, start=start, whole=True),
+    )
+    for _ in _watched(run, lasting, bursts):
+        pass
+    lasting.finish()
+    bursts.finish()
+    return lasting.events, bursts.events
+
+
+def _watched(
+    run: nm.Run, lasting: nc.Lasting, bursts: nc.Bursts
+) -> Iterator[tuple[dict[str, Real], Mask]]:
+    """Signals of a run piece by piece, which also goes to what looks for lines."""
     for piece in pieces_of(run):
         signals = _signals(piece)
         lasting.push(signals, piece.mask)
+        bursts.push(signals, piece.mask)
         yield signals, piece.mask
 
 

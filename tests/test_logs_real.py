@@ -1,12 +1,16 @@
 """Logs of a real Franka Panda and a real Unitree Go2, from import to verdict."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commandline import call
 from rerun.chunk import RrdReader
 
+import inspector
+from inspector.logs.read import read_log
 from noisemodel import Run
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "panda"
@@ -44,3 +48,17 @@ def test_legs_in_the_air_are_ok_though_their_desired_positions_come_in_coarse_st
     assert status == 0, out
     assert "differentiated from positions in steps of 0.026 rad" in out
     assert "it was left out." in out
+
+
+@pytest.mark.parametrize("frequency", [25.0, 60.0, 150.0])
+@pytest.mark.parametrize("rms", [0.3, 3.0, 100.0])
+def test_a_tone_of_half_a_second_in_a_real_log_is_found_however_loud(rms, frequency):
+    run = read_log(DATA / "measured.csv").run
+    time, velocity = run.time - run.time[0], run.velocity.astype(np.float64)
+    during = (time >= 9.0) & (time < 9.5)
+    velocity[:, 1] += during * rms * np.sqrt(2) * np.sin(2 * np.pi * frequency * time)
+    found = inspector.analyse(replace(run, velocity=velocity)).findings
+    begin = float(run.time[0])
+    assert [each.label for each in found] == ["oscillations"]
+    assert found[0].start == pytest.approx(begin + 9.0, abs=0.2)
+    assert found[0].stop == pytest.approx(begin + 9.5, abs=0.2)

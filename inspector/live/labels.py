@@ -117,7 +117,7 @@ class Labeller:
         self.hop = chosen.profile.hop / rate * ratio
         self._names = chosen.profile.signals
         self._stream = nc.Stream(chosen, rate=lower, joints=self._joints)
-        self._lasting = nc.Lasting(lower)
+        self._lasting, self._bursts = nc.Lasting(lower), nc.Bursts(lower)
         if ratio > 1:
             self._decimator = Decimator(ratio)
             self.remark = (
@@ -146,12 +146,13 @@ class Labeller:
             for names in (self._followed, self._names)
         )
         self._lasting.push(followed, valid)
+        self._bursts.push(followed, valid)
         return self._stream.push(signals, valid)
 
     @property
     def lasting(self) -> tuple[Event, ...]:
-        """What lasts so far, on the clock of the labels."""
-        return () if self._stream is None else self._lasting.events
+        """What lasts, and bursts, so far, on the clock of the labels."""
+        return () if self._stream is None else (*self._lasting.events, *self._bursts.events)
 
     @property
     def decided(self) -> float:
@@ -162,6 +163,7 @@ class Labeller:
         """End the signal."""
         if self._stream is not None:
             self._lasting.finish()
+            self._bursts.finish()
 
     def skip(self, samples: int) -> None:
         """Pass over samples that were lost."""
@@ -174,6 +176,7 @@ class Labeller:
             whole = max(samples - 4 * self._ratio * EDGE, 0) // self._ratio
         self._stream.skip(whole)
         self._lasting.skip(whole)
+        self._bursts.skip(whole)
         if self._decimator is not None:
             rest = samples - whole * self._ratio
             self._take(np.zeros((rest, self._columns)), np.zeros(rest, dtype=bool))

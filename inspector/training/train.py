@@ -15,6 +15,7 @@ from inspector.analysis import extents
 from inspector.audit.signals import without_placeholder
 from inspector.colors import SERIES, Color, of_classes
 from inspector.errors import InspectorError, OptionError
+from inspector.library import lines
 from inspector.logs.clocks import without_hold
 from inspector.logs.plausibility import check_joints
 from inspector.report.picture import require as require
@@ -371,7 +372,8 @@ def evaluate(
             yield recording
 
     def localise(recording: nc.Recording, labels: nc.Labels) -> Located:
-        return extents(source[recording.name] or _run_of(recording), labels)
+        run = source[recording.name] or _run_of(recording)
+        return extents(run, labels, *lines(run))
 
     return nc.assess(
         classifier,

@@ -12,6 +12,7 @@ only to train.
 """
 
 from noiseclassifier.assessment import Assessment, assess, evaluate
+from noiseclassifier.bursts import Bursts
 from noiseclassifier.classifier import Classifier, Stream
 from noiseclassifier.dataset import Dataset, Examples
 from noiseclassifier.errors import (
@@ -65,6 +66,7 @@ __all__ = [
     "AnnotationError",
     "Assessment",
     "Block",
+    "Bursts",
     "Classifier",
     "Dataset",
     "DatasetError",

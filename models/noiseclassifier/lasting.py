@@ -85,38 +85,21 @@ class Line:
         return self.windows >= WINDOWS or self.sharp >= SHARP
 
 
-class Lasting:
-    """Finds lines that last in signals that come in chunks of any size.
+class Windows:
+    """Cuts signals that come in chunks of any size into windows, none of which touches a gap.
 
     Args:
         rate: Sample rate, in [Hz].
+        window: Duration of a window, in [s].
+        hop: Time from one to the next, in [s].
         start: Time of the first sample, in [s].
-
-    Attributes:
-        examined: Windows that were examined; 0 where each stretch is shorter than ``SHORTEST``.
     """
 
-    def __init__(self, rate: float, *, start: float = 0.0) -> None:
+    def __init__(self, rate: float, window: float, hop: float, start: float) -> None:
         self.rate, self.start = rate, start
-        self._length, self._hop = round(WINDOW * rate), max(1, round(HOP * rate))
-        self._margin = round(MARGIN * rate)
+        self._length, self._hop = round(window * rate), max(1, round(hop * rate))
         self._first = 0  # number of the first sample that is held
         self._samples = np.empty((0, 0, 0))  # of the stretch, from where the next window begins
-        self._windows = 0  # of the stretch
-        self.examined = 0
-        self._lines: list[Line] = []  # of the latest window
-        self._events: list[Event] = []
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """Findings so far, in order of time."""
-        return tuple(self._events)
-
-    @property
-    def decided(self) -> float:
-        """Time before which no finding begins that is still to come, in [s]."""
-        firsts = [line.first for line in self._lines]
-        return self.start + min([self._first, *firsts]) / self.rate
 
     def push(self, signals: Mapping[str, Real], valid: Mask | None = None) -> None:
         """Take samples.
@@ -144,23 +127,68 @@ class Lasting:
 
     def finish(self) -> None:
         """End a stretch: the signal ends, or a gap begins."""
-        rest = self._samples.shape[2]
-        if not self._windows and rest >= SHORTEST * self.rate:
-            self._follow(strong(self._samples, self.rate), rest)
-        for line in self._lines:
-            if line.found or line.windows == self._windows < WINDOWS:
-                self._add(line, self._first + rest)
-        self._lines, self._windows = [], 0
+        self._end(self._samples)
+        self._first += self._samples.shape[2]
         self._samples = self._samples[..., :0]
-        self._first += rest
 
     def _take(self, fresh: Array) -> None:
         held = self._samples if len(self._samples) == len(fresh) else fresh[..., :0]
         self._samples = np.concatenate((held, fresh), axis=2)
         while self._samples.shape[2] >= self._length:
-            self._follow(strong(self._samples[..., : self._length], self.rate), self._length)
+            self._window(self._samples[..., : self._length])
             self._samples = self._samples[..., self._hop :]
             self._first += self._hop
+
+    def _window(self, samples: Array) -> None:
+        """Take the next window of a stretch."""
+        raise NotImplementedError
+
+    def _end(self, rest: Array) -> None:
+        """End a stretch, of which a rest is in no window or in earlier ones."""
+        raise NotImplementedError
+
+
+class Lasting(Windows):
+    """Finds lines that last in signals that come in chunks of any size.
+
+    Args:
+        rate: Sample rate, in [Hz].
+        start: Time of the first sample, in [s].
+
+    Attributes:
+        examined: Windows that were examined; 0 where each stretch is shorter than ``SHORTEST``.
+    """
+
+    def __init__(self, rate: float, *, start: float = 0.0) -> None:
+        super().__init__(rate, WINDOW, HOP, start)
+        self._margin = round(MARGIN * rate)
+        self._windows = 0  # of the stretch
+        self.examined = 0
+        self._lines: list[Line] = []  # of the latest window
+        self._events: list[Event] = []
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Findings so far, in order of time."""
+        return tuple(self._events)
+
+    @property
+    def decided(self) -> float:
+        """Time before which no finding begins that is still to come, in [s]."""
+        firsts = [line.first for line in self._lines]
+        return self.start + min([self._first, *firsts]) / self.rate
+
+    def _window(self, samples: Array) -> None:
+        self._follow(strong(samples, self.rate), self._length)
+
+    def _end(self, rest: Array) -> None:
+        length = rest.shape[2]
+        if not self._windows and length >= SHORTEST * self.rate:
+            self._follow(strong(rest, self.rate), length)
+        for line in self._lines:
+            if line.found or line.windows == self._windows < WINDOWS:
+                self._add(line, self._first + length)
+        self._lines, self._windows = [], 0
 
     def _follow(self, peaks: list[tuple[int, float, float]], length: int) -> None:
         """Continue the lines of the window before with the peaks of the next one."""
