@@ -20,6 +20,7 @@ from inspector.live.drawing import Drawing
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
 from inspector.live.samples import (
     DROPPED,
+    SIGNALS,
     Clock,
     LiveError,
     SampleBuffer,
@@ -194,14 +195,9 @@ class LiveSession:
         received = clocks.perf_counter() if received is None else received
         if self._closed:
             raise LiveError("the session is closed; begin another one")
-        given = {
-            "velocity": velocity,
-            "velocity_desired": velocity_desired,
-            "position": position,
-            "base_velocity": base_velocity,
-            "base_pose": base_pose,
-        }
-        rows = rows_of({name: value for name, value in given.items() if value is not None})
+        given = (velocity, velocity_desired, position, base_velocity, base_pose)
+        named = zip(SIGNALS, given, strict=True)
+        rows = rows_of({name: values for name, values in named if values is not None})
         stamps = self._stamps(time, len(rows["velocity"]))
         if not len(stamps):
             return

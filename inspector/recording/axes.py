@@ -171,12 +171,11 @@ def log_beside(
     panel: Panel,
     left: Sequence[Label],
     right: Sequence[Label] | Scale,
-    unit: str = "dB",
 ) -> None:
     """Log what stands beside a panel: its title, names of rows, ticks, and labels or a scale."""
     log_labels(recording, panel, "left", left)
     if isinstance(right, Scale):
-        log_scale(recording, panel, right, unit)
+        log_scale(recording, panel, right)
     else:
         log_labels(recording, panel, "right", right)
 
