@@ -367,16 +367,21 @@ class Drawing:
         self._start: float | None = None  # time of the first sample
         self._camera: Camera | None = None
         self._full = False  # whether plots show the last ten seconds, not the first
-        self._plots = {
-            kind: _plots(kind, len(joint_names))
-            for kind in widths
-            if kind.removesuffix("_desired") in panels.UNITS
-        }
-        for kind, plots in self._plots.items():
-            desired = kind.endswith("_desired")
-            for path, columns in plots.items():
+        self._plots: dict[str, dict[str, slice]] = {}  # columns of each entity, by signal
+        self._titles: dict[str, list[str]] = {}  # entities of each plot
+        size = panels.JOINTS_PER_PLOT
+        for kind in widths:
+            measured, desired, _ = kind.partition("_desired")
+            if measured not in panels.UNITS:
+                continue
+            for number, first in enumerate(range(0, len(joint_names), size)):
+                path, columns = f"/joints/{measured}/{number}{desired}", slice(first, first + size)
+                which = f" {number + 1}" if len(joint_names) > size else ""
+                title = f"{measured}{which} [{panels.UNITS[measured]}]"
+                self._plots.setdefault(kind, {})[path] = columns
+                self._titles.setdefault(title, []).append(path)
                 names = [f"{name} desired" if desired else name for name in joint_names[columns]]
-                shades = colors.of_series(len(names), dim=desired)
+                shades = colors.of_series(len(names), dim=bool(desired))
                 style_lines(self._recording, path, names=names, colours=shades)
         self._style(classes)
 
@@ -576,15 +581,9 @@ class Drawing:
 
     def _signals(self, shown: Mapping[str, Any]) -> Part:
         """Plots of joint signals and of scores, behind each other."""
-        paths: dict[str, list[str]] = {}
-        for kind, plots in self._plots.items():
-            measured = kind.removesuffix("_desired")
-            for number, path in enumerate(plots, start=1):
-                which = f" {number}" if len(plots) > 1 else ""
-                paths.setdefault(f"{measured}{which} [{panels.UNITS[measured]}]", []).append(path)
         views = {
             title: unstable.plot(title, "/joints", own, legend=True, **shown)
-            for title, own in paths.items()
+            for title, own in self._titles.items()
         }
         if self._classes is not None:
             views["Scores"] = unstable.plot("Scores", SCORES, legend=True, **shown)
@@ -609,14 +608,3 @@ def _found(shown: Mask) -> Iterable[Any]:
     middles = axes.TOP * (1.0 - (np.arange(count) + (upper + lower) / 2) / count)
     bands = np.where(shown, middles, np.nan).repeat(unstable.COPIES, axis=1)
     return unstable.band_columns(bands, axes.TOP * (lower - upper) / 2 / count)
-
-
-def _plots(kind: str, joints: int) -> dict[str, slice]:
-    """The entities of a signal, each with the columns of eight joints."""
-    end = "_desired" if kind.endswith("_desired") else ""
-    return {
-        f"/joints/{kind.removesuffix('_desired')}/{first // panels.JOINTS_PER_PLOT}{end}": slice(
-            first, first + panels.JOINTS_PER_PLOT
-        )
-        for first in range(0, joints, panels.JOINTS_PER_PLOT)
-    }

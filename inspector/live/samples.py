@@ -115,7 +115,7 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
                 f"{name}: shape {array.shape}, expected (joints,) for one sample or"
                 " (samples, joints)"
             )
-        rows[name] = np.atleast_2d(array)
+        rows[name] = array if array.ndim == 2 else array.reshape(1, -1)
         if len(rows[name]) != len(rows["velocity"]):
             listed = ", ".join(f"{len(array)} of {name}" for name, array in rows.items())
             raise LiveError(f"samples differ in number: {listed}")
