@@ -28,9 +28,10 @@ Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 TEMPORARY = re.compile(r"\.noise-inspector-([0-9a-f]{8})?[0-9a-f]{8}")
 """Names of temporary files: with the machine, or without it for model files."""
+# Ages from which a temporary file is one of a process that was killed, in [s]: on any machine that
+# shares the folder, and on this one, whose locks are known.
 ABANDONED, ABANDONED_HERE = 86_400.0, 60.0
-"""Ages from which a temporary file is one of a process that was killed, in [s]: on any machine that
-shares the folder, and on this one, whose locks are known."""
+EXISTS = "{}: exists already; choose another name, or overwrite it (--overwrite)"
 
 LIMITS = MappingProxyType(
     {"joints": 1000, "columns": 10_000, "triangles": 2_000_000, "bodies": 20_000}
@@ -38,21 +39,11 @@ LIMITS = MappingProxyType(
 """Joints of a robot or a run, columns of a CSV log, triangles of a mesh, bodies and geoms of an
 MJCF."""
 
-PREFIX = "NOISE_LIMIT_"
-"""Of the environment variables with other limits: ``NOISE_LIMIT_JOINTS=2000``."""
-
-MAX_BYTES = 64 * 2**20
-"""Most bytes of a URDF or an MJCF."""
-
-MAX_DEPTH = 500
-"""Most elements of XML within each other, as MuJoCo has it too; parsers that recurse crash on
-more."""
-MAX_ATTRIBUTES = 200
-"""Most attributes of an element; Pinocchio compares each with all others."""
-
-DIGEST = 32
-"""Bytes after a cached archive that show whether it is whole, and was made by this user for its
-key."""
+PREFIX = "NOISE_LIMIT_"  # of environment variables with other limits: NOISE_LIMIT_JOINTS=2000
+MAX_BYTES = 64 * 2**20  # most bytes of a URDF or an MJCF
+MAX_DEPTH = 500  # most elements of XML within each other, as in MuJoCo; parsers that recurse crash
+MAX_ATTRIBUTES = 200  # most attributes of an element; Pinocchio compares each with all others
+DIGEST = 32  # bytes after a cached archive that show that it is whole, and this user's for its key
 
 
 _read: dict[Path, None] | None = None
@@ -111,7 +102,9 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     try:
         _lock(held)  # a live recording may wait for its next sample for days
         yield temporary
-        _place(temporary, path, overwrite=overwrite)
+        if not overwrite:
+            _claim(temporary, path)
+        temporary.replace(path)  # which does nothing where both are one file
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
@@ -120,11 +113,7 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
 
 
 def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
-    """Refuse an output before long work is done for it.
-
-    Args:
-        overwrite: Whether a file that exists may be replaced.
-    """
+    """Refuse an output before long work is done for it, unless it may replace what exists."""
     path = Path(path)
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; name a file")
@@ -132,7 +121,7 @@ def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
         raise OutputError(f"{path}: is no regular file; name one")
     refuse_read(path)
     if path.exists() and not overwrite:
-        raise _exists(path)
+        raise OutputError(EXISTS.format(path))
     if not path.parent.is_dir():
         raise OutputError(f"{path}: cannot be written (No such file or directory: {path.parent})")
 
@@ -148,26 +137,17 @@ def _lock(file: int) -> bool:
     return True
 
 
-def _place(temporary: Path, path: Path, *, overwrite: bool) -> None:
-    """Give a file its final name, which another process may have taken since it was checked."""
-    if not overwrite:
+def _claim(temporary: Path, path: Path) -> None:
+    """Take a file's final name, which another process may have taken since it was checked."""
+    try:
         try:
             os.link(temporary, path)
-            return
         except FileExistsError:
-            raise _exists(path) from None
-        except OSError:  # a file system without hard links: the name is claimed by an empty file
-            try:
-                path.open("xb").close()
-            except FileExistsError:
-                raise _exists(path) from None
-    temporary.replace(path)
-
-
-def _exists(path: Path) -> OutputError:
-    return OutputError(
-        f"{path}: exists already; choose another name, or overwrite it (--overwrite)"
-    )
+            raise
+        except OSError:  # a file system without hard links: an empty file claims the name
+            path.open("xb").close()
+    except FileExistsError:
+        raise OutputError(EXISTS.format(path)) from None
 
 
 @cache
@@ -178,8 +158,12 @@ def _sweep(folder: Path) -> None:
             if found := TEMPORARY.fullmatch(entry.name):
                 age = ABANDONED_HERE if found[1] == _machine() else ABANDONED
                 with suppress(OSError):
-                    if time.time() - entry.stat().st_mtime > age and _is_left(entry.path):
-                        Path(entry.path).unlink()
+                    if time.time() - entry.stat().st_mtime <= age:
+                        continue
+                    file = os.open(entry.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+                    with os.fdopen(file):
+                        if _lock(file):  # no process holds it
+                            Path(entry.path).unlink()
 
 
 @cache
@@ -190,15 +174,6 @@ def _machine() -> str:
     except OSError:
         name = platform.node()
     return hashlib.sha256(name.encode()).hexdigest()[:8]
-
-
-def _is_left(path: str) -> bool:
-    """Whether no process holds a temporary file."""
-    file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    try:
-        return _lock(file)
-    finally:
-        os.close(file)
 
 
 def limit(name: str) -> int:
@@ -253,8 +228,7 @@ def parsed_xml(text: bytes) -> ET.Element:
         depth -= 1
 
     parser.StartDoctypeDeclHandler = refuse
-    parser.StartElementHandler = enter
-    parser.EndElementHandler = leave
+    parser.StartElementHandler, parser.EndElementHandler = enter, leave
     try:
         parser.Parse(text, True)
         return ET.fromstring(text)  # noqa: S314

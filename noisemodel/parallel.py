@@ -28,16 +28,11 @@ Result = TypeVar("Result")
 Jobs: TypeAlias = int | str
 """How many items to work on at once in this machine, or the address of a Dask scheduler."""
 
-FRESH = 3.0
-"""Work in [s] below which two fresh interpreters are not faster than this one alone."""
-POLL = 0.5
-"""Time after which a worker looks whether its parent is still there, in [s]."""
-REACHED, STAFFED = 10.0, 60.0
-"""Time in which a Dask scheduler has to answer, and in which it needs a worker, in [s]."""
-SOFTWARE = ("noise-inspector", "numpy")
-"""Packages whose versions have to be the client's, so that results are the same."""
-DIED = "the worker died, of lack of memory or a crash"
-"""What there is to say of an item with which a worker died."""
+FRESH = 3.0  # work in [s] below which two fresh interpreters are not faster than this one alone
+POLL = 0.5  # time after which a worker looks whether its parent is still there, in [s]
+REACHED, STAFFED = 10.0, 60.0  # in [s]: until a Dask scheduler answers, and until it has a worker
+SOFTWARE = ("noise-inspector", "numpy")  # of the client's versions, so that results are the same
+DIED = "the worker died, of lack of memory or a crash"  # what to say of an item that ended a worker
 
 
 def in_order(
@@ -82,8 +77,8 @@ def as_done(
     jobs = min(jobs, len(items))
     if jobs < 2 or work < FRESH:
         yield from enumerate(map(function, items))
-        return
-    yield from _in_processes(function, items, died, jobs)
+    else:
+        yield from _in_processes(function, items, died, jobs)
 
 
 def _on_cluster(

@@ -25,11 +25,10 @@ from noisemodel.types import Array, Mask, RunError, UnknownJointError, hint
 Values: TypeAlias = ArrayLike | Mapping[str, float]
 
 WIDTHS = {"base_pose": 7, "base_velocity": 6, "time": 1}
-GAP = 5.0
-"""Length of a step, in median ones, above which it is a gap."""
-
-NEAR = 0.05
-"""Largest relative difference of the stamps' rate from the recorder's, which replaces it."""
+GAP = 5.0  # length of a step, in median ones, above which it is a gap
+NEAR = (
+    0.05  # largest relative difference of the stamps' rate from the recorder's, which replaces it
+)
 
 
 class Recorder:
@@ -130,9 +129,7 @@ class Recorder:
             "base_velocity": base_velocity,
             "time": None if time is None else [time],
         }
-        rows = {
-            name: self._row(name, values) for name, values in given.items() if values is not None
-        }
+        rows = {name: self._row(name, each) for name, each in given.items() if each is not None}
         self._check(rows)
         for name, row in rows.items():
             self._values.setdefault(name, array("d")).frombytes(row.tobytes())
@@ -170,20 +167,11 @@ class Recorder:
         fields: dict[str, Any] = dict(filled)
         if differentiated:
             meta["differentiated"] = differentiated
-        return Run(
-            **fields,
-            joint_names=self._joints,
-            desired_joint_names=self._desired,
-            robot=self._robot,
-            meta=meta,
-        )
+        names: dict[str, Any] = {"joint_names": self._joints, "desired_joint_names": self._desired}
+        return Run(**fields, **names, robot=self._robot, meta=meta)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the run of the samples so far, for ``inspector view`` and the like.
-
-        Args:
-            path: The file to write.
-            overwrite: Whether a file that exists may be replaced.
 
         Raises:
             RunError: As ``run``.
@@ -201,10 +189,9 @@ class Recorder:
         traceback: TracebackType | None,
     ) -> None:
         """Save the samples so far; an error of the loop hides an error of saving."""
-        if self._path is None:
-            return
         try:
-            self.save(self._path, overwrite=True)
+            if self._path is not None:
+                self.save(self._path, overwrite=True)
         except RunError:
             if error is None:
                 raise
@@ -251,13 +238,11 @@ class Recorder:
             for name in sorted(self._values.keys() ^ rows.keys()):
                 how = "missing" if name in self._values else "new"
                 raise RunError(f"{name}: {how} in sample {sample}; push it each time or never")
-            if "time" in rows:
-                before, now = self._values["time"][-1], rows["time"][0]
-                if now <= before:
-                    how = "stands still" if now == before else "runs backwards"
-                    raise RunError(
-                        f"time: {how} in sample {sample} ({before:.9g} s, then {now:.9g} s)"
-                    )
+        if self._count and "time" in rows:
+            before, now = self._values["time"][-1], rows["time"][0]
+            if now <= before:
+                how = "stands still" if now == before else "runs backwards"
+                raise RunError(f"time: {how} in sample {sample} ({before:.9g} s, then {now:.9g} s)")
 
     def _uniform(
         self, stamps: Array, valid: Mask, signals: dict[str, Array], meta: dict[str, Any]

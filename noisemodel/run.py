@@ -21,43 +21,28 @@ from noisemodel.runfile import OnDemand, either_way, pieces, rows_at_once
 from noisemodel.types import Array, Mask, Real, RunError, RunFileError
 
 SAMPLED = (
-    "time",
-    "velocity",
-    "position",
-    "velocity_desired",
-    "position_desired",
-    "effort",
-    "valid",
-    "base_pose",
-    "base_velocity",
+    *("time", "velocity", "position", "velocity_desired", "position_desired"),
+    *("effort", "valid", "base_pose", "base_velocity"),
 )
 """The fields of a run that hold a row or a value for each sample; ``stages`` hold such fields."""
 
 MOTION = ("velocity", "velocity_desired", "effort", "base_velocity")
 """The fields of a run that a classifier takes signals of."""
 
-ROBOT_FILES = (".urdf", ".xml", ".mjcf")
-"""How the names of files that describe robots end."""
-
+ROBOT_FILES = (".urdf", ".xml", ".mjcf")  # how the names of files that describe robots end
 UNIFORM = 1e-3
 """How far a time step may lie from the median step, as a share of it (run file, version 1)."""
 
-SHORTEST, LONGEST = 1e-9, 1e9
-"""Steps of time that a run may have, in [s]."""
-
-LATEST = 9e9
-"""Times of a run lie closer to 0, in [s]: 285 years, what nanoseconds in 64 bits can count."""
-
-LARGEST = 1e15
-"""Signals are smaller: the squares of much larger ones overflow, and no robot has such."""
+SHORTEST, LONGEST = 1e-9, 1e9  # steps of time that a run may have, in [s]
+LATEST = 9e9  # largest time, in [s]: 285 years, what nanoseconds in 64 bits can count
+LARGEST = 1e15  # signals are smaller: squares of much larger ones overflow, and no robot has such
 
 WINDOW, ORDER = 7, 3
 METHOD = f"Savitzky-Golay, window {WINDOW}, order {ORDER}"
 SOURCES = {"velocity": "position", "velocity_desired": "position_desired"}
 """The joint velocities and the positions that each can be differentiated from."""
 
-EDGE = 10
-"""Samples at the lower rate that the low-pass filter of `decimated` reaches to either side."""
+EDGE = 10  # samples at the lower rate that the filter of `decimated` reaches to either side
 
 
 class NotUniformError(RunError):
@@ -220,16 +205,12 @@ class Run:
                 f"{max(0, last - first)} samples from {start:g} s to {stop:g} s, expected 2 at"
                 f" least; the run has {self.time[0]:g} s to {self.time[-1]:g} s"
             )
+        begin = float(self.time[first])
         clipped = [
-            Block(
-                float(self.time[first]) if block.start < start else block.start,
-                min(block.stop, stop),
-                block.label,
-            )
-            for block in self.blocks
+            replace(b, start=begin if b.start < start else b.start, stop=min(b.stop, stop))
+            for b in self.blocks
         ]
-        blocks = tuple(block for block in clipped if block.start < block.stop)
-        return part(self, first, last, blocks=blocks)
+        return part(self, first, last, blocks=tuple(b for b in clipped if b.start < b.stop))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the run as a run file, whole or not at all.
@@ -242,7 +223,24 @@ class Run:
             OutputError: If the file exists or cannot be written.
         """
         path = Path(path)
-        runfile.write(path, _arrays(self, folder=path.parent), overwrite=overwrite)
+        arrays: dict[str, Any] = {
+            "format": runfile.FORMAT,
+            "time": self.time,
+            "joint_names": np.array(self.joint_names, dtype=str),
+            **{name: signal for name, signal, _ in self._signals()},
+            "meta": json.dumps(dict(self.meta), sort_keys=True),
+        }
+        if self.desired_joint_names != self.joint_names:
+            arrays["desired_joint_names"] = np.array(self.desired_joint_names, dtype=str)
+        if not self.mask.all():
+            arrays["valid"] = self.mask
+        if self.robot is not None:
+            moves = is_robot_file(self.robot) and not Path(self.robot).is_absolute()
+            arrays["robot"] = os.path.relpath(self.robot, path.parent) if moves else self.robot
+        if self.blocks:
+            for name in ("start", "stop", "label"):
+                arrays[f"block_{name}"] = np.array([getattr(each, name) for each in self.blocks])
+        runfile.write(path, arrays, overwrite=overwrite)
 
     @classmethod
     def load(cls, path: str | Path, *, on_demand: bool = False) -> Self:
@@ -254,8 +252,7 @@ class Run:
             on_demand: Whether signals of 64 MB or more stay in the file. Their rows are read where
                 they are sliced; whatever else is done with them reads them whole.
 
-        Returns:
-            The run; what was differentiated is listed under ``differentiated`` in its ``meta``.
+        What was differentiated is listed under ``differentiated`` in the ``meta`` of the run.
 
         Raises:
             RunFileError: If the file is no run file, or holds a run that is wrong.
@@ -293,19 +290,16 @@ def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
     The pieces have the rate and the names of the run, and the fields ``MOTION`` alone. They are not
     checked again: one may be a gap alone. ``samples`` is their length, megabytes unless given.
     """
-    whole: dict[str, Any] = {
-        **{name: getattr(run, name) for name in ("joint_names", "desired_joint_names")},
-        **{name: getattr(run, name) for name in ("robot", "meta", "rate")},
-        "stages": MappingProxyType({}),
-        "blocks": (),
-    }
-    motion = {name: getattr(run, name) for name in ("time", *MOTION)} | {"valid": run.mask}
+    names = ("joint_names", "desired_joint_names", "robot", "meta", "rate")
+    whole = dict.fromkeys(SAMPLED) | {name: getattr(run, name) for name in names}
+    whole |= {"stages": MappingProxyType({}), "blocks": ()}
+    motion = {name: getattr(run, name) for name in ("time", "valid", *MOTION)}
     size = samples or rows_at_once(run.motion)
     for first in range(0, len(run.time), size):
         rows = slice(first, first + size)
         fields = {name: None if each is None else each[rows] for name, each in motion.items()}
         piece: Run = object.__new__(Run)
-        vars(piece).update(dict.fromkeys(SAMPLED) | whole | fields)
+        vars(piece).update(whole | fields)
         yield piece
 
 
@@ -324,38 +318,13 @@ def is_robot_file(name: str) -> bool:
     return name.lower().endswith(ROBOT_FILES)
 
 
-# The run file: a run as arrays, and back.
-
-
-def _arrays(run: Run, *, folder: Path) -> dict[str, Any]:
-    signals = {name: signal for name, signal, _ in run._signals()}
-    arrays = {
-        "format": runfile.FORMAT,
-        "time": run.time,
-        "joint_names": np.array(run.joint_names, dtype=str),
-        **signals,
-        "meta": json.dumps(dict(run.meta), sort_keys=True),
-    }
-    if run.desired_joint_names != run.joint_names:
-        arrays["desired_joint_names"] = np.array(run.desired_joint_names, dtype=str)
-    if not run.mask.all():
-        arrays["valid"] = run.mask
-    if run.robot is not None:
-        moves = is_robot_file(run.robot) and not Path(run.robot).is_absolute()
-        arrays["robot"] = os.path.relpath(run.robot, folder) if moves else run.robot
-    if run.blocks:
-        arrays["block_start"] = np.array([block.start for block in run.blocks])
-        arrays["block_stop"] = np.array([block.stop for block in run.blocks])
-        arrays["block_label"] = np.array([block.label for block in run.blocks])
-    return arrays
+# What a run file and a run have in common.
 
 
 def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, Any]:
-    signals = {
-        name: array
-        for name, array in arrays.items()
-        if "samples" in runfile.ARRAYS.get(name, ("", ()))[1]
-    }
+    """What makes a `Run` of the arrays of a run file in a folder."""
+    sampled = (name for name in arrays if "samples" in runfile.ARRAYS.get(name, ("", ()))[1])
+    signals = {name: arrays[name] for name in sampled}
     if "time" not in signals:
         raise RunError(f"array 'time' is missing; the file has {', '.join(arrays) or 'nothing'}")
     if "velocity" not in signals and "position" not in signals:
@@ -367,7 +336,7 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
     if "valid" in signals:
         check_valid(signals["valid"], len(signals["time"]))
     signals, differentiated = with_velocities(signals)
-    meta = _meta(arrays)
+    meta = _meta(str(arrays.get("meta", "{}")))
     if differentiated:
         meta["differentiated"] = differentiated
     velocity = signals["velocity"]
@@ -376,33 +345,28 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
         joints = len(velocity)  # transposed, which the error states
     unnamed = [f"joint{number + 1}" for number in range(joints)]
     robot = str(arrays.get("robot", ""))
-    return {
-        **signals,
-        "joint_names": tuple(map(str, arrays.get("joint_names", unnamed))),
-        "desired_joint_names": tuple(map(str, arrays.get("desired_joint_names", ()))),
-        "stages": {
-            name.removeprefix(runfile.STAGE): array
-            for name, array in arrays.items()
-            if name.startswith(runfile.STAGE)
-        },
-        "robot": str(folder / robot) if is_robot_file(robot) else robot or None,
-        "blocks": _blocks(arrays),
-        "meta": meta,
-    }
-
-
-def _blocks(arrays: Mapping[str, NDArray[Any]]) -> tuple[Block, ...]:
     columns = [arrays.get(f"block_{name}", np.empty(0)) for name in ("start", "stop", "label")]
     if len({column.shape for column in columns}) > 1:
         shapes = ", ".join(str(column.shape) for column in columns)
         raise RunError(f"block_start, block_stop and block_label have shapes {shapes}")
-    rows = zip(*columns, strict=True)
-    return tuple(Block(float(start), float(stop), str(label)) for start, stop, label in rows)
+    stages = [name for name in arrays if name.startswith(runfile.STAGE)]
+    return {
+        **signals,
+        "joint_names": tuple(map(str, arrays.get("joint_names", unnamed))),
+        "desired_joint_names": tuple(map(str, arrays.get("desired_joint_names", ()))),
+        "stages": {name.removeprefix(runfile.STAGE): arrays[name] for name in stages},
+        "robot": str(folder / robot) if is_robot_file(robot) else robot or None,
+        "blocks": tuple(
+            Block(float(a), float(b), str(c)) for a, b, c in zip(*columns, strict=True)
+        ),
+        "meta": meta,
+    }
 
 
-def _meta(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+def _meta(text: str) -> dict[str, Any]:
+    """The JSON object that a run file has as meta."""
     try:
-        meta = json.loads(str(arrays.get("meta", "{}")))
+        meta = json.loads(text)
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else error
         raise RunError(f"meta: not JSON ({reason})") from error
@@ -470,8 +434,7 @@ def check_names(array: str, names: Sequence[str]) -> None:
     check_words(array, names)
     if len(names) > limit("joints"):
         raise RunError(f"{array}: {len(names)} joints, {beyond('joints')}")
-    twice = sorted(name for name, count in Counter(names).items() if count > 1)
-    if twice:
+    if twice := sorted(name for name, count in Counter(names).items() if count > 1):
         raise RunError(f"{array}: {', '.join(twice)} named twice")
 
 
@@ -503,9 +466,8 @@ def check_signal(name: str, signal: Real, shape: tuple[int, int]) -> None:
 def check_valid(valid: Mask, samples: int) -> None:
     """Refuse a mask that is not one boolean per sample, or that leaves nothing."""
     if valid.dtype != np.bool_ or valid.shape != (samples,):
-        raise RunError(
-            f"valid: shape {valid.shape} of {valid.dtype}, expected {(samples,)} of bool"
-        )
+        given = f"shape {valid.shape} of {valid.dtype}"
+        raise RunError(f"valid: {given}, expected {(samples,)} of bool")
     if not valid.any():
         raise RunError("valid: false in every sample, no sample is left")
 
@@ -514,15 +476,13 @@ def check_blocks(blocks: Sequence[Block], time: Array) -> None:
     """Refuse blocks that are empty, lie outside of the run or overlap."""
     check_words("block_label", (block.label for block in blocks))
     step = (time[-1] - time[0]) / (len(time) - 1)
-    for block in blocks:
-        if not block.start < block.stop:
+    for start, stop, label in ((each.start, each.stop, each.label) for each in blocks):
+        if not start < stop:
+            raise RunError(f"block {label!r}: starts at {start:.6g} s, stops at {stop:.6g} s")
+        if start < time[0] - step or stop > time[-1] + 2 * step:
             raise RunError(
-                f"block {block.label!r}: starts at {block.start:.6g} s, stops at {block.stop:.6g} s"
-            )
-        if block.start < time[0] - step or block.stop > time[-1] + 2 * step:
-            raise RunError(
-                f"block {block.label!r}: {block.start:.6g} s to {block.stop:.6g} s lies outside of"
-                f" the run, {time[0]:.6g} s to {time[-1]:.6g} s"
+                f"block {label!r}: {start:.6g} s to {stop:.6g} s lies outside of the run,"
+                f" {time[0]:.6g} s to {time[-1]:.6g} s"
             )
     for before, after in pairwise(blocks):
         if after.start < before.stop - step:
@@ -564,8 +524,7 @@ def with_velocities(
         check_signal("base_pose", pose, (len(time), 7))
         check_quaternions(pose, valid)
         filled["base_velocity"] = base_velocity(time, pose, valid)
-    how = {name: METHOD for name in filled if name not in signals}
-    return filled, how
+    return filled, {name: METHOD for name in filled if name not in signals}
 
 
 def joint_velocity(time: Array, position: Real, valid: Mask | None = None) -> Array:
@@ -575,11 +534,9 @@ def joint_velocity(time: Array, position: Real, valid: Mask | None = None) -> Ar
     and in stretches of a single sample.
     """
     step = median_step(time)
-
-    def slope(values: Real) -> Array:
-        return _slope(np.unwrap(values.astype(np.float64), axis=0), step)
-
-    return _by_stretch(slope, position, position.shape[1], valid)
+    return _by_stretch(
+        lambda values: _slope(np.unwrap(values, axis=0), step), position, position.shape[1], valid
+    )
 
 
 def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
@@ -588,11 +545,24 @@ def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
     ``pose`` is x, y, z and quaternion x, y, z, w, shape (samples, 7); gaps as in `joint_velocity`.
     """
     step = median_step(time)
-    return _by_stretch(lambda values: _body_twist(values.astype(np.float64), step), pose, 6, valid)
+
+    def twist(pose: Array) -> Array:
+        quaternion = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
+        quaternion = continuous_quaternions(quaternion)
+        vector, scalar = quaternion[:, :3], quaternion[:, 3:]
+        rate = _slope(quaternion, step)
+        # omega = 2 vec(conj(q) q_dot), v = R(q)^T p_dot
+        angular = 2 * (scalar * rate[:, :3] - vector * rate[:, 3:] - np.cross(vector, rate[:, :3]))
+        world = _slope(pose[:, :3], step)
+        across = 2 * np.cross(-vector, world)
+        linear = world + scalar * across + np.cross(-vector, across)
+        return np.hstack((linear, angular))
+
+    return _by_stretch(twist, pose, 6, valid)
 
 
 def _by_stretch(
-    derivative: Callable[[Real], Array], signal: Real, width: int, valid: Mask | None
+    derivative: Callable[[Array], Array], signal: Real, width: int, valid: Mask | None
 ) -> Array:
     """Derivative of each stretch between gaps, on demand of a signal on demand."""
 
@@ -602,23 +572,10 @@ def _by_stretch(
         values, around = signal[low:high], None if valid is None else valid[low:high]
         found = np.zeros((high - low, width))
         for stretch in stretches(around, len(found)):
-            found[stretch] = derivative(values[stretch])
+            found[stretch] = derivative(values[stretch].astype(np.float64))
         return found[first - low : stop - low]
 
     return either_way((signal,), (len(signal), width), rows)
-
-
-def _body_twist(pose: Array, step: float) -> Array:
-    quaternion = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
-    quaternion = continuous_quaternions(quaternion)
-    vector, scalar = quaternion[:, :3], quaternion[:, 3:]
-    rate = _slope(quaternion, step)
-    # omega = 2 vec(conj(q) q_dot), v = R(q)^T p_dot
-    angular = 2 * (scalar * rate[:, :3] - vector * rate[:, 3:] - np.cross(vector, rate[:, :3]))
-    world = _slope(pose[:, :3], step)
-    across = 2 * np.cross(-vector, world)
-    linear = world + scalar * across + np.cross(-vector, across)
-    return np.hstack((linear, angular))
 
 
 def continuous_quaternions(quaternion: Array) -> Array:
@@ -666,13 +623,14 @@ def resample(
     reached = np.zeros(len(instants), dtype=bool)
     for stretch in between or [slice(0, len(stamps))]:
         known = stamps[stretch]
-        if len(known) > 1:
-            first = int(np.searchsorted(instants, known[0] - slack))
-            stop = int(np.searchsorted(instants, known[-1] + slack, side="right"))
-            if first < stop:
-                curve = PchipInterpolator(known, values[stretch], axis=0)
-                found[first:stop] = curve(instants[first:stop])
-                reached[first:stop] = True
+        if len(known) < 2:
+            continue
+        first = int(np.searchsorted(instants, known[0] - slack))
+        stop = int(np.searchsorted(instants, known[-1] + slack, side="right"))
+        if first < stop:
+            curve = PchipInterpolator(known, values[stretch], axis=0)
+            found[first:stop] = curve(instants[first:stop])
+            reached[first:stop] = True
     return found, reached
 
 
@@ -712,11 +670,11 @@ def decimated(run: Run, rate: float) -> Run:
         if (signal := getattr(run, name)) is not None:
             fields[name] = _lower(signal, ratio)
     lower = fields["velocity"]
-    fields["velocity"] = either_way(
-        (lower,),
-        lower.shape,
-        lambda first, stop: np.where(valid[first:stop, None], lower[first:stop], 0.0),
-    )
+
+    def silent_in_gaps(first: int, stop: int) -> Array:
+        return np.where(valid[first:stop, None], lower[first:stop], 0.0)
+
+    fields["velocity"] = either_way((lower,), lower.shape, silent_in_gaps)
     fields["stages"] = {name: _lower(stage, ratio) for name, stage in run.stages.items()}
     return replace(run, time=time, valid=valid, **fields)
 

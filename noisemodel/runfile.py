@@ -49,29 +49,20 @@ ARRAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "meta": ("U", ()),
 }
 """The arrays of a run file: the kind of number or text that each holds, and its axes."""
-
 STAGE_ARRAY = ("f", ("samples", "joints"))
 KIND_WORDS = {"f": "numbers", "b": "booleans", "U": "text"}
 
-COMPRESSIBLE = 0.8
-"""Arrays are compressed if that leaves less than this share of their size."""
+COMPRESSIBLE = 0.8  # arrays are compressed if that leaves less than this share of their size
 STRETCH, STRETCHES = 4096, 16
 """Bytes of a stretch on which compression is tried, and how many there are."""
 
-LARGE = 2**26
-"""Bytes from which an array can stay in the file."""
-
-AT_ONCE = 2**23
-"""Bytes of an array that are read at once."""
-
+LARGE = 2**26  # bytes from which an array can stay in the file
+AT_ONCE = 2**23  # bytes of an array that are read at once
 MAX_UNPACKED = "NOISE_MAX_UNPACKED"
 """Environment variable with another limit than ``UNPACKED``, in bytes."""
 
-UNPACKED = 512 * 2**20
-"""Bytes that any compressed file may unpack to."""
-
-RATIO = 20
-"""A large file may unpack to so many times its own size; the numbers of logs hardly shrink."""
+UNPACKED = 512 * 2**20  # bytes that any compressed file may unpack to
+RATIO = 20  # a large file may unpack to so many times its size; the numbers of logs hardly shrink
 
 DAMAGE = (
     *(EOFError, MemoryError, RuntimeError, UnicodeDecodeError),
@@ -80,17 +71,11 @@ DAMAGE = (
 """What zipfile and NumPy raise on archives that are broken, encrypted, of a kind that zipfile does
 not read, or state a wrong size."""
 
-TEXT = 64 * 2**20
-"""Most bytes of a text that is read at once."""
-
-PIECE = 2**20
-"""Bytes that are unpacked at once."""
-
-MARKS = 256
-"""Places of a packed array from which it can be unpacked again, each of about 45 KB."""
-
+TEXT = 64 * 2**20  # most bytes of a text that is read at once
+PIECE = 2**20  # bytes that are unpacked at once
+MARKS = 256  # places of a packed array from which it can be unpacked again, each of about 45 KB
+# NumPy's; zipfile has others, which unpack a few bytes to gigabytes at once.
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""Those of NumPy; others of zipfile unpack a few bytes to gigabytes at once."""
 
 
 class ArchiveError(ValueError):
@@ -106,10 +91,9 @@ class ObjectArrayError(ArchiveError):
 
 
 def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
-    """Read the arrays of a run file; integers become floating-point where numbers are expected.
+    """Read the arrays of a run file, of which large ones may stay in the file, see `OnDemand`.
 
-    Args:
-        on_demand: Whether large arrays stay in the file, see `OnDemand`.
+    Integers become floating-point where numbers are expected.
     """
     try:
         for name in names_in(path):
@@ -146,15 +130,16 @@ def _unread(path: Path, error: OSError | ArchiveError) -> RunFileError:
 
 def _reading(path: Path, array: Any) -> Any:
     """An array that raises RunFileError where it is read from the file."""
+    if not isinstance(array, OnDemand):
+        return array
 
     def rows(first: int, stop: int) -> NDArray[Any]:
         try:
-            found: NDArray[Any] = array.read(first, stop)
+            return array.read(first, stop)
         except (OSError, ArchiveError) as error:
             raise _unread(path, error) from error
-        return found
 
-    return OnDemand(array.shape, array.dtype, rows) if isinstance(array, OnDemand) else array
+    return OnDemand(array.shape, array.dtype, rows)
 
 
 def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
@@ -193,23 +178,16 @@ def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
 def _shrinks(array: Any) -> bool:
     """Whether compression pays, tried on some stretches that are spread over an array."""
     data = np.atleast_1d(array).ravel(order="K").view(np.uint8)
-    starts = np.linspace(0, max(0, len(data) - STRETCH), STRETCHES).astype(int)
-    tried = b"".join(data[start : start + STRETCH].tobytes() for start in starts.tolist())
+    starts = np.linspace(0, max(0, len(data) - STRETCH), STRETCHES).astype(int).tolist()
+    tried = b"".join(data[start : start + STRETCH].tobytes() for start in starts)
     return len(zlib.compress(tried, 1)) < COMPRESSIBLE * len(tried)
 
 
 class OnDemand(NDArrayOperatorsMixin):
-    """An array whose rows are read when they are needed.
+    """An array whose rows are read when they are needed: ``read`` has the first and the last + 1.
 
     It can stand in for a NumPy array. Slices and indices of rows read these; whatever else is done
-    with it reads it whole, once, and keeps it in memory.
-
-    Args:
-        shape: Its shape, rows first.
-        read: Reads rows from a first one up to the one after the last.
-
-    Attributes:
-        checked: Whether its values were checked; they are not checked again.
+    with it reads it whole, once, and keeps it in memory. What is ``checked`` once is not again.
     """
 
     def __init__(
@@ -243,15 +221,15 @@ class OnDemand(NDArrayOperatorsMixin):
         """Rows by their indices, the file being read once if these rise."""
         found = np.empty((len(rows), *self.shape[1:]), self.dtype)
         rows = np.where(rows < 0, rows + len(self), rows)
-        size = rows_at_once(self)
         first = 0
         while first < len(rows):
+            ahead = rows[first:] - rows[first]
+            outside = (ahead < 0) | (ahead >= rows_at_once(self))
+            chosen = ahead[: int(outside.argmax()) if outside.any() else None]
             low = int(rows[first])
-            outside = np.flatnonzero((rows[first:] < low) | (rows[first:] >= low + size))
-            stop = first + int(outside[0]) if len(outside) else len(rows)
-            chosen = rows[first:stop] - low
-            found[first:stop] = self.read(low, low + int(chosen.max()) + 1)[chosen]
-            first = stop
+            piece = self.read(low, low + int(chosen.max()) + 1)[chosen]
+            found[first : first + len(piece)] = piece
+            first += len(piece)
         return found
 
     def astype(self, dtype: Any, **_: Any) -> "OnDemand":
@@ -315,11 +293,11 @@ def read_npz(
             name = member.filename.removesuffix(".npy")
             if names is None or name in names:
                 with archive.open(member) as stream:
-                    large = member.file_size > on_demand
-                    kept: Any = _kept(path, stream, name, member) if large else None
-                    if kept is None:
-                        kept = read_array(stream, name, member.file_size)
-                    found[name] = kept
+                    kept = (
+                        _kept(path, stream, name, member) if member.file_size > on_demand else None
+                    )
+                    whole = kept is None
+                    found[name] = read_array(stream, name, member.file_size) if whole else kept
     return found
 
 
@@ -383,11 +361,10 @@ def _kept(path: Path, stream: IO[bytes], name: str, info: zipfile.ZipInfo) -> On
 
 
 class _Member:
-    """The bytes of a member of an archive, from any place.
+    """The bytes of a member of an archive, from any place; the file is opened for each piece.
 
-    The file is opened for each piece. What is packed is unpacked from the last mark before the
-    piece: a state of the decompressor, kept every so many bytes. The checksum is compared once the
-    member was read in order.
+    What is packed is unpacked from the last mark before the piece: a state of the decompressor,
+    kept every so many bytes. The checksum is compared once the member was read in order.
     """
 
     def __init__(self, path: Path, name: str, info: zipfile.ZipInfo) -> None:
