@@ -26,23 +26,13 @@ Mesh: TypeAlias = tuple[Array, Indices]
 Named: TypeAlias = Mapping[str, ET.Element]
 """Elements by the address that others call them: # and their id."""
 
-VERSION = 1
-"""Version of the code that reads triangles; to be raised with every change of its results."""
-
-TRIANGLE_BYTES = 134
-"""Most bytes of a file by triangle that it may have: more than a binary STL has, 256 MiB in all."""
-
-TAIL = 1024
-"""Bytes at the end of a file among which its closing word is."""
-
-HEADER = 84
-"""Bytes before the facets of a binary STL, the last four of them their number."""
-
+VERSION = 1  # of the code that reads triangles; to be raised with every change of its results
+TRIANGLE_BYTES = 134  # most bytes of a file by triangle: more than a binary STL has, 256 MiB in all
+TAIL = 1024  # bytes at the end of a file among which its closing word is
+HEADER = 84  # bytes before the facets of a binary STL, the last four of them their number
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
-MAX_NODES = 10_000
-"""Nodes of a COLLADA scene, instances of instances counted each: they double with each level."""
-
+MAX_NODES = 10_000  # of a COLLADA scene, each instance counted: they may double with each level
 WITHOUT_SURFACE = {"source", "vertices", "lines", "linestrips", "extra"}
 
 
@@ -109,8 +99,7 @@ def _kept(what: str, path: Path, data: bytes, make: Callable[[], Mesh]) -> Array
         return {"points": points, "faces": faces.astype(np.int32)}
 
     kept = cached(f"{what}-{VERSION}-{path.suffix.lower()[1:]}-{content}", arrays)
-    triangles: Array = kept["points"][kept["faces"]]
-    return triangles
+    return np.asarray(kept["points"][kept["faces"]])
 
 
 def _parsed(path: Path, data: bytes) -> Mesh:
@@ -212,8 +201,7 @@ def _collada(data: bytes) -> Mesh:
     }
     scene = _target(named, _child(root, "scene/{*}instance_visual_scene"))
     points, faces = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
-    count = 0
-    triangles = 0
+    count = triangles = 0
     for placed, corners in _instances(named, scene, np.eye(4), iter(range(MAX_NODES))):
         points.append(placed)
         faces.append(corners + count)
@@ -259,21 +247,16 @@ def _transform(node: ET.Element) -> Array:
                 part[:3, 3] = _numbers(element)
             case "scale":
                 part[:3, :3] = np.diag(_numbers(element))
-            case "rotate":
+            case "rotate":  # Rodrigues
                 *axis, degrees = _numbers(element)
-                part[:3, :3] = _rotation(np.array(axis), np.deg2rad(degrees))
+                angle, (x, y, z) = np.deg2rad(degrees), np.array(axis) / np.linalg.norm(axis)
+                cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+                part[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
             case "lookat" | "skew" as word:
                 raise ValueError(f"it has a <{word}>, which is not supported")
         with np.errstate(over="ignore", invalid="ignore"):
             whole = whole @ part
     return whole
-
-
-def _rotation(axis: Array, angle: float) -> Array:
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    turn: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    return turn  # Rodrigues
 
 
 def _geometry(named: Named, geometry: ET.Element) -> Iterator[Mesh]:

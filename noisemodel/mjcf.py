@@ -28,15 +28,7 @@ import numpy as np
 
 from noisemodel.files import beyond, limit, read_xml
 from noisemodel.types import Array, RobotError
-from noisemodel.urdf import (
-    HINT,
-    LinkShape,
-    Mimic,
-    box,
-    capsule,
-    cylinder,
-    sphere,
-)
+from noisemodel.urdf import HINT, LinkShape, Mimic, box, capsule, cylinder, sphere
 
 Meshes: TypeAlias = dict[int, tuple[str, Array, Array]]
 """By index of a geom that is a mesh of a file: the mesh's address relative to the model's folder,
@@ -44,20 +36,12 @@ and from the file's numbers to the geom's axes a matrix, shape (3, 3), and a shi
 
 SUFFIXES = (".xml", ".mjcf")
 
-DRAWN_GROUPS = 3
-"""MuJoCo draws geoms of groups 0, 1 and 2 unless told otherwise; collision shapes are in 3."""
-
-UNCOLOURED = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's colour of a geom that names none: its material's is taken then."""
-
-MAX_INCLUDED = 200
-"""Most files that one MJCF may consist of."""
-
+DRAWN_GROUPS = 3  # MuJoCo draws groups 0, 1 and 2 unless told otherwise; collision shapes are in 3
+UNCOLOURED = (0.5, 0.5, 0.5, 1.0)  # of a geom that names no colour: its material's is taken then
+MAX_INCLUDED = 200  # most files that one MJCF may consist of
+# Memory of the process that compiles, in [byte], its processor time and its time, in [s].
 MEMORY, SECONDS, PATIENCE = 2 * 2**30, 10, 60.0
-"""Memory of the process that compiles, in [byte], its processor time and its time, in [s]."""
-
-MAX_COMPILED = 2**28
-"""Most bytes of a compiled model."""
+MAX_COMPILED = 2**28  # most bytes of a compiled model
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,16 +96,13 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
     for name in ("qpos0", "body_pos", "body_quat", "jnt_pos", "jnt_axis", "geom_pos", "geom_size"):
         if not np.isfinite(getattr(compiled, name)).all():
             raise RobotError(f"{path}: {name} of the compiled model is not finite")
-    drawn = {}
-    triangles = 0
+    drawn, triangles = {}, 0
     for geom in range(compiled.ngeom):
         if (shape := _shape(compiled, geom, meshes.get(geom))) is not None:
             drawn[geom] = shape
             triangles += 0 if isinstance(shape.body, str) else len(shape.body)
-            if triangles > limit("triangles"):
-                raise RobotError(
-                    f"{path}: its shapes have too many triangles, {beyond('triangles')}"
-                )
+        if triangles > limit("triangles"):
+            raise RobotError(f"{path}: its shapes have too many triangles, {beyond('triangles')}")
     visual = _visual(compiled)
     model, floating = _model(path, compiled, floating_base)
     return Mjcf(
@@ -269,7 +250,10 @@ def _without_files(spec: Any, path: Path, folders: Sequence[Path]) -> dict[int, 
             continue
         # MuJoCo takes refpos off, turns by refquat backwards, then scales.
         matrix = np.diag(mesh.scale) @ _rotation(mesh.refquat).T
-        address = _address(spec, mesh, path, folders)
+        file = Path(mesh.file).name if spec.strippath else mesh.file
+        places = [folder / mesh.compiler.meshdir / file for folder in folders]
+        found = next((place for place in places if place.is_file()), places[0])
+        address = os.path.relpath(found, path.parent)
         meshes[index] = (address, matrix.tolist(), (-matrix @ mesh.refpos).tolist())
         geom.type, geom.meshname, geom.size = mjtGeom.mjGEOM_SPHERE, "", (1.0, 0.0, 0.0)
     for name, mesh in by_name.items():
@@ -278,13 +262,6 @@ def _without_files(spec: Any, path: Path, folders: Sequence[Path]) -> dict[int, 
     # MuJoCo takes the masses of some bodies from meshes, now from spheres: nothing reads them.
     spec.compiler.boundmass = spec.compiler.boundinertia = 1e-6
     return meshes
-
-
-def _address(spec: Any, mesh: Any, path: Path, folders: Sequence[Path]) -> str:
-    file = Path(mesh.file).name if spec.strippath else mesh.file
-    places = [folder / mesh.compiler.meshdir / file for folder in folders]
-    found = next((place for place in places if place.is_file()), places[0])
-    return os.path.relpath(found, path.parent)
 
 
 def _rotation(quaternion: Array) -> Array:
@@ -361,15 +338,9 @@ def _add_joint(
             axis
         )
     limits = compiled.jnt_range[index] if compiled.jnt_limited[index] else (-np.inf, np.inf)
-    joint = model.addJoint(
-        parent,
-        kind,
-        place * pin.SE3(np.eye(3), origin) * back,
-        title,
-        np.array([np.inf]),
-        np.array([np.inf]),
-        *(np.array([float(each)]) for each in limits),
-    )
+    place = place * pin.SE3(np.eye(3), origin) * back
+    bounds = [np.array([float(each)]) for each in (np.inf, np.inf, *limits)]  # effort, speed, range
+    joint = model.addJoint(parent, kind, place, title, *bounds)
     return joint, pin.SE3(np.eye(3), -origin)
 
 
@@ -430,13 +401,8 @@ def _shape(compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None) -> L
         case _:
             return None
     turn = _rotation(compiled.geom_quat[geom])
-    return LinkShape(
-        link=_body_name(compiled, body),
-        matrix=turn @ matrix,
-        translation=turn @ shift + compiled.geom_pos[geom],
-        body=drawn,
-        colour=_colour(compiled, geom),
-    )
+    place, colour = turn @ shift + compiled.geom_pos[geom], _colour(compiled, geom)
+    return LinkShape(_body_name(compiled, body), turn @ matrix, place, drawn, colour)
 
 
 def _colour(compiled: Any, geom: int) -> tuple[float, ...]:

@@ -4,8 +4,8 @@ import os
 import re
 import tempfile
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, distribution
@@ -31,15 +31,9 @@ from noisemodel.types import (
 )
 from noisemodel.urdf import Mimic
 
-MENAGERIE = "menagerie/"
-"""What the names of MuJoCo Menagerie's robots begin with: menagerie/unitree_go2."""
-
-PACKAGE_ROOT = "NOISE_PACKAGE_ROOT"
-"""Environment variable with a folder that meshes may lie in besides the robot's own."""
-
-PACKAGE = re.compile(rb"package:///?([^/\"'<>\s]+)/")
-"""The package in the address of a mesh."""
-
+MENAGERIE = "menagerie/"  # the names of MuJoCo Menagerie's robots begin so: menagerie/unitree_go2
+PACKAGE_ROOT = "NOISE_PACKAGE_ROOT"  # environment variable: a further folder of meshes
+PACKAGE = re.compile(rb"package:///?([^/\"'<>\s]+)/")  # the package in the address of a mesh
 BESIDE = ("meshes", "visual", "collision", "assets")
 """Folders beside a URDF's or MJCF's own that belong to the robot if no package says so."""
 
@@ -52,11 +46,8 @@ KINDS = {
 }
 """Pinocchio's joint types by what they do; a URDF has no others."""
 
-SINGLE = ("revolute", "continuous", "prismatic")
-"""The types of joints that a run can name."""
-
-CHUNK = 4096
-"""Samples that are worked on at once: few enough for the cache, with little overhead of Python."""
+SINGLE = ("revolute", "continuous", "prismatic")  # the types of joints that a run can name
+CHUNK = 4096  # samples worked on at once: few enough for the cache, with little overhead of Python
 
 
 @dataclass(frozen=True)
@@ -72,17 +63,12 @@ class Listed:
     floating_base: bool = False
 
 
-def _listed() -> Mapping[str, Listed]:
-    tables = tomllib.loads(Path(__file__).with_name("robots.toml").read_text())
-    robots = [
-        (name, Listed(path, base == "floating"))
-        for base in tables
-        for name, path in tables[base].items()
-    ]
-    return MappingProxyType(dict(sorted(robots)))
+_tables = tomllib.loads(Path(__file__).with_name("robots.toml").read_text())
+_paths = {(name, base): path for base, table in _tables.items() for name, path in table.items()}
 
-
-ROBOTS = _listed()
+ROBOTS: Mapping[str, Listed] = MappingProxyType(
+    {name: Listed(path, base == "floating") for (name, base), path in sorted(_paths.items())}
+)
 """The listed robots by name."""
 
 
@@ -171,8 +157,14 @@ def _joint(model: Any, index: int) -> Joint:
     turn, rotation = None, placement.rotation.T
     if kind.endswith("Unaligned"):
         subspace = np.ravel(joint.createData().S)  # the joint's twist at unit velocity
-        turn = _axes_with_z(subspace[:3] + subspace[3:])
+        z = subspace[:3] + subspace[3:]
+        z /= np.linalg.norm(z)
+        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+        x /= np.linalg.norm(x)
+        turn = np.stack((x, np.cross(z, x), z))
         rotation = turn @ rotation
+    x, y, z = placement.translation
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return Joint(
         name=str(model.names[index]),
         kind=matches[0],
@@ -181,23 +173,9 @@ def _joint(model: Any, index: int) -> Joint:
         first_v=int(joint.idx_v),
         axis="XYZ".find(kind[-1]) if kind[-1] in "XYZ" else 2,
         turn=turn,
-        shift=_shift(rotation, placement.translation),
+        # v' = R (v + w x t), w' = R w
+        shift=np.block([[rotation, -rotation @ cross], [np.zeros((3, 3)), rotation]]),
     )
-
-
-def _shift(rotation: Array, translation: Array) -> Array:
-    """Twist at the parent's origin to twist at the joint's: v' = R (v + w x t), w' = R w."""
-    x, y, z = translation
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.block([[rotation, -rotation @ cross], [np.zeros((3, 3)), rotation]])
-
-
-def _axes_with_z(axis: Array) -> Array:
-    """Rotation to axes whose z is ``axis``, shape (3, 3)."""
-    z = axis / np.linalg.norm(axis)
-    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-    x /= np.linalg.norm(x)
-    return np.stack((x, np.cross(z, x), z))
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,9 +226,6 @@ class Robot:
             mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
             package_root: A further folder that meshes may lie in, see `package_roots`.
 
-        Returns:
-            The robot.
-
         Raises:
             UnknownRobotError: If there is neither such a name nor such a file.
             RobotError: If the URDF or MJCF cannot be read, or ``package_root`` is no folder.
@@ -272,19 +247,10 @@ class Robot:
         mimics = mimics if mimic else {}
         if mimic:
             table = _coupled(table, mimics, path)
-        independent = [joint for joint in table if joint.name not in mimics]
-        return cls(
-            name=str(name) if is_name(str(name)) else path.stem,
-            path=path,
-            package_roots=roots,
-            model=model,
-            joints=table,
-            nq=sum(joint.nq for joint in independent),
-            nv=sum(joint.nv for joint in independent),
-            floating_base=floating_base,
-            mimics=mimics,
-            mjcf=description,
-        )
+        own = [joint for joint in table if joint.name not in mimics]
+        nq, nv = sum(joint.nq for joint in own), sum(joint.nv for joint in own)
+        title = str(name) if is_name(str(name)) else path.stem
+        return cls(title, path, roots, model, table, nq, nv, floating_base, mimics, description)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -298,9 +264,6 @@ class Robot:
 
         Joints that are not in the log are assumed stationary in their neutral position, and so is a
         base of which the run has no pose. Columns of joints that follow another one are ignored.
-
-        Args:
-            run: A run with positions.
 
         Returns:
             Configurations q, shape (samples, nq), and velocities v, shape (samples, nv).
@@ -323,9 +286,7 @@ class Robot:
     def desired(self, run: Run) -> tuple[Array, Array] | None:
         """Order a run's desired motion as Pinocchio does; its base is stationary.
 
-        Args:
-            run: A run with positions, measured or desired: without desired ones the joints are
-                where they were measured.
+        Without desired positions the joints are where they were measured.
 
         Returns:
             Configurations, shape (samples, nq), and velocities, shape (samples, nv); None where
@@ -348,9 +309,7 @@ class Robot:
     def _positions(self, names: tuple[str, ...], position: Real) -> Array:
         # Samples lie next to each other in memory, as batch kinematics reads them.
         q = np.tile(self.neutral[:, None], len(position))
-        columns = np.ascontiguousarray(position.T)
-        for column, joint in self._named(names):
-            angle = columns[column]
+        for joint, angle in self._named(names, position):
             if joint.kind == "continuous":
                 q[joint.first_q], q[joint.first_q + 1] = np.cos(angle), np.sin(angle)
             else:
@@ -359,19 +318,18 @@ class Robot:
 
     def _velocities(self, names: tuple[str, ...], velocity: Real) -> Array:
         v = np.zeros((self.nv, len(velocity)))
-        columns = np.ascontiguousarray(velocity.T)
-        for column, joint in self._named(names):
-            v[joint.first_v] = columns[column]
+        for joint, rate in self._named(names, velocity):
+            v[joint.first_v] = rate
         return v.T
 
-    def _named(self, names: tuple[str, ...]) -> Iterator[tuple[int, Joint]]:
-        """Columns of joints that move by themselves, each with its joint."""
+    def _named(self, names: tuple[str, ...], signal: Real) -> Iterator[tuple[Joint, Real]]:
+        """Joints that move by themselves, each with its column of a signal."""
         by_name = {joint.name: joint for joint in self.joints if joint.nv == 1}
-        for column, name in enumerate(names):
+        for name, column in zip(names, np.ascontiguousarray(signal.T), strict=True):
             if name not in by_name:
                 raise UnknownJointError(name, self.name, self.joint_names)
             if name not in self.mimics:
-                yield column, by_name[name]
+                yield by_name[name], column
 
     @property
     def neutral(self) -> Array:
@@ -452,17 +410,24 @@ def _is_wide(folder: Path) -> bool:
 
 
 def _model(path: Path, floating_base: bool) -> Any:
+    """Read a URDF with Pinocchio, whose words on file descriptor 2 become the error's."""
     import pinocchio
 
     root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
-    with kept_stderr() as messages:
+    with tempfile.TemporaryFile() as kept:
+        terminal = os.dup(2)
+        os.dup2(kept.fileno(), 2)
         try:
             return pinocchio.buildModelFromUrdf(str(path), *root)
         except (ValueError, RuntimeError) as error:
             # The exception only states that the URDF is not valid; the reason went to stderr.
-            reasons = re.findall(r"Error: +(.+)", messages()) or [str(error)]
+            said = os.pread(kept.fileno(), 2**16, 0).decode(errors="replace")
+            reasons = re.findall(r"Error: +(.+)", said) or [str(error)]
             reason = " ".join(reasons[0].split())
             raise RobotError(f"{path}: Pinocchio cannot read the URDF ({reason})") from error
+        finally:
+            os.dup2(terminal, 2)
+            os.close(terminal)
 
 
 def _coupled(
@@ -475,42 +440,26 @@ def _coupled(
         if joint.name not in mimics:
             placed[joint.name] = replace(joint, first_q=first_q, first_v=first_v)
             first_q, first_v = first_q + joint.nq, first_v + joint.nv
-    for joint in table:
-        if joint.name in mimics:
-            leader, multiplier, offset = joint.name, 1.0, 0.0
-            for _ in range(len(mimics) + 1):  # a chain of joints that follow each other
-                if leader in mimics:
-                    mimic = mimics[leader]
-                    offset += multiplier * mimic.offset
-                    leader, multiplier = mimic.joint, multiplier * mimic.multiplier
-            about = f"{path}: joint {joint.name!r} mimics {leader!r}"
+    for joint in (each for each in table if each.name in mimics):
+        leader, multiplier, offset = joint.name, 1.0, 0.0
+        for _ in range(len(mimics) + 1):  # a chain of joints that follow each other
             if leader in mimics:
-                raise RobotError(f"{path}: joint {joint.name!r} mimics itself")
-            if leader not in placed:
-                raise RobotError(f"{about}, which is missing")
-            if "continuous" in (joint.kind, placed[leader].kind):
-                raise RobotError(f"{about}; continuous joints cannot")
-            placed[joint.name] = replace(
-                joint,
-                first_q=placed[leader].first_q,
-                first_v=placed[leader].first_v,
-                multiplier=multiplier,
-                offset=offset,
-            )
+                mimic = mimics[leader]
+                offset += multiplier * mimic.offset
+                leader, multiplier = mimic.joint, multiplier * mimic.multiplier
+        about = f"{path}: joint {joint.name!r} mimics {leader!r}"
+        if leader in mimics:
+            raise RobotError(f"{path}: joint {joint.name!r} mimics itself")
+        if leader not in placed:
+            raise RobotError(f"{about}, which is missing")
+        first = placed[leader]
+        if "continuous" in (joint.kind, first.kind):
+            raise RobotError(f"{about}; continuous joints cannot")
+        q, v = first.first_q, first.first_v
+        placed[joint.name] = replace(
+            joint, first_q=q, first_v=v, multiplier=multiplier, offset=offset
+        )
     return tuple(placed[joint.name] for joint in table)
-
-
-@contextmanager
-def kept_stderr() -> Iterator[Callable[[], str]]:
-    """Keep what the process writes to file descriptor 2 while the block runs."""
-    with tempfile.TemporaryFile() as kept:
-        terminal = os.dup(2)
-        os.dup2(kept.fileno(), 2)
-        try:
-            yield lambda: os.pread(kept.fileno(), 2**16, 0).decode(errors="replace")
-        finally:
-            os.dup2(terminal, 2)
-            os.close(terminal)
 
 
 def listed_folders() -> tuple[Path, ...]:
@@ -570,10 +519,7 @@ def menagerie_path(name: str) -> Path:
 
 @dataclass(frozen=True)
 class Limits:
-    """Lowest and highest position of a joint in [rad] or [m], and its highest speed.
-
-    They are infinite where the robot states none.
-    """
+    """Lowest and highest position of a joint in [rad] or [m], and speed; infinite if not known."""
 
     lower: float = -inf
     upper: float = inf
@@ -589,12 +535,11 @@ class Limits:
 def joint_limits(name: str | Path) -> Mapping[str, Limits]:
     """Limits of the joints that a run can name, by name, in the order of the robot's file."""
     path = locate(name)
-    modified = path.stat().st_mtime_ns if path.is_file() else 0
-    return _of_file(str(name), path, modified)
+    return _limits_in(str(name), path, path.stat().st_mtime_ns if path.is_file() else 0)
 
 
 @lru_cache(maxsize=32)
-def _of_file(name: str, path: Path, modified: int) -> Mapping[str, Limits]:
+def _limits_in(name: str, path: Path, _modified: int) -> Mapping[str, Limits]:
     if path.suffix.lower() != ".urdf":
         return MappingProxyType(limits_of(Robot.load(name)))
     found = {}  # without Pinocchio, which takes long to import
@@ -602,9 +547,14 @@ def _of_file(name: str, path: Path, modified: int) -> Mapping[str, Limits]:
         if (kind := joint.get("type", "")) in SINGLE:
             limit = joint.find("limit")
             known = {} if limit is None else limit.attrib
-            lower, upper = (_number(known.get(each), 0.0) for each in ("lower", "upper"))
-            velocity = _number(known.get("velocity"), inf)
-            found[joint.get("name", "")] = _limits(kind, lower, upper, velocity)
+            numbers = []
+            for each, default in (("lower", 0.0), ("upper", 0.0), ("velocity", inf)):
+                try:
+                    number = float(known.get(each, default))
+                except ValueError:
+                    number = default
+                numbers.append(number if isfinite(number) else default)
+            found[joint.get("name", "")] = _limits(kind, *numbers)
     return MappingProxyType(found)
 
 
@@ -626,14 +576,6 @@ def _limits(kind: str, lower: float, upper: float, velocity: float) -> Limits:
     if kind == "continuous" or not lower < upper or max(abs(lower), abs(upper)) > 1e6:
         lower, upper = -inf, inf
     return Limits(lower, upper, velocity if 0 < velocity < 1e6 else inf, kind != "prismatic")
-
-
-def _number(text: str | None, default: float) -> float:
-    try:
-        value = default if text is None else float(text)
-    except ValueError:
-        return default
-    return value if isfinite(value) else default
 
 
 # Twists of all links, all samples at once.

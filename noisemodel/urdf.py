@@ -7,7 +7,7 @@ the ends of a capsule by 0.20 % (0.01 dB; a test holds these).
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,15 +21,9 @@ from noisemodel.types import Array, GeometryError, MeshError, RobotError
 
 NUMBERS = {"xyz": 3, "rpy": 3, "ixx": 1, "iyy": 1, "izz": 1, "ixy": 1, "ixz": 1, "iyz": 1}
 
-AXIAL = {"revolute", "continuous", "prismatic", "planar"}
-"""Joint types whose axis matters; a fixed joint's is often 0."""
-
-SECTIONS = 64
-"""Flat sides of a cylinder or capsule."""
-
-SUBDIVISIONS = 4
-"""How often an icosahedron's triangles are cut in four to make a sphere: 5120 triangles."""
-
+AXIAL = {"revolute", "continuous", "prismatic", "planar"}  # types whose axis may not be 0
+SECTIONS = 64  # flat sides of a cylinder or capsule
+SUBDIVISIONS = 4  # how often an icosahedron's triangles are cut in four to make a sphere
 HINT = "--package-root (`package_root=`) names a folder of meshes elsewhere"
 
 
@@ -288,8 +282,7 @@ def _unit_sphere() -> Array:
 
 
 def _on_sphere(points: Array) -> Array:
-    unit: Array = points / np.linalg.norm(points, axis=-1, keepdims=True)
-    return unit
+    return np.asarray(points / np.linalg.norm(points, axis=-1, keepdims=True))
 
 
 SOLIDS: Mapping[str, tuple[tuple[str, ...], int, Callable[..., Array]]] = MappingProxyType(
@@ -314,8 +307,15 @@ def find_mesh(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
     """
     if not address:
         raise MeshError("''", f"{urdf.name} names a mesh without a file")
+    scheme, _, rest = address.rpartition("://")
+    places = [urdf.parent / rest] if scheme in ("", "file") else []
     try:
-        found = [path.resolve() for path in _candidates(address, urdf, roots) if path.is_file()]
+        for root in roots if scheme == "package" else ():
+            places.append(root / rest.lstrip("/"))
+            package, _, inside = rest.lstrip("/").partition("/")
+            if root.name == package or (root / "package.xml").is_file():
+                places.append(root / inside)
+        found = [path.resolve() for path in places if path.is_file()]
     except OSError as error:  # no permission, or a name too long for a file
         raise MeshError(address, f"cannot be looked up ({error.strerror})") from error
     listed = ", ".join(map(str, roots)) or "any folder: a home has no meshes"
@@ -328,15 +328,3 @@ def find_mesh(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
         ):
             return path
     raise MeshError(address, f"lies outside of {listed}; {HINT}")
-
-
-def _candidates(address: str, urdf: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    scheme, _, rest = address.rpartition("://")
-    if scheme == "package":
-        package, _, below = rest.lstrip("/").partition("/")
-        for root in roots:
-            yield root / rest.lstrip("/")
-            if root.name == package or (root / "package.xml").is_file():
-                yield root / below
-    elif scheme in ("", "file"):
-        yield urdf.parent / rest
