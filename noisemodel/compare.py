@@ -17,6 +17,7 @@ from noisemodel.surface import GEOMETRIES, TINY, Surface
 from noisemodel.types import (
     Array,
     GeometryError,
+    Mask,
     NoiseModelError,
     Real,
     RobotError,
@@ -32,11 +33,8 @@ SIMPLIFIED = "simplified"
 COMPARED = (SIMPLIFIED, "C", "paper", "mean", "rms", "normal")
 """The kinds that are compared unless others are named."""
 
-TERMS = ("A", "B", "C")
-"""The terms of the paper's mean speed."""
-
-REFERENCES = ("normal", "mean")
-"""The other kinds are compared with the first of these that is among them."""
+TERMS = ("A", "B", "C")  # the terms of the paper's mean speed
+REFERENCES = ("normal", "mean")  # the others are compared with the first of these, if it is there
 
 BANDS = {
     "0-20 Hz": (0.0, 20.0),
@@ -46,42 +44,24 @@ BANDS = {
 }
 """Parts of the spectrum for which distances are given one by one, in [Hz]."""
 
-ENVELOPE = 0.02
-"""Stretch of time whose root mean square is one value of the envelope, in [s]."""
-
-WINDOW = 0.1024
-"""Length of a spectrum's Hann window, in [s]: the paper's 1024 samples at 10 kHz."""
-
-DYNAMICS_DB = 100.0
-"""What lies further below a signal's loudest line counts as this far below, in [dB]."""
-
-GROUP = 3
-"""Fewest robots that the table gives a median of."""
-NAME = 26
-"""Width of a robot's name in print."""
-
+ENVELOPE = 0.02  # stretch of time whose root mean square is one value of the envelope, in [s]
+WINDOW = 0.1024  # length of a spectrum's Hann window, in [s]: the paper's 1024 samples at 10 kHz
+DYNAMICS_DB = 100.0  # what lies further below a signal's loudest line counts as this far below
+GROUP = 3  # fewest robots that the table gives a median of
+NAME = 26  # width of a robot's name in print
 SECONDS = 6.0
-RATE = 4000.0
-"""Sample rate of the excitation unless another is given, in [Hz]."""
-NOMINAL_SPEED = {"prismatic": 0.3}
-"""Speed of the slow sines in [m/s]; of joints that turn it is 1 rad/s."""
-BASE_SPEED = 0.1
-"""Speed of a floating base, in [m/s] and [rad/s]."""
-SINES_HZ = (0.1, 0.8)
-SINES = 3
-RIPPLE = 0.01
-"""Root mean square of the ripple, as a share of the joint's nominal speed."""
-RIPPLE_HZ = 10.0
-"""Lowest frequency of the ripple, which has the same power in every octave above, in [Hz]."""
-USABLE = 0.9
-"""Share of its range and of its speed that a joint uses at most."""
-SHAKE = 0.2
-"""Amplitude of a shake, in [rad/s]."""
+RATE = 4000.0  # sample rate of the excitation unless another is given, in [Hz]
+NOMINAL_SPEED = {"prismatic": 0.3}  # of the slow sines, in [m/s]; of joints that turn it is 1 rad/s
+BASE_SPEED = 0.1  # speed of a floating base, in [m/s] and [rad/s]
+SINES, SINES_HZ = 3, (0.1, 0.8)
+RIPPLE = 0.01  # root mean square of the ripple, as a share of the joint's nominal speed
+RIPPLE_HZ = 10.0  # lowest frequency of the ripple, which has the same power in each octave above
+USABLE = 0.9  # share of its range and of its speed that a joint uses at most
+SHAKE = 0.2  # amplitude of a shake, in [rad/s]
 SHAKE_HZ = (40.0, 200.0)
 SHAKES = {"shake-near": (1.0, 1.8), "shake-far": (2.6, 3.4)}
 JERK = (4.6, 4.8)
-JERK_DECAY = 0.03
-"""Time constant of the decay of the jump, in [s]."""
+JERK_DECAY = 0.03  # time constant of the decay of the jump, in [s]
 
 Source: TypeAlias = Robot | Run | Path | str
 """A robot, its listed name or the path of its URDF or MJCF; or a run, or the path of a run file."""
@@ -155,40 +135,27 @@ class Comparison:
         return self.links[shares.argmax()], float(shares.max())
 
     def by_band(self, kind: int) -> Array:
-        """Spectral distance to the reference in each of ``BANDS``.
+        """Spectral distance to the reference in each of ``BANDS``, shape (bands,), in [dB].
 
-        Args:
-            kind: Index of the kind.
-
-        Returns:
-            Shape (bands,), in [dB]; nan above the Nyquist frequency.
+        ``kind`` is the index of the kind. It is nan above the Nyquist frequency.
         """
         squares = self.distance_by_frequency[kind, self.reference] ** 2
         inside = [(self.frequency >= low) & (self.frequency < high) for low, high in BANDS.values()]
-        return np.array([np.sqrt(squares[at].mean()) if at.any() else np.nan for at in inside])
+        return np.sqrt(_means(squares, inside))
 
     def by_label(self, kind: int, labels: Sequence[str]) -> Array:
-        """Mean contrast of the events with each label.
+        """Mean contrast of the events with each label, shape (labels,), in [dB].
 
-        Args:
-            kind: Index of the kind.
-            labels: The labels.
-
-        Returns:
-            Shape (labels,), in [dB]; nan where there is no such event.
+        ``kind`` is the index of the kind. It is nan where there is no such event.
         """
         own = np.array([event.label for event in self.events])
-        inside = [own == label for label in labels]
-        levels = self.contrast[kind]
-        return np.array([levels[at].mean() if at.any() else np.nan for at in inside])
+        return _means(self.contrast[kind], [own == label for label in labels])
 
     def rows(self, labels: Sequence[str]) -> Iterator[dict[str, str | bool | int | float]]:
-        """Rows of ``Comparisons.to_arrow``, one for each kind.
-
-        Args:
-            labels: The labels of events that have a column.
-        """
+        """Rows of ``Comparisons.to_arrow``, one for each kind; ``labels`` have a column each."""
         shares = zip(TERMS, self.terms.sum(axis=0).tolist(), strict=True)
+        bands = [f"distance_{band.replace(' Hz', '')}_db" for band in BANDS]
+        columns = [band.replace("-", "_").replace(" ", "_") for band in bands]
         facts = {
             "name": self.name,
             "floating_base": self.floating_base,
@@ -199,7 +166,6 @@ class Comparison:
             **{f"share_{term}": share for term, share in shares},
         }
         for index, kind in enumerate(self.kinds):
-            columns = (band.replace(" Hz", "").replace("-", "_") for band in BANDS)
             distances = zip(columns, self.by_band(index).tolist(), strict=True)
             contrasts = zip(labels, self.by_label(index, labels).tolist(), strict=True)
             loudest = int(self.shares[index].argmax())
@@ -209,7 +175,7 @@ class Comparison:
                 "reference": self.kinds[self.reference],
                 "correlation": float(self.correlation[index, self.reference]),
                 "distance_db": float(self.distance[index, self.reference]),
-                **{f"distance_{band}_db".replace(" ", "_"): each for band, each in distances},
+                **dict(distances),
                 **{f"contrast_{label}_db": contrast for label, contrast in contrasts},
                 "loudest_share": float(self.shares[index, loudest]),
                 "loudest_link": self.links[loudest],
@@ -291,13 +257,14 @@ class Comparisons:
 
 
 def medians(rows: Sequence[Array]) -> Array:
-    """Median of each column over the rows that have a number there.
-
-    Args:
-        rows: One or more, each of shape (columns,).
-    """
+    """Median of each column over the rows, each of shape (columns,), that have a number there."""
     finite = [column[np.isfinite(column)] for column in np.array(rows).T]
     return np.array([np.median(column) if len(column) else np.nan for column in finite])
+
+
+def _means(values: Array, parts: Sequence[Mask]) -> Array:
+    """Mean of some values of each part, nan without any."""
+    return np.array([values[part].mean() if part.any() else np.nan for part in parts])
 
 
 def _by_robot(found: Comparisons) -> Iterator[str]:
@@ -368,22 +335,15 @@ def _beside(names: Sequence[str], *parts: Sequence[str]) -> Iterator[str]:
 # The measures.
 
 
-def envelopes(powers: Array, stretch: int) -> Array:
-    """Root mean squares of the pressure in one stretch of so many samples after the other."""
+def envelope_correlation(powers: Array, stretch: int) -> Array:
+    """Correlation of each two envelopes: root mean squares of the pressure in each stretch."""
     whole = powers.shape[1] // stretch * stretch
-    stretches = powers[:, :whole].reshape(len(powers), -1, stretch)
-    roots: Array = np.sqrt(stretches.mean(axis=2))
-    return roots
-
-
-def correlation(signals: Array) -> Array:
-    """Correlate each signal with each."""
-    centered = signals - signals.mean(axis=1, keepdims=True)
+    envelopes = np.sqrt(powers[:, :whole].reshape(len(powers), -1, stretch).mean(axis=2))
+    centered = envelopes - envelopes.mean(axis=1, keepdims=True)
     products = centered @ centered.T
     lengths = np.sqrt(np.diag(products))
     with np.errstate(invalid="ignore", divide="ignore"):
-        correlated: Array = products / np.outer(lengths, lengths)
-    return correlated
+        return np.asarray(products / np.outer(lengths, lengths))
 
 
 def log_spectra(signal: Array, window: int) -> Array:
@@ -458,19 +418,13 @@ def _estimates(
         place = kinds.index(SIMPLIFIED)
         pressure[place] = simplified(v)
         power[place] = pressure[place] ** 2
-        energy[place] = _joint_energy(robot, surface, v)
+        # Squared velocities of each link's joint; a joint that follows another one has none.
+        squares = np.einsum("sj,sj->j", v, v, dtype=np.float64)
+        for link, index in enumerate(surface.joint):
+            joint = robot.joints[index - 1]
+            if joint.name not in robot.mimics:
+                energy[place, link] = squares[joint.first_v : joint.first_v + joint.nv].sum()
     return pressure, power, energy, terms / max(terms.sum(), TINY)
-
-
-def _joint_energy(robot: Robot, surface: Surface, v: Real) -> Array:
-    """Sum the squared velocities of each link's joint; a joint that follows one has none."""
-    squares = np.einsum("sj,sj->j", v, v, dtype=np.float64)
-    energy = np.zeros(len(surface.links))
-    for link, index in enumerate(surface.joint):
-        joint = robot.joints[index - 1]
-        if joint.name not in robot.mimics:
-            energy[link] = squares[joint.first_v : joint.first_v + joint.nv].sum()
-    return energy
 
 
 # The motion of each robot.
@@ -488,10 +442,8 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
     - ``jerk``: the speed of all joints jumps within one sample, and the jump decays.
 
     Positions keep to the limits of the robot: the motion of a joint with a small range or speed is
-    scaled down. Joints that mimic another one follow it; the base's pose stays at the origin.
-
-    Args:
-        rate: Sample rate, in [Hz]; its Nyquist frequency has to be above the shakes.
+    scaled down. Joints that mimic another one follow it; the base's pose stays at the origin. The
+    Nyquist frequency of ``rate``, in [Hz], has to be above the shakes.
     """
     if not 2.0 * SHAKE_HZ[1] < rate < np.inf:
         raise NoiseModelError(
@@ -566,8 +518,7 @@ def _motion(time: Array, axes: int, random: "np.random.Generator", rate: float) 
     pink = np.fft.irfft(white * slope[:, None], n=len(time), axis=0)
     ripple = RIPPLE * (pink / np.sqrt(np.mean(pink**2, axis=0)))
     jump = 0.5 * (time >= JERK[0]) * np.exp((JERK[0] - time) / JERK_DECAY)
-    velocity: Array = sines + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes)
-    return velocity
+    return np.asarray(sines + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes))
 
 
 def moving(source: Source, seed: int = 0) -> tuple[Robot, Run, tuple[str, ...]]:
@@ -616,7 +567,7 @@ def compare(
     jobs: Jobs = 1,
     progress: Progress | None = None,
 ) -> Comparisons:
-    """Comparison of kinds of noise estimates, on the motions of one robot or many.
+    """Comparison of kinds of noise estimates, on the motions of one robot or many, in their order.
 
     All estimates are compared as pressures, whose scale is arbitrary: a factor between two kinds
     changes neither their correlation nor their distance. F. Sygulla and D. Rixen define the
@@ -639,9 +590,6 @@ def compare(
         progress: Shows the progress; takes an iterable and its length ``total``, and yields the
             items, as ``tqdm`` does.
 
-    Returns:
-        A comparison for each robot, in their order.
-
     Raises:
         UnknownKindError: If a kind does not exist.
         GeometryError: If the geometry does not exist.
@@ -654,7 +602,7 @@ def compare(
         raise NoiseModelError(f"jobs is {jobs}, expected 1 or more")
     one = partial(_attempt, seed=seed, kinds=kinds, geometry=surface)
     results: Iterable[Comparison | LeftOut]
-    results = in_order(one, sources, jobs=jobs, died=_died)
+    results = in_order(one, sources, jobs=jobs, died=lambda each: LeftOut(_name(each), DIED))
     found = list(results if progress is None else progress(results, total=len(sources)))
     return Comparisons(
         tuple(each for each in found if isinstance(each, Comparison)),
@@ -693,10 +641,6 @@ def _name(source: Source) -> str:
     return source.robot or "run" if isinstance(source, Run) else str(source)
 
 
-def _died(source: Source) -> LeftOut:
-    return LeftOut(_name(source), DIED)
-
-
 def _attempt(
     source: Source, seed: int, kinds: Sequence[str], geometry: str
 ) -> Comparison | LeftOut:
@@ -708,12 +652,7 @@ def _attempt(
 
 
 def _compare(
-    name: str,
-    robot: Robot,
-    run: Run,
-    remarks: tuple[str, ...],
-    kinds: Sequence[str],
-    geometry: str,
+    name: str, robot: Robot, run: Run, remarks: tuple[str, ...], kinds: Sequence[str], geometry: str
 ) -> Comparison:
     rate = run.rate
     check_length(len(run.time), rate)
@@ -736,7 +675,7 @@ def _compare(
         links=surface.names,
         links_with_surface=len(surface.names) - len(surface.without_geometry),
         pressure=pressure / np.where(rms > 0.0, rms, 1.0),
-        correlation=correlation(envelopes(power, round(ENVELOPE * rate))),
+        correlation=envelope_correlation(power, round(ENVELOPE * rate)),
         distance=np.sqrt(squares.mean(axis=2)),
         frequency=np.arange(window // 2 + 1) * rate / window,
         distance_by_frequency=np.sqrt(squares),

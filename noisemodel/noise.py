@@ -5,6 +5,7 @@ The extended estimate is that power: a link radiates by its surface and the mean
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -13,43 +14,26 @@ from numpy.typing import NDArray
 
 from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
 from noisemodel.run import Run, rows_of, stretches
-from noisemodel.runfile import AT_ONCE, pieces
-from noisemodel.surface import LinkSurface, Surface, check_surface, point_speeds, turning_speed
-from noisemodel.types import Array, Mask, NoiseModelError, Real, UnknownKindError
+from noisemodel.runfile import AT_ONCE, OnDemand, pieces
+from noisemodel.surface import LinkSurface, Surface, point_speeds, turning_speed
+from noisemodel.types import Array, GeometryError, Mask, NoiseModelError, Real, UnknownKindError
 
 Index: TypeAlias = NDArray[np.intp]
 
-DENSITY = 1.204
-"""Of air at 20 °C, in [kg/m³]."""
-
-SOUND_SPEED = 343.2
-"""In air at 20 °C, in [m/s]."""
-
-REFERENCE_POWER = 1e-12
-"""0 dB of sound power, in [W]."""
-
-LOUDEST = 5
-"""Links that are printed by name."""
-
-CHUNK = 4096
-"""Samples that are worked on at once: few enough for the cache, with little overhead of Python."""
+DENSITY = 1.204  # of air at 20 °C, in [kg/m³]
+SOUND_SPEED = 343.2  # in air at 20 °C, in [m/s]
+REFERENCE_POWER = 1e-12  # 0 dB of sound power, in [W]
+LOUDEST = 5  # links that are printed by name
+CHUNK = 4096  # samples worked on at once: few enough for the cache, with little overhead of Python
 
 KINDS = ("paper", "A", "B", "C", "mean", "rms", "normal")
 """The kinds of mean speed."""
+QUADRATIC = ("rms", "normal")  # their squares are quadratic forms of a link's twist
 
-QUADRATIC = ("rms", "normal")
-"""The kinds whose square is a quadratic form of a link's twist."""
-
-BLOCK_OF_POINTS = 256
-"""Samples of all points of a link that fit into the cache."""
-BIN = 0.01
-"""Shortest bin, in [s]."""
-BINS = 4000
-"""Most bins that a run is divided into."""
-BLOCK = 2**16
-"""Samples whose running mean is taken at once."""
-FAST = 10.0
-"""Motion below this frequency moves the robot and does not vibrate, in [Hz]."""
+BLOCK_OF_POINTS = 256  # samples of all points of a link that fit into the cache
+BIN, BINS = 0.01, 4000  # shortest bin, in [s], and most bins that a run is divided into
+BLOCK = 2**16  # samples whose running mean is taken at once
+FAST = 10.0  # motion below this frequency moves the robot and does not vibrate, in [Hz]
 
 
 # The simplified estimate, and sound power.
@@ -93,37 +77,27 @@ def _squared(velocity: Real) -> Array:
 def norms(run: Run) -> dict[str, Array]:
     """Reduce the velocities of a run to a few signals.
 
-    Args:
-        run: The run.
-
     Returns:
         Signals by name, each of shape (samples,), in [rad/s]: ``measured``, a floating base's
         velocities among them, and ``noise``, the simplified estimate; with desired velocities also
         ``desired`` and ``error``, the difference of desired and measured velocities of the joints
         that have both, if there are any.
     """
-    motion = run.motion
-    signals = {
-        "noise": simplified(motion, run.velocity_desired),
-        "measured": simplified(motion),
-    }
-    if (desired := run.velocity_desired) is not None:
+    motion, desired = run.motion, run.velocity_desired
+    signals = {"noise": simplified(motion, desired), "measured": simplified(motion)}
+    if desired is not None:
         signals["desired"] = simplified(desired)
-        if run.desired_joint_names == run.joint_names:
-            error: Real = np.asarray(desired - run.velocity)
-        else:
-            measured, wanted = _both(run)
-            error = np.asarray(desired[:, wanted] - run.velocity[:, measured])
-        if error.shape[1]:
-            signals["error"] = simplified(error)
+        measured = run.velocity
+        if run.desired_joint_names != run.joint_names:
+            own, wanted = _both(run)
+            measured, desired = measured[:, own], desired[:, wanted]
+        if desired.shape[1]:
+            signals["error"] = simplified(np.asarray(desired - measured))
     return signals
 
 
 def by_joint(run: Run) -> dict[str, Array]:
     """Take the velocities of those joints that are desired as well as measured.
-
-    Args:
-        run: The run.
 
     Returns:
         ``desired_joints``, ``measured_joints`` and ``error_joints``, their difference, each of
@@ -180,13 +154,9 @@ class Noise:
         return decibel(self.total / REFERENCE_POWER)
 
     def pressure(self, distance: float) -> Array:
-        """Sound pressure where the robot is a point that radiates evenly.
+        """Sound pressure where the robot is a point that radiates evenly, in [Pa].
 
-        Args:
-            distance: From the robot, in [m].
-
-        Returns:
-            Shape (samples,), in [Pa].
+        It has the shape (samples,); ``distance`` is from the robot, in [m].
 
         Raises:
             NoiseModelError: If ``distance`` is not positive.
@@ -194,8 +164,7 @@ class Noise:
         check_positive("distance", distance, "m")
         impedance = DENSITY * SOUND_SPEED
         # p = sqrt(P rho c / (4 pi d²)), Sygulla & Rixen, Sec. II-A
-        pressure: Array = np.sqrt(self.total * impedance / (4.0 * np.pi * distance**2))
-        return pressure
+        return np.asarray(np.sqrt(self.total * impedance / (4.0 * np.pi * distance**2)))
 
     def shares(self, stretches: Sequence[tuple[int, int]] | None = None) -> Array:
         """Share of each link in the energy that the robot radiates in stretches of time.
@@ -219,8 +188,7 @@ class Noise:
         parts = [self.power[start:stop].sum(axis=0) for start, stop in stretches]
         energy = np.array(parts).reshape(len(stretches), len(self.names))
         whole = energy.sum(axis=1, keepdims=True)
-        shares: Array = np.divide(energy, whole, out=np.zeros_like(energy), where=whole > 0.0)
-        return shares
+        return np.asarray(np.divide(energy, whole, out=np.zeros_like(energy), where=whole > 0.0))
 
     def __str__(self) -> str:
         mean = float(decibel(self.total.mean() / REFERENCE_POWER))
@@ -274,9 +242,7 @@ def surface_speed(robot: Robot, surface: Surface, q: Real, v: Real, kind: str = 
         GeometryError: If the surface belongs to another robot.
         NoiseModelError: If ``q`` or ``v`` are of another shape or not finite.
     """
-    check_kind(kind)
-    check_surface(surface, robot)
-    check_motion(robot, q, v)
+    _check(robot, surface, q, v, kind)
     speeds = np.empty((len(surface.links), len(q)))
     for start in range(0, len(q), CHUNK):
         part = slice(start, start + CHUNK)
@@ -316,39 +282,37 @@ def _link_speed(kind: str, link: LinkSurface, joint: Joint, twist: Array, veloci
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))  # rounding, where nothing moves out
     own = joint.subspace @ velocity
     carried = twist - own
-    terms: dict[str, Callable[[], Array]] = {  # Sec. II-A
-        "A": lambda: _length(carried[:3]),  # |v_O|
-        "B": lambda: _turning(link, carried),  # <|w_parent x r|>
-        "C": lambda: _driven(link, own),
-    }
-    if kind == "paper":
-        return terms["A"]() + terms["B"]() + terms["C"]()
-    return terms[kind]()
-
-
-def _driven(link: LinkSurface, own: Array) -> Array:
-    """C = |v_rel| + <|w_rel x r|>; for a joint with one axis the latter is |qdot| G."""
-    turning = _turning(link, own) if np.isnan(link.lever) else _length(own[3:]) * link.lever
-    return _length(own[:3]) + turning
-
-
-def _turning(link: LinkSurface, twist: Array) -> Array:
-    return turning_speed(link.turning, link.rounding, twist[3:])
+    terms = []  # of the paper's mean speed, Sec. II-A
+    if kind in ("paper", "A"):
+        terms.append(_length(carried[:3]))  # |v_O|
+    if kind in ("paper", "B"):
+        terms.append(turning_speed(link.turning, link.rounding, carried[3:]))  # <|w_parent x r|>
+    if kind in ("paper", "C"):  # |v_rel| + <|w_rel x r|>; about one axis the latter is |qdot| G
+        if np.isnan(link.lever):
+            turning = turning_speed(link.turning, link.rounding, own[3:])
+        else:
+            turning = _length(own[3:]) * link.lever
+        terms.append(_length(own[:3]) + turning)
+    return sum(terms[1:], terms[0])
 
 
 def _length(vectors: Array) -> Array:
-    length: Array = np.sqrt(np.einsum("is,is->s", vectors, vectors))
-    return length
+    return np.asarray(np.sqrt(np.einsum("is,is->s", vectors, vectors)))
 
 
-def check_kind(kind: str) -> None:
-    """Refuse an unknown kind."""
+def _check(robot: Robot, surface: Surface, q: Real, v: Real, kind: str) -> None:
+    """Refuse an unknown kind, a surface of another robot, and a motion that is not this robot's."""
     if kind not in KINDS:
         raise UnknownKindError(kind, KINDS)
+    if len(surface.names) != len(robot.joints):
+        raise GeometryError(
+            f"a surface of {len(surface.names)} links for {robot.name!r}, which has"
+            f" {len(robot.joints)}; expected Surface.of(robot)"
+        )
+    _check_motion(robot, q, v, ("q", "v"))
 
 
-def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q", "v")) -> None:
-    """Refuse a motion that is not this robot's, or not finite."""
+def _check_motion(robot: Robot, q: Real, v: Real, names: tuple[str, str]) -> None:
     for name, array, width in zip(names, (q, v), (robot.nq, robot.nv), strict=True):
         if array.shape != (len(q), width):
             raise NoiseModelError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
@@ -432,21 +396,15 @@ def extended(
         v_desired: Desired velocities, shape (samples, nv); the power of this motion is added.
             A floating base is stationary in it, whatever is given.
 
-    Returns:
-        The sound power of every link.
-
     Raises:
         UnknownKindError: If the kind does not exist.
         GeometryError: If the surface belongs to another robot.
         NoiseModelError: If ``q`` or ``v`` are of another shape than the robot's, or not finite; a
             number is not positive; lengths differ; or a link is too small for "dipole".
     """
-    check_kind(kind)
-    check_surface(surface, robot)
-    check_motion(robot, q, v)
+    _check(robot, surface, q, v, kind)
     if isinstance(efficiency, str) and efficiency != "dipole":
         raise NoiseModelError(f"efficiency is {efficiency!r}, expected numbers or 'dipole'")
-
     motions = _motions(robot, q, v, q_desired, v_desired)
     dipoles: list[Dipole | None] = [None] * len(motions)
     if isinstance(efficiency, str):
@@ -454,8 +412,16 @@ def extended(
             raise NoiseModelError("efficiency 'dipole' needs the rate of the samples, in Hz")
         check_positive("rate", rate, "Hz")
         dipoles = [Dipole(surface, rate) for _ in motions]
-    each = _efficiencies(efficiency, surface)[:, None]
-    power, stop = np.empty((len(surface.links), len(q))), 0
+        efficiency = 1.0  # it is in the motion instead
+    each, links = np.asarray(efficiency, dtype=np.float64), len(surface.links)
+    if each.shape not in ((), (links,)):
+        raise NoiseModelError(
+            f"efficiency has shape {each.shape}, expected one number or ({links},)"
+        )
+    if not ((each > 0.0) & (each < np.inf)).all():
+        raise NoiseModelError(f"efficiency is {each.min():g}, expected positive numbers")
+    each = np.broadcast_to(each, links)[:, None]
+    power, stop = np.empty((links, len(q))), 0
     for squares in _squares(robot, surface, motions, kind, CHUNK, dipoles):
         start, stop = stop, stop + squares.shape[1]
         power[:, start:stop] = sound_power(squares, surface.area[:, None], each)
@@ -473,7 +439,7 @@ def _motions(
             )
         return [(q, v)]
     wanted = q if q_desired is None else q_desired
-    check_motion(robot, wanted, v_desired, names=("q_desired", "v_desired"))
+    _check_motion(robot, wanted, v_desired, ("q_desired", "v_desired"))
     if len(v_desired) != len(v):
         raise NoiseModelError(f"v has {len(v)} samples, v_desired {len(v_desired)}")
     if robot.floating_base:
@@ -497,18 +463,6 @@ def _squares(
             for (q, v), dipole in zip(motions, dipoles, strict=False)
         )
         yield sum(more, first)
-
-
-def _efficiencies(efficiency: float | Sequence[float] | Real | str, surface: Surface) -> Array:
-    """Efficiency of each link, shape (links,); "dipole" is in the motion instead."""
-    each = np.asarray(1.0 if isinstance(efficiency, str) else efficiency, dtype=np.float64)
-    if each.shape not in ((), (len(surface.links),)):
-        raise NoiseModelError(
-            f"efficiency has shape {each.shape}, expected one number or ({len(surface.links)},)"
-        )
-    if not ((each > 0.0) & (each < np.inf)).all():
-        raise NoiseModelError(f"efficiency is {each.min():g}, expected positive numbers")
-    return np.broadcast_to(each, len(surface.links))
 
 
 # The noise of a run, link by link, in bins of time.
@@ -562,22 +516,20 @@ def link_noise(
     floating = True if run.base_pose is not None else None
     robot = Robot.load(run.robot, floating_base=floating)
     surface = Surface.of(robot, geometry)
-    bins = _edges(run)
+    samples = len(run.time)
+    size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
+    bins = np.append(np.arange(0, samples, size), samples)  # two or more
     middles = _middles(run, bins)
-
     q, wanted = robot.configuration(middles)[0], robot.desired(middles)
-    motion, wanted_motion = run.motion, run.velocity_desired
+    motion, desired_motion = run.motion, run.velocity_desired
+    fast_part = partial(_vibrating_part, motion, run.mask, run.rate)
+    fast = OnDemand(motion.shape, np.float64, fast_part)
 
-    def fast_part(first: int, stop: int) -> Array:
-        return _vibrating_part(motion, run.mask, run.rate, first, stop)
-
-    fast = _moments(robot, run, fast_part, bins)
-    motions, desired = [("normal", fast)], []
+    motions, desired = [("normal", _moments(robot, run, fast, bins))], []
     if kind in QUADRATIC:
-        motions.append((kind, _moments(robot, run, lambda a, b: motion[a:b], bins)))
-        if wanted_motion is not None:
-            by_part = lambda a, b: wanted_motion[a:b]  # noqa: E731
-            desired = [(kind, _moments(robot, run, by_part, bins, desired=True))]
+        motions.append((kind, _moments(robot, run, motion, bins)))
+        if desired_motion is not None:
+            desired = [(kind, _moments(robot, run, desired_motion, bins, desired=True))]
     if run.position_desired is None:  # desired velocities at measured positions: one pose for all
         motions, desired = [*motions, *desired], []
     vibration, *power = by_moments(robot, surface, q, motions)
@@ -585,10 +537,13 @@ def link_noise(
         power += by_moments(robot, surface, wanted[0], desired)
     if kind not in QUADRATIC:
         power = [by_samples(robot, surface, run, kind, bins)]
+    movers = {0: frozenset[str]()}  # of the universe
+    for index, joint in enumerate(robot.joints, start=1):
+        movers[index] = movers[joint.parent] | {joint.name}
     return LinkNoise(
         kind=kind,
         links=surface.names,
-        movers=tuple(_movers(robot, joint) for joint in surface.joint.tolist()),
+        movers=tuple(movers[joint] for joint in surface.joint.tolist()),
         time=run.time[bins[:-1]] + np.diff(bins) / 2 / run.rate,
         power=np.sum(power, axis=0),
         vibration=vibration,
@@ -647,13 +602,6 @@ def _half(rate: float) -> int:
     return max(1, round(rate / FAST / 2))
 
 
-def _edges(run: Run) -> Index:
-    """First sample of each bin, and the end; there are two bins or more."""
-    samples = len(run.time)
-    size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
-    return np.append(np.arange(0, samples, size), samples)
-
-
 def _middles(run: Run, bins: Index) -> Run:
     """Take one sample of each bin: the middle one of those that are valid."""
     samples = (bins[:-1] + bins[1:]) // 2
@@ -667,12 +615,7 @@ def _middles(run: Run, bins: Index) -> Run:
 
 
 def _moments(
-    robot: Robot,
-    run: Run,
-    motion: Callable[[int, int], Real],
-    bins: Index,
-    *,
-    desired: bool = False,
+    robot: Robot, run: Run, motion: Real | OnDemand, bins: Index, *, desired: bool = False
 ) -> Array:
     """Mean products of a run's velocities, in Pinocchio's order, shape (bins, nv, nv)."""
     first = {joint.name: joint.first_v for joint in robot.joints}
@@ -687,25 +630,12 @@ def _moments(
     many = size * max(1, AT_ONCE // (8 * size * width))
     # A bin that is shorter than the others is taken with those before it.
     starts = [start for start in range(0, len(run.time), many) if len(run.time) - start >= size]
-    parts = pairwise([*starts, len(run.time)])
-    products = np.concatenate(
-        [
-            second_moments(motion(*part)[:, chosen], run.mask[slice(*part)], size=size)
-            for part in parts
-        ]
-    )
+    parts = [slice(*each) for each in pairwise([*starts, len(run.time)])]
+    means = [second_moments(motion[p][:, chosen], run.mask[p], size=size) for p in parts]
+    products = np.concatenate(means)
     moments = np.zeros((robot.nv, robot.nv, len(bins) - 1))  # in memory as `by_moments` reads it
     moments[np.array(entries)[:, None], entries] = products.transpose(1, 2, 0)
     return moments.transpose(2, 0, 1)
-
-
-def _movers(robot: Robot, carrier: int) -> frozenset[str]:
-    names = set[str]()
-    while carrier:  # 0 is the universe
-        joint = robot.joints[carrier - 1]
-        names.add(joint.name)
-        carrier = joint.parent
-    return frozenset(names)
 
 
 def _remarks(run: Run, robot: Robot, surface: Surface) -> Iterator[str]:

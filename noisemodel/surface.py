@@ -26,45 +26,25 @@ GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """The geometries, and the shapes of the URDF or MJCF that each takes: the first that a link has."""
 
-VERSION = "link-3"
-"""Changes with what is computed here, so that nothing older is taken from the cache."""
-
-HALVINGS = 8
-"""1024 points for each link: mean speeds are right to about 1e-3, whatever the motion."""
-
-FINENESS = 2.0
-"""Panels of the fine points go this many times into the surface's thickness."""
-
-MOST = 1_000_000
-"""Fine points of a surface; more are placed only where there are many triangles."""
-
-SLENDEREST = 1e-3
-"""Thinner than this share of its length, a surface counts as that thin."""
-
+VERSION = "link-3"  # changes with what is computed here, so that the cache gives nothing older
+HALVINGS = 8  # 1024 points for each link: mean speeds are right to about 1e-3, whatever the motion
+FINENESS = 2.0  # panels of the fine points go this many times into the surface's thickness
+MOST = 1_000_000  # fine points of a surface; more are placed only where there are many triangles
+SLENDEREST = 1e-3  # thinner than this share of its length, a surface counts as that thin
+# Points of a tetrahedron: mean 0 and covariance 1 in all directions.
 CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float64)
-"""Points of a tetrahedron: mean 0 and covariance 1 in all directions."""
-
-SIDE = 96
-"""Cells along one side of the table of turning; between its nodes it is right to about 3e-4."""
-
-TINY = 1e-300
-"""Keeps the direction of no rotation finite."""
-
-ALL: Indices = np.zeros(1, dtype=np.intp)
-"""Where the only cell begins, if all points are in one."""
+SIDE = 96  # cells along one side of the table of turning; between its nodes it is right to 3e-4
+TINY = 1e-300  # keeps the direction of no rotation finite
+ALL: Indices = np.zeros(1, dtype=np.intp)  # where the only cell begins, if all points are in one
 
 
 def triangles(robot: Robot, geometry: str = "visual") -> tuple[Array, ...]:
-    """Draw all links that move with triangles; a link is all geometry that moves with one joint.
+    """Triangles of each joint's link in the joint's axes, (triangles, 3 corners, 3), in [m].
 
-    Args:
-        geometry: "visual" or "collision", as the URDF or MJCF has them; "hull", the convex hull of
-            every visual by itself; or "auto", the visual or, of a link that has none, the
-            collision.
-
-    Returns:
-        The triangles of each joint's link in the joint's axes, of shape (triangles, 3 corners, 3),
-        in [m]. Which side of a triangle is outside is not known.
+    A link is all geometry that moves with one joint. ``geometry`` is "visual" or "collision", as
+    the URDF or MJCF has them; "hull", the convex hull of every visual by itself; or "auto", the
+    visual or, of a link that has none, the collision. Which side of a triangle is outside is not
+    known.
     """
     if geometry not in GEOMETRIES:
         known = ", ".join(GEOMETRIES)
@@ -81,16 +61,9 @@ def link_names(robot: Robot) -> tuple[str, ...]:
 
 
 def pieces(
-    robot: Robot,
-    geometry: str = "auto",
-    *,
-    world: bool = True,
+    robot: Robot, geometry: str = "auto", *, world: bool = True
 ) -> Iterator[tuple[int, LinkShape, Array]]:
-    """Draw a robot piece by piece.
-
-    Args:
-        geometry: One of ``GEOMETRIES``; each link takes the first of its shapes that it has.
-        world: Whether what is fixed to the world is drawn, too.
+    """Draw a robot piece by piece; ``world`` tells whether what is fixed to the world counts, too.
 
     Yields:
         Index of the joint that moves a piece in Pinocchio, 0 if none does; the piece as the file
@@ -205,12 +178,7 @@ def _edge_points(triangles: Array, areas: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Cloud:
-    """Points that a mean over the surface is taken at.
-
-    Attributes:
-        points: Shape (points, 3), in [m].
-        weights: Positive, sum 1, shape (points,).
-    """
+    """Points of a surface, shape (points, 3), in [m], and weights of a mean: positive, of sum 1."""
 
     points: Array
     weights: Array
@@ -297,7 +265,11 @@ def _cells(cloud: Cloud, halvings: int) -> tuple[Array, Array, Indices]:
     Cells are cut at their mean across their longest axis. The cloud is transformed to axes in
     which it is less slender: so a rod is cut around itself, too, and not only along.
     """
-    points, weights = cloud.points @ _plumper(cloud), cloud.weights
+    _, (covariance,) = _statistics(cloud.points, cloud.weights, ALL)
+    spread, axes = np.linalg.eigh(covariance)
+    # Lengths along these axes are to each other as their square roots are.
+    plumper = axes / np.maximum(spread, SLENDEREST**2 * spread[2]) ** 0.25
+    points, weights = cloud.points @ plumper, cloud.weights
     order, starts = np.arange(len(points)), ALL
     for _ in range(halvings):
         center, covariance = _statistics(points[order], weights[order], starts)
@@ -310,14 +282,6 @@ def _cells(cloud: Cloud, halvings: int) -> tuple[Array, Array, Indices]:
         behind = sizes - np.add.reduceat(ahead, starts, dtype=np.intp)
         starts = np.union1d(starts, (starts + behind)[(behind > 0) & (behind < sizes)])
     return cloud.points[order], weights[order], starts
-
-
-def _plumper(cloud: Cloud) -> Array:
-    """Axes in which the cloud's lengths are to each other as their square roots are."""
-    _, (covariance,) = _statistics(cloud.points, cloud.weights, ALL)
-    spread, axes = np.linalg.eigh(covariance)
-    plumper: Array = axes / np.maximum(spread, SLENDEREST**2 * spread[2]) ** 0.25
-    return plumper
 
 
 def _statistics(points: Array, weights: Array, starts: Indices) -> tuple[Array, Array]:
@@ -380,8 +344,7 @@ def turning_speed(table: Array, rounded: Array, angular: Array) -> Array:
     low = ratios.take(corner) * (1 - b) + ratios.take(corner + 1) * b
     high = ratios.take(corner + SIDE + 1) * (1 - b) + ratios.take(corner + SIDE + 2) * b
     ratio = low * (1 - a) + high * a
-    speed: Array = np.sqrt(np.einsum("is,is->s", turned, turned)) * ratio
-    return speed
+    return np.asarray(np.sqrt(np.einsum("is,is->s", turned, turned)) * ratio)
 
 
 @dataclass(frozen=True, eq=False)
@@ -411,10 +374,7 @@ class LinkSurface:
 
     @classmethod
     def of(cls, triangles: Array, axis: Array | None) -> Self:
-        """Integrate over triangles in the joint's axes, or take the integrals from the cache.
-
-        ``axis`` is what the joint turns about, None if it turns about any.
-        """
+        """Integrate over triangles, or take it from the cache; ``axis`` as `Joint.turning_axis`."""
         content = hashlib.sha256(triangles.tobytes())
         content.update(b"any" if axis is None else axis.tobytes())
         kept = cached(f"{VERSION}-{content.hexdigest()}", lambda: _integrals(triangles, axis))
@@ -462,7 +422,8 @@ class Surface:
 
         Args:
             robot: The robot.
-            geometry: "visual", "collision", "hull" or "auto".
+            geometry: "visual", "collision", "hull" (of each visual), or "auto": the visual, or else
+                the collision.
 
         Raises:
             GeometryError: If a shape or a mesh cannot be read, or has no surface.
@@ -502,20 +463,10 @@ class Surface:
     @property
     def without_geometry(self) -> tuple[str, ...]:
         """Names of the links without geometry."""
-        pairs = zip(self.names, self.links, strict=True)
-        return tuple(name for name, link in pairs if link.area == 0.0)
+        return tuple(self.names[link] for link in np.flatnonzero(self.area == 0.0))
 
     def __str__(self) -> str:
         lines = [f"{'link':28} {'area [m²]':>9} {'lever [m]':>9}"]
         for name, link in zip(self.names, self.links, strict=True):
             lines.append(f"{name:28} {link.area:9.4f} {link.lever:9.4f}")
         return "\n".join([*lines, f"{'all':28} {self.area.sum():9.4f}"])
-
-
-def check_surface(surface: Surface, robot: Robot) -> None:
-    """Refuse a surface of another robot, by its number of links."""
-    if len(surface.names) != len(robot.joints):
-        raise GeometryError(
-            f"a surface of {len(surface.names)} links for {robot.name!r}, which has"
-            f" {len(robot.joints)}; expected Surface.of(robot)"
-        )
