@@ -181,9 +181,7 @@ class ToolControl:
             velocity=velocity,
             planned=planned,
             torque=self._tool.torque(
-                here,
-                velocity,
-                np.clip(acceleration, -HIGHEST_ACCELERATION, HIGHEST_ACCELERATION),
+                here, velocity, np.clip(acceleration, -HIGHEST_ACCELERATION, HIGHEST_ACCELERATION)
             ),
             lift=inverse[None, :, 2],
         )

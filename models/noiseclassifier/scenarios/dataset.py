@@ -416,11 +416,7 @@ def _make(folder: Folder, group: Sequence[Task]) -> Iterator[Task]:
 
 
 def logs(
-    folder: Folder,
-    *,
-    copies: int = 1,
-    rate: float | None = None,
-    side: Side = "all",
+    folder: Folder, *, copies: int = 1, rate: float | None = None, side: Side = "all"
 ) -> Iterator[tuple[str, Run]]:
     """Logs of the runs of wide domains, each with its name: ``<robot>/<fault>[.copy]-<seed>``."""
     if side not in get_args(Side):

@@ -45,12 +45,7 @@ class Force:
 
 def force(model: Any, load: Load) -> Force:
     """The force of a load in a simulation."""
-    kinds: dict[type, Any] = {
-        Payload: _weight,
-        Collision: _obstacle,
-        JointStop: _stop,
-        Push: _hand,
-    }
+    kinds: dict[type, Any] = {Payload: _weight, Collision: _obstacle, JointStop: _stop, Push: _hand}
     made: Force = kinds[type(load)](model, load)
     return made
 

@@ -15,15 +15,7 @@ from noiseclassifier.scenarios.drives import LOAD_SHARE, DomainDrives, Drives
 from noiseclassifier.scenarios.errors import DivergedError, ScenarioError, SimulationError, unknown
 from noiseclassifier.scenarios.faults import Defect, Faults, Imperfections, no_defect
 from noiseclassifier.scenarios.labels import RULE, annotate, unplanned
-from noiseclassifier.scenarios.motions import (
-    RATE,
-    STEP,
-    STEPS,
-    Event,
-    Plan,
-    multiplied,
-    times,
-)
+from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, Event, Plan, multiplied, times
 from noiseclassifier.scenarios.robots import ROBOTS, WIDE, Simulated
 from noiseclassifier.scenarios.table import FAULTS, SCENARIOS, THROUGHOUT, Scenario, suited
 from noisemodel import Run, decimated

@@ -156,12 +156,7 @@ def _joints(model: Any) -> tuple[Joint, ...]:
 
 
 def _add_bodies(
-    spec: Any,
-    model: Any,
-    joints: Sequence[Joint],
-    armature: Array,
-    damping: Array,
-    friction: Array,
+    spec: Any, model: Any, joints: Sequence[Joint], armature: Array, damping: Array, friction: Array
 ) -> list[Any]:
     """Add all bodies with their joints and drives; the world comes first."""
     bodies = [spec.worldbody]
