@@ -15,8 +15,7 @@ from noiseclassifier.scenarios.arm_reaching import (
 )
 from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Faults, Imperfections
-from noiseclassifier.scenarios.forces import force
-from noiseclassifier.scenarios.loop import Control, Reference, Scene
+from noiseclassifier.scenarios.loop import Control, Reference, Scene, force
 from noiseclassifier.scenarios.motions import (
     TICK,
     Box,
