@@ -46,22 +46,13 @@ MAX_COMPILED = 2**28  # most bytes of a compiled model
 
 @dataclass(frozen=True, eq=False)
 class Mjcf:
-    """What an MJCF describes.
+    """What an MJCF describes; free joints but the first are objects that stay where they are."""
 
-    Attributes:
-        model: The ``pinocchio.Model``.
-        floating_base: Whether its first joint lets the base move freely. Further free joints
-            belong to objects, which stay where the file puts them.
-        mimics: Joints that a linear equality constraint ties to another one, by name.
-        visual: The geoms that are drawn, by the rule of `_visual`.
-        collision: The geoms that can collide.
-    """
-
-    model: Any
-    floating_base: bool
-    mimics: Mapping[str, Mimic]
-    visual: tuple[LinkShape, ...]
-    collision: tuple[LinkShape, ...]
+    model: Any  # pinocchio.Model
+    floating_base: bool  # whether the first joint lets the base move freely
+    mimics: Mapping[str, Mimic]  # joints that a linear equality ties to another one, by name
+    visual: tuple[LinkShape, ...]  # the geoms that are drawn, by the rule of `_visual`
+    collision: tuple[LinkShape, ...]  # the geoms that can collide
 
 
 def is_mjcf(path: Path) -> bool:

@@ -470,29 +470,16 @@ def _squares(
 
 @dataclass(frozen=True, eq=False)
 class LinkNoise:
-    """Sound power of each link.
+    """Sound power of each link."""
 
-    Attributes:
-        kind: How the mean speed of a surface was taken.
-        links: Names of the links, shape (links,).
-        movers: Names of the joints that move each link, shape (links,).
-        time: Centres of the bins, shape (bins,), in [s].
-        power: Mean power in each bin, shape (bins, links), in [W].
-        vibration: That of the measured motion above 10 Hz alone, normal to the surface,
-            shape (bins, links), in [W].
-        terms: Total power by each of the paper's terms A, B and C, shape (bins,), in [W]; empty
-            unless they are requested.
-        remarks: What is missing or assumed, a sentence each.
-    """
-
-    kind: str
-    links: tuple[str, ...]
-    movers: tuple[frozenset[str], ...]
-    time: Array
-    power: Array
-    vibration: Array
-    terms: dict[str, Array]
-    remarks: tuple[str, ...]
+    kind: str  # how the mean speed of a surface was taken
+    links: tuple[str, ...]  # names
+    movers: tuple[frozenset[str], ...]  # names of the joints that move each link
+    time: Array  # centres of the bins, shape (bins,), in [s]
+    power: Array  # mean in each bin, shape (bins, links), in [W]
+    vibration: Array  # of the measured motion above 10 Hz alone, normal to the surface, as power
+    terms: dict[str, Array]  # total by the paper's term, shape (bins,), in [W]; if requested
+    remarks: tuple[str, ...]  # what is missing or assumed, a sentence each
 
     @property
     def total(self) -> Array:

@@ -52,15 +52,10 @@ CHUNK = 4096  # samples worked on at once: few enough for the cache, with little
 
 @dataclass(frozen=True)
 class Listed:
-    """A robot of the list.
+    """A robot of the list."""
 
-    Attributes:
-        urdf: Path of its URDF, below the robots' folder of example-robot-data.
-        floating_base: Whether it moves freely in space.
-    """
-
-    urdf: str
-    floating_base: bool = False
+    urdf: str  # path below the robots' folder of example-robot-data
+    floating_base: bool = False  # whether it moves freely in space
 
 
 _tables = tomllib.loads(Path(__file__).with_name("robots.toml").read_text())
@@ -74,32 +69,20 @@ ROBOTS: Mapping[str, Listed] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Joint:
-    """How one joint moves its link.
-
-    Attributes:
-        name: Its name.
-        kind: "revolute", "continuous", "prismatic", "floating" or "planar".
-        parent: Index of the joint that carries it; 0 is the universe.
-        first_q: Index of its first entry in the configuration.
-        first_v: Index of its first entry in the velocity.
-        axis: Index of the coordinate axis that it moves about or along, after ``turn``.
-        turn: Rotation from the joint's axes to axes of which one is the joint's own, or None
-            where that is so already, shape (3, 3).
-        shift: Twist of the parent to twist of the resting joint, in those axes, shape (6, 6).
-        multiplier: Ratio to the joint that ``first_q`` belongs to (mimic joints).
-        offset: Added to the position (mimic joints), in [rad] or [m].
-    """
+    """How one joint moves its link."""
 
     name: str
-    kind: str
-    parent: int
-    first_q: int
-    first_v: int
-    axis: int
+    kind: str  # one of the values of `KINDS`
+    parent: int  # index of the joint that carries it; 0 is the universe
+    first_q: int  # index of its first entry in the configuration
+    first_v: int  # index of its first entry in the velocity
+    axis: int  # index of the coordinate axis that it moves about or along, after ``turn``
+    # Rotation from the joint's axes to axes of which one is the joint's own, shape (3, 3), or None
+    # where that is so already.
     turn: Array | None
-    shift: Array
-    multiplier: float = 1.0
-    offset: float = 0.0
+    shift: Array  # twist of the parent to twist of the resting joint, in those axes, shape (6, 6)
+    multiplier: float = 1.0  # of a mimic joint: ratio to the joint that ``first_q`` belongs to
+    offset: float = 0.0  # of a mimic joint: added to the position, in [rad] or [m]
 
     @property
     def nq(self) -> int:

@@ -349,27 +349,17 @@ def turning_speed(table: Array, rounded: Array, angular: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class LinkSurface:
-    """The surface of a link, in its joint's axes; all is 0 where there is no geometry.
+    """The surface of a link, in its joint's axes; all is 0 where there is no geometry."""
 
-    Attributes:
-        area: In [m²].
-        centroid: Shape (3,), in [m].
-        lever: Mean distance from the axis that the joint turns about (the paper's G), in [m]; 0
-            for a joint that slides, nan for a floating base, which turns about any axis.
-        mean_square: Under a twist nu the mean-square speed is nu' M nu, shape (6, 6).
-        mean_square_normal: The same for the speed normal to the surface, shape (6, 6).
-        rounding: Axes in which equal rotations have equal mean-square speed, shape (3, 3).
-        turning: Ratio of mean to root-mean-square speed of rotations, by axis, as a table.
-        points: Weighted points on the surface.
-    """
-
-    area: float
-    centroid: Array
+    area: float  # in [m²]
+    centroid: Array  # shape (3,), in [m]
+    # Mean distance from the axis that the joint turns about (the paper's G), in [m]; 0 for a joint
+    # that slides, nan for a floating base, which turns about any axis.
     lever: float
-    mean_square: Array
-    mean_square_normal: Array
-    rounding: Array
-    turning: Array
+    mean_square: Array  # under a twist nu the mean-square speed is nu' M nu, shape (6, 6)
+    mean_square_normal: Array  # the same for the speed normal to the surface, shape (6, 6)
+    rounding: Array  # axes in which equal rotations have equal mean-square speed, shape (3, 3)
+    turning: Array  # ratio of mean to root-mean-square speed of rotations, by axis, as a table
     points: Cloud
 
     @classmethod

@@ -38,23 +38,13 @@ class Mimic:
 
 @dataclass(frozen=True, eq=False)
 class LinkShape:
-    """A piece of geometry of a link.
+    """A piece of geometry of a link."""
 
-    Attributes:
-        link: The link's name.
-        matrix: From the geometry's numbers to the link's axes: its scale, then its rotation,
-            shape (3, 3).
-        translation: The geometry's origin in the link's axes, shape (3,), in [m].
-        body: The address of a mesh, or the triangles of a simple shape, shape (triangles,
-            3 corners, 3), in [m].
-        colour: Red, green, blue and opacity, from 0 to 1; empty unless it was read.
-    """
-
-    link: str
-    matrix: Array
-    translation: Array
-    body: str | Array
-    colour: tuple[float, ...] = ()
+    link: str  # name
+    matrix: Array  # from its numbers to the link's axes: scale, then rotation, shape (3, 3)
+    translation: Array  # its origin in the link's axes, shape (3,), in [m]
+    body: str | Array  # address of a mesh, or triangles, (triangles, 3 corners, 3), in [m]
+    colour: tuple[float, ...] = ()  # red, green, blue and opacity, 0 to 1; empty unless it was read
 
 
 def checked(path: Path) -> ET.Element:
