@@ -28,8 +28,7 @@ from noiseclassifier.measures import (
     plain,
 )
 from noiseclassifier.recording import Recording, check_apart, group_of, seen
-from noiseclassifier.signals import named
-from noiseclassifier.types import Array
+from noiseclassifier.signals import Array, named
 
 FORMAT = "noise-evaluation/3"
 ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"

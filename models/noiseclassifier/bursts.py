@@ -18,7 +18,7 @@ import numpy as np
 
 from noiseclassifier.labels import Event
 from noiseclassifier.lasting import AROUND, HIGHEST, STRONG, Windows, merged, spectrum
-from noiseclassifier.types import Array
+from noiseclassifier.signals import Array
 
 WINDOW, HOP = 0.5, 0.125
 """Duration of a window, and time from one to the next, in [s]."""

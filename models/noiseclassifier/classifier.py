@@ -16,8 +16,7 @@ from noiseclassifier.labels import UNKNOWN, Labels
 from noiseclassifier.measures import Evaluation
 from noiseclassifier.profile import NOMINAL, Profile
 from noiseclassifier.reference import Rest
-from noiseclassifier.signals import Signals, feeds, stacked
-from noiseclassifier.types import Array, Index, Mask, Real, Words
+from noiseclassifier.signals import Array, Index, Mask, Real, Signals, Words, feeds, stacked
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ from noiseclassifier.features import features, frame
 from noiseclassifier.noisytest import read_folder
 from noiseclassifier.profile import NOMINAL, Profile
 from noiseclassifier.recording import Block, Recording, group_of
-from noiseclassifier.signals import stacked
-from noiseclassifier.types import Array, Mask, Real, Words
+from noiseclassifier.signals import Array, Mask, Real, Words, stacked
 
 CHUNK = 64
 """Frames per evaluation, which bounds the memory that they take."""

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from noiseclassifier.errors import SignalError
 from noiseclassifier.profile import STATISTICS, Profile, Resolution, columns, spectra
 from noiseclassifier.reference import RunningReference
-from noiseclassifier.signals import Signals, by_joint, stacked
-from noiseclassifier.types import Array, Index, Mask, Real
+from noiseclassifier.signals import Array, Index, Mask, Real, Signals, by_joint, stacked
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 

@@ -24,8 +24,7 @@ from noiseclassifier.matching import OK, UNCLEAR, truth_of, within
 from noiseclassifier.measures import Evaluation
 from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, RELATIVE, TOLERANCE, LogBands
 from noiseclassifier.recording import Recording
-from noiseclassifier.signals import EFFORT, NOISE, feeds, named
-from noiseclassifier.types import Array
+from noiseclassifier.signals import EFFORT, NOISE, Array, feeds, named
 
 LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
 """Of the inputs, those that training takes of each log: the others lack features of the first."""

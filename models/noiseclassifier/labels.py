@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from noiseclassifier.types import Array, Index, Mask, Words
+from noiseclassifier.signals import Array, Index, Mask, Words
 
 if TYPE_CHECKING:
     import pyarrow

@@ -23,8 +23,7 @@ from itertools import pairwise
 import numpy as np
 
 from noiseclassifier.labels import UNKNOWN, Event
-from noiseclassifier.signals import JOINTS
-from noiseclassifier.types import Array, Mask, Real
+from noiseclassifier.signals import JOINTS, Array, Mask, Real
 
 WINDOW, HOP = 1.0, 0.25
 """Duration of a window, and time from one to the next, in [s]."""

@@ -32,7 +32,7 @@ import numpy as np
 
 from noiseclassifier.labels import CONFIRM, UNKNOWN, Event, Labels, sides
 from noiseclassifier.recording import Block, Fault, Recording, robot_of
-from noiseclassifier.types import Array, Index, Mask, Words
+from noiseclassifier.signals import Array, Index, Mask, Words
 
 OK, UNCLEAR = "ok", ""
 UNNAMED = "unnamed"

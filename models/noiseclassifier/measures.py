@@ -49,7 +49,7 @@ from noiseclassifier.matching import (
     Unanswered,
     are_probabilities,
 )
-from noiseclassifier.types import Array, Index, Mask, Words
+from noiseclassifier.signals import Array, Index, Mask, Words
 
 RESAMPLES = 2000
 SEED = 0

@@ -30,7 +30,7 @@ from noiseclassifier.estimators.trees import Trees
 from noiseclassifier.features import feature_count
 from noiseclassifier.jsontext import from_json
 from noiseclassifier.profile import HIGHEST, LogBands, Profile
-from noiseclassifier.types import Array
+from noiseclassifier.signals import Array
 
 FORMAT = "noise-model/6"
 OLD_FORMATS = ("noise-model/4", "noise-model/5")

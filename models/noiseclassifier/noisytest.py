@@ -14,7 +14,7 @@ from noiseclassifier.errors import AnnotationError, FileError, RateError
 from noiseclassifier.jsontext import from_toml, text_of
 from noiseclassifier.profile import TOLERANCE
 from noiseclassifier.recording import Block, Recording
-from noiseclassifier.types import Array
+from noiseclassifier.signals import Array
 
 LONGEST_LINE = 2**16
 """Characters of a line: far more than two numbers and a comment have."""

@@ -14,8 +14,7 @@ from typing import Any, Literal, Self, TypeAlias, get_args
 import numpy as np
 
 from noiseclassifier.errors import ProfileError
-from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE, by_joint
-from noiseclassifier.types import Index
+from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE, Index, by_joint
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 """NoisyTest's classes, in its order; `ok` is the first of every model."""

@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from noiseclassifier.errors import DatasetError, RecordingError
-from noiseclassifier.signals import NOISE, Signals, by_joint, named
-from noiseclassifier.types import Array, Index, Mask
+from noiseclassifier.signals import NOISE, Array, Index, Mask, Signals, by_joint, named
 
 
 class Block(NamedTuple):

@@ -12,7 +12,7 @@ distribution (P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5
 
 import numpy as np
 
-from noiseclassifier.types import Array, Index, Mask
+from noiseclassifier.signals import Array, Index, Mask
 
 LEAST = 0.15
 """Added to each spread, in [Np]: features of a robot that stands hardly vary at all."""

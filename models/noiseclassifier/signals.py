@@ -1,4 +1,4 @@
-"""Signals: the input of a classifier, one noise estimate or several signals by name.
+"""Signals: the input of a classifier, one noise estimate or several signals by name; array types.
 
 A signal is a norm, shape (samples,), or what the norm is of, joint by joint, shape
 (joints, samples), by its name. Stacked, they are rows: norms first, and then all joints of
@@ -6,12 +6,18 @@ one signal after the joints of the other.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from noiseclassifier.errors import MissingSignalError, SignalError
-from noiseclassifier.types import Real
+
+Array: TypeAlias = NDArray[np.float64]
+Real: TypeAlias = NDArray[np.floating[Any]]
+Mask: TypeAlias = NDArray[np.bool_]
+Index: TypeAlias = NDArray[np.intp]
+Words: TypeAlias = NDArray[np.str_]
 
 NOISE = "noise"
 """The one signal of the paper, p_hat = sqrt(|qd|^2 + |qd_desired|^2) (Sec. II-A)."""

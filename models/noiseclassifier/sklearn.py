@@ -53,7 +53,7 @@ from noiseclassifier.estimators import ESTIMATORS
 from noiseclassifier.estimators.decision import Probable
 from noiseclassifier.features import feature_count, standard
 from noiseclassifier.profile import GENERAL, SCALAR, LogBands, Profile
-from noiseclassifier.types import Array
+from noiseclassifier.signals import Array
 
 RECIPES = {"scalar": SCALAR, "general": GENERAL}
 """Profiles that have a name here."""

@@ -27,7 +27,7 @@ from noiseclassifier.labels import UNKNOWN
 from noiseclassifier.measures import Evaluation, plain
 from noiseclassifier.profile import Kernel, Multiclass, Profile
 from noiseclassifier.recording import Recording
-from noiseclassifier.types import Array, Index, Words
+from noiseclassifier.signals import Array, Index, Words
 
 Value: TypeAlias = int | float | str
 Point: TypeAlias = Mapping[str, Value]

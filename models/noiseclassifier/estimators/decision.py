@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from noiseclassifier.profile import Profile
-from noiseclassifier.types import Array, Index, Mask
+from noiseclassifier.signals import Array, Index, Mask
 
 TINY = 1e-12
 """Added to a probability before its logarithm."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from noiseclassifier.estimators.decision import TINY, Probable, calibrate, identity, of_seen_classes
 from noiseclassifier.profile import Profile
 from noiseclassifier.recording import folds
-from noiseclassifier.types import Array, Index, Words
+from noiseclassifier.signals import Array, Index, Words
 
 Single: TypeAlias = NDArray[np.float32]
 

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from noiseclassifier.profile import Kernel, Multiclass, Profile
-from noiseclassifier.types import Array, Index, Words
+from noiseclassifier.signals import Array, Index, Words
 
 
 @dataclass(frozen=True, eq=False)

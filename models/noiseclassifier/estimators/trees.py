@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from noiseclassifier.estimators.decision import Probable, calibrate, identity, of_seen_classes
 from noiseclassifier.profile import MOST_LEAVES, Profile
 from noiseclassifier.recording import folds
-from noiseclassifier.types import Array, Index, Mask, Words
+from noiseclassifier.signals import Array, Index, Mask, Words
 
 BATCH = 32
 """Frames that are evaluated together: fewer take longer, more take memory and no less time."""
