@@ -1,5 +1,6 @@
 """Features relative to a reference: the signal as far as it has come, or the rest of it."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import noiseclassifier as nc
-from noiseclassifier import reference as module
-from noiseclassifier.features import frame_features
-from noiseclassifier.reference import LEAST, NORMAL, Rest, RunningReference
+from noiseclassifier.features import LEAST_SPREAD, NORMAL, Rest, RunningReference, frame_features
 
+module = sys.modules["noiseclassifier.features"]
 RECIPE = replace(nc.ANY, rounds=5)
 RATES = (80.0, 125.0, 500.0, 1000.0)
 
@@ -36,7 +36,7 @@ def by_median(good, features):
     """Features less the median of good ones, in their deviations, within 15."""
     location = np.median(good, axis=0)
     spread = NORMAL * np.median(np.abs(good - location), axis=0)
-    return np.clip((features - location) / (spread + LEAST), -15.0, 15.0)
+    return np.clip((features - location) / (spread + LEAST_SPREAD), -15.0, 15.0)
 
 
 def test_a_running_reference_has_a_memory_of_a_minute():
@@ -58,7 +58,7 @@ def test_a_running_reference_is_the_mean_of_frames_within_its_spread():
 def test_the_first_frame_of_a_signal_is_its_own_reference():
     np.testing.assert_array_equal(RunningReference().relative(frames()[:1]), np.zeros((1, 5)))
     second = RunningReference().relative(np.array([[0.0], [0.01]]))[1, 0]
-    assert 0.0 < second < 0.01 / LEAST  # the spread before anything is known is not 0
+    assert 0.0 < second < 0.01 / LEAST_SPREAD  # the spread before anything is known is not 0
 
 
 @given(first=st.integers(0, 40), louder=st.floats(-50.0, 50.0))

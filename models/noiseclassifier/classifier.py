@@ -11,11 +11,10 @@ from noiseclassifier import modelfile
 from noiseclassifier.dataset import CHUNK, Dataset, Examples, features_in_chunks
 from noiseclassifier.errors import DatasetError, FileError, MissingSignalError, RateError
 from noiseclassifier.estimators import ESTIMATORS, Estimator
-from noiseclassifier.features import FrameFeatures, Frames, frames_of, standard
+from noiseclassifier.features import FrameFeatures, Frames, Rest, frames_of, standard
 from noiseclassifier.labels import UNKNOWN, Labels
 from noiseclassifier.measures import Evaluation
 from noiseclassifier.profile import NOMINAL, Profile
-from noiseclassifier.reference import Rest
 from noiseclassifier.signals import Array, Index, Mask, Real, Signals, Words, feeds, stacked
 
 

@@ -112,7 +112,7 @@ class Profile:
     neither desired nor tracked."""
     reference: bool = False
     """Whether log-band energies and their differences from the signal before are features as they
-    are, and once more relative to a reference (`noiseclassifier.reference`)."""
+    are, and once more relative to a reference (`features.RunningReference`)."""
     floor: float = 1e-6
     """Added to an amplitude before its logarithm."""
     least_deviation: float = 0.0
