@@ -8,9 +8,9 @@ import pytest
 from generalmodel import RATES, RECIPE, frames, recording, signals, trained
 
 import noiseclassifier as nc
+from noiseclassifier.classifier import LEARNT
 from noiseclassifier.estimators.trees import Trees
 from noiseclassifier.features import frame_features
-from noiseclassifier.general import LEARNT
 from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, columns
 from noiseclassifier.signals import JOINTS, MOTION, NOISE
 

@@ -13,7 +13,15 @@ only to train.
 
 from noiseclassifier.assessment import Assessment, assess, evaluate
 from noiseclassifier.bursts import Bursts
-from noiseclassifier.classifier import Classifier, Stream
+from noiseclassifier.classifier import (
+    Classifier,
+    General,
+    Model,
+    Stream,
+    frames_of,
+    load,
+    nearest,
+)
 from noiseclassifier.dataset import Dataset, Examples
 from noiseclassifier.errors import (
     AnnotationError,
@@ -29,7 +37,6 @@ from noiseclassifier.errors import (
     SignalError,
 )
 from noiseclassifier.features import features, frame
-from noiseclassifier.general import General, Model, frames_of, load, nearest
 from noiseclassifier.labels import UNKNOWN, Event, Labels
 from noiseclassifier.lasting import Lasting, merged
 from noiseclassifier.matching import Unanswered, match

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from noiseclassifier.classifier import Classifier
+from noiseclassifier.classifier import Classifier, Model
 from noiseclassifier.dataset import Dataset, Examples, check
 from noiseclassifier.errors import DatasetError, SignalError
-from noiseclassifier.general import Model
 from noiseclassifier.labels import Event, Labels, interval
 from noiseclassifier.matching import FALSE, UNCLEAR, Predictions, Unanswered, within
 from noiseclassifier.measures import (

@@ -492,10 +492,12 @@ def frame_features(signal: Signals, profile: Profile, valid: Mask | None = None)
         profile: How it is framed, and what to compute.
         valid: False in gaps, shape (samples,); frames that touch a gap are left out.
     """
-    return _joined([*frames_of([(signal, valid)], profile)])
+    return _joined([*features_of_pieces([(signal, valid)], profile)])
 
 
-def frames_of(pieces: Iterable[tuple[Signals, Mask | None]], profile: Profile) -> Iterator[Frames]:
+def features_of_pieces(
+    pieces: Iterable[tuple[Signals, Mask | None]], profile: Profile
+) -> Iterator[Frames]:
     """Features of all frames of a signal that comes in pieces, the same as of the whole one.
 
     Args:
