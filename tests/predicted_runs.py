@@ -1,6 +1,7 @@
 """Recordings with predictions of a made-up model."""
 
 import numpy as np
+from scipy.stats import chi2
 
 from noiseclassifier.labels import Labels
 from noiseclassifier.matching import Predictions
@@ -68,3 +69,9 @@ def many(seeds, labels=None):
         for seed in range(seeds)
         for scenario, annotated in (("good", GOOD), ("blow", IMPACT), ("swing", OSCILLATION))
     ]
+
+
+def garwood(events):
+    """Exact bounds of the mean of a Poisson distribution with 95 %, Garwood (1936)."""
+    low = chi2.ppf(0.025, 2 * events) / 2 if events else 0.0
+    return low, chi2.ppf(0.975, 2 * events + 2) / 2

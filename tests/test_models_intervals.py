@@ -2,8 +2,9 @@ from math import isnan, nan
 
 import numpy as np
 import pytest
+from predicted_runs import garwood
 
-from noiseclassifier.measures import Resampling, garwood
+from noiseclassifier.measures import Resampling, fay_feuer, plain
 
 
 def each_its_own(runs):
@@ -20,9 +21,9 @@ def rate_of(resampling, events, time):
 
 def test_bounds_of_rare_events_are_those_of_the_tables():
     # Garwood (1936), 95 %
-    assert garwood(0) == pytest.approx((0.0, 3.6889), abs=1e-4)
-    assert garwood(1) == pytest.approx((0.0253, 5.5716), abs=1e-4)
-    assert garwood(10) == pytest.approx((4.7954, 18.3904), abs=1e-4)
+    assert fay_feuer(np.array([0]), np.ones(1)) == pytest.approx((0.0, 3.6889), abs=1e-4)
+    assert fay_feuer(np.array([1]), np.ones(1)) == pytest.approx((0.0253, 5.5716), abs=1e-4)
+    assert fay_feuer(np.array([10]), np.ones(1)) == pytest.approx((4.7954, 18.3904), abs=1e-4)
 
 
 def test_clustered_events_have_wider_intervals_than_single_ones():
@@ -78,7 +79,7 @@ def test_only_runs_in_the_sample_of_a_measure_count():
     assert share_of(each_its_own(7), whole / 2, whole).runs == 5
     nothing = share_of(each_its_own(7), np.zeros(7), np.zeros(7))
     assert isnan(nothing.value)
-    assert nothing.as_dict() == {"value": None, "low": None, "high": None, "runs": 0, "groups": 0}
+    assert plain(nothing) == {"value": None, "low": None, "high": None, "runs": 0, "groups": 0}
 
 
 def test_the_mean_of_two_sets_that_are_the_same_is_the_share_of_the_set():

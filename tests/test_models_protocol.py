@@ -6,7 +6,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, predicted
+from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, garwood, predicted
 
 from noiseclassifier import match, measures
 from noiseclassifier.assessment import protocol_lines as lines_of
@@ -28,7 +28,6 @@ from noiseclassifier.measures import (
     Resampling,
     auc,
     fay_feuer,
-    garwood,
     harmonic_mean,
 )
 from noiseclassifier.recording import Fault

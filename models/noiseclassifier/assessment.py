@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isnan
 from typing import Any
 
@@ -12,14 +12,22 @@ from noiseclassifier.classifier import Classifier, Model
 from noiseclassifier.dataset import Dataset, Examples, check
 from noiseclassifier.errors import DatasetError, SignalError
 from noiseclassifier.labels import Event, Labels, interval
-from noiseclassifier.matching import FALSE, UNCLEAR, Predictions, Unanswered, within
+from noiseclassifier.matching import (
+    FALSE,
+    OK,
+    UNCLEAR,
+    Predictions,
+    Unanswered,
+    origin_of,
+    truth_of,
+    within,
+)
 from noiseclassifier.measures import (
     LEAST_GROUPS,
     RATES,
     WORST,
     Estimate,
     Evaluation,
-    Part,
     Protocol,
     Resampling,
     calibration,
@@ -56,17 +64,18 @@ ROWS = (
     ("  F1", "any_f1", ""),
 )
 """Title, measure and counts of each row."""
-COLUMNS = (
-    ("false/h", "false_alarms_per_hour"),
-    ("ok flagged", "ok_flagged"),
-    ("unlab./h", "alarms_in_unlabelled_per_hour"),
-    ("found", "recall_injected"),
-    ("detectable", "recall_felt"),
-    ("F1 class", "class_f1"),
-    ("delay", "delay"),
-)
+COLUMNS = {
+    "false/h": "false_alarms_per_hour",
+    "ok flagged": "ok_flagged",
+    "unlab./h": "alarms_in_unlabelled_per_hour",
+    "found": "recall_injected",
+    "detectable": "recall_felt",
+    "F1 class": "class_f1",
+    "delay": "delay",
+}
+"""Measures of a table by robot or domain, by title."""
 
-
+Form = Callable[[float], str]
 Localise = Callable[[Recording, Labels], tuple[tuple[Event, ...], tuple[Event, ...]]]
 """Gives the events of labels by their frames, and the same from onset to end."""
 
@@ -103,29 +112,16 @@ class Assessment:
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
-        frames = {
-            name: (
-                {label: one.as_dict() for label, one in each.items()}
-                if isinstance(each, dict)
-                else each.as_dict()
-            )
-            for name, each in self.frames.items()
-        }
-        bins = {name: plain(each.tolist()) for name, each in (self.reliability or {}).items()}
+        names = ("runs", "groups", "blocks", "runs_with", "copies", "seen")
         return {
             "format": FORMAT,
-            "runs": self.runs,
-            "groups": self.groups,
-            "blocks": self.blocks,
-            "runs_with": self.runs_with,
-            "copies": self.copies,
-            "seen": self.seen,
+            **{name: getattr(self, name) for name in names},
             "protocol": self.protocol.as_dict(),
             "classes": list(self.evaluation.classes),
             "confusion": self.evaluation.confusion.tolist(),
-            "frames": {"frames": int(self.evaluation.frames), **frames},
-            "calibration_error": self.calibration_error and self.calibration_error.as_dict(),
-            "reliability": bins or None,
+            "frames": {"frames": int(self.evaluation.frames), **plain(self.frames)},
+            "calibration_error": plain(self.calibration_error),
+            "reliability": plain(self.reliability),
         }
 
     def __str__(self) -> str:
@@ -195,28 +191,27 @@ def assess(
 def predict(
     classifier: Classifier, recording: Recording, localise: Localise | None = None
 ) -> Predictions:
-    """Predictions of a model on a recording, on its annotated blocks and from end to end.
-
-    A recording whose blocks all lie in gaps has no frame of a block.
-
-    Args:
-        localise: Estimates onset and end of the findings; else they last as their frames do.
-    """
-    check(recording, classifier.profile)
-    truth = predicted = np.array([], dtype=str)
-    if not classifier.profile.reference:
-        with suppress(DatasetError):  # no frame without a gap
-            # Frames that are cut from blocks, as the paper does for validation.
-            dataset = Dataset.of([recording], classifier.profile, training=False)
-            truth, predicted = dataset.labels, classifier.predict(dataset.frames)
+    """Predictions of a model on a recording, on its annotated blocks and from end to end."""
+    profile, blocks, step = classifier.profile, within(recording), 1.0 / recording.rate
+    check(recording, profile)
     labels = classifier.classify(
         recording.signal, recording.rate, start=recording.start, valid=recording.valid
     )
-    found = Predictions(
+    truth = predicted = np.array([], dtype=str)
+    if profile.reference:
+        # Frames that are cut out of blocks have no reference: those of the whole recording count.
+        truth = truth_of(labels.start, labels.stop, blocks, step=step)
+        truth, predicted = truth[truth != UNCLEAR], labels.label[truth != UNCLEAR]
+    else:
+        with suppress(DatasetError):  # all blocks lie in gaps
+            # Frames that are cut from blocks, as the paper does for validation.
+            dataset = Dataset.of([recording], profile, training=False)
+            truth, predicted = dataset.labels, classifier.predict(dataset.frames)
+    return Predictions(
         recording.name,
         group_of(recording.name),
-        1.0 / recording.rate,
-        within(recording),
+        step,
+        blocks,
         truth,
         predicted,
         labels,
@@ -224,11 +219,6 @@ def predict(
         recording.facts,
         localise(recording, labels) if localise and len(labels) else None,
     )
-    if not classifier.profile.reference:
-        return found
-    # Frames that are cut out of blocks have no reference: those of the whole recording count.
-    known = found.whole_truth != UNCLEAR
-    return replace(found, truth=found.whole_truth[known], predicted=labels.label[known])
 
 
 def measure(
@@ -238,13 +228,7 @@ def measure(
     copies: Mapping[str, str] | None = None,
     known: Mapping[str, str] | None = None,
 ) -> Assessment:
-    """Assessment of predictions.
-
-    Args:
-        unanswered: Recordings without a verdict.
-        copies: Recordings that were left out, and the equal one of each.
-        known: Recordings that the model was trained on, and what of them.
-    """
+    """Assessment of predictions; the other recordings are listed."""
     if unanswered and not predictions:
         first = unanswered[0]
         raise DatasetError(
@@ -292,9 +276,18 @@ def table(assessment: Assessment, by: str = "") -> str:
     Args:
         by: ``robot``, ``domain`` or ``scenario``: the one table of parts to print, whole.
     """
-    protocol = assessment.protocol
-    paragraphs = [_head(assessment), *protocol_lines(protocol, by), _errors(protocol)]
-    paragraphs += [part(assessment) for part in (_frames, _paper, _confusion, _foot)]
+    foot = ["Brackets are 95 % confidence intervals over groups of runs."]
+    if assessment.groups < LEAST_GROUPS:
+        foot.append(f"Measures of fewer than {LEAST_GROUPS} groups have none.")
+    paragraphs = [
+        _head(assessment),
+        *protocol_lines(assessment.protocol, by),
+        _errors(assessment.protocol),
+        _frames(assessment),
+        _paper(assessment),
+        _confusion(assessment.evaluation),
+        foot,
+    ]
     return "\n\n".join("\n".join(lines) for lines in paragraphs if lines)
 
 
@@ -304,18 +297,6 @@ def protocol_lines(protocol: Protocol, by: str = "") -> list[list[str]]:
     parts = [_summary(protocol), _not_answered(protocol), _worst(protocol)]
     parts += [_table(protocol, key, whole=bool(by)) for key in keys]
     return [part for part in parts if part]
-
-
-def percent(estimate: Estimate) -> str:
-    """A share as text: ``97.9% [96.1, 98.8]``."""
-    return _ranged(estimate, _share)
-
-
-def number(estimate: Estimate, unit: str = "") -> str:
-    """A number of any unit as text: ``0.14 s [0.12, 0.15]``."""
-    text = _ranged(estimate, _rate)
-    value, bracket, bounds = text.partition(" [")
-    return f"{value} {unit}{bracket}{bounds}" if unit and text != "-" else text
 
 
 def _head(assessment: Assessment) -> list[str]:
@@ -342,37 +323,35 @@ def _head(assessment: Assessment) -> list[str]:
 
 
 def _summary(protocol: Protocol) -> list[str]:
-    counts, delay = protocol.counts, protocol.pooled["delay"]
+    counts, alike, pooled = protocol.counts, protocol.alike, protocol.pooled
     lines = [
         "At the operating point that ships: findings as `inspector classify` reports them",
         _line("", ["robots alike", "all runs pooled"], ["by chance", "counts"]),
     ]
     for title, name, behind in ROWS:
-        form = _rate if name in RATES else _share
-        chance = protocol.by_chance.get(name)
+        figures = [_ranged(each[name], _form(name)) for each in (alike, pooled)]
+        chance = _share(protocol.by_chance[name]) if name in protocol.by_chance else ""
         count = " of ".join(f"{counts[each]:.0f}" for each in behind.split("/")) if behind else ""
-        figures = [_ranged(each[name], form) for each in (protocol.alike, protocol.pooled)]
-        lines.append(_line(title, figures, ["" if chance is None else _share(chance), count]))
-    late = _time(protocol.alike["late_delay"].value)
-    figures = [f"{_time(protocol.alike['delay'].value)}, 90 %: {late}", _ranged(delay, _time)]
-    lines.append(_line("Delay until a live listener knows", figures))
-    for title, value in (
-        ("AUC of runs, mean over domains", protocol.auc),
-        ("pAUC (FPR up to 10 %)", protocol.pauc),
-        ("Score of DCASE task 2 (harmonic mean)", protocol.official),
-    ):
-        lines.append(_line(title, [_share(value), ""], ["50.0%"]))
+        lines.append(_line(title, figures, [chance, count]))
+    late = f"{_time(alike['delay'].value)}, 90 %: {_time(alike['late_delay'].value)}"
+    figures = [late, _ranged(pooled["delay"], _time)]
     runs = len(protocol.outcomes) + len(protocol.unanswered)
     count = f"{len(protocol.unanswered)} of {runs}"
-    figures = [_share(protocol.not_answered), ""]
-    return [*lines, _line("Runs without a verdict", figures, ["", count])]
+    return [
+        *lines,
+        _line("Delay until a live listener knows", figures),
+        _line("AUC of runs, mean over domains", [_share(protocol.auc), ""], ["50.0%"]),
+        _line("pAUC (FPR up to 10 %)", [_share(protocol.pauc), ""], ["50.0%"]),
+        _line("Score of DCASE task 2 (harmonic mean)", [_share(protocol.official), ""], ["50.0%"]),
+        _line("Runs without a verdict", [_share(protocol.not_answered), ""], ["", count]),
+    ]
 
 
 def _not_answered(protocol: Protocol) -> list[str]:
     """Reasons why runs have no verdict, each with its runs and robots."""
     reasons: dict[str, list[str]] = {}
     for each in protocol.unanswered:
-        reasons.setdefault(each.reason, []).append(each.origin["robot"])
+        reasons.setdefault(each.reason, []).append(origin_of(each)["robot"])
     lines = []
     for reason, robots in reasons.items():
         names = sorted(set(robots))
@@ -387,59 +366,58 @@ def _worst(protocol: Protocol) -> list[str]:
     cases, cells = protocol.cases, protocol.cells
     if worst := protocol.worst(cases, "recall_injected"):
         lines.append(f"The worst {len(worst)} of robot and scenario, by injected faults found")
-        for key in worst:
-            counts = cases[key].counts
-            found = (
-                f"{counts['found']:.0f} of {counts['faults']:.0f} injected,"
-                f" {counts['found_felt']:.0f} of {counts['felt']:.0f} detectable"
-            )
-            share = _share(cases[key].measures["recall_injected"])
-            lines.append(_line("  " + _short(" ".join(key)), [share], [found]))
-    for measure in ("false_alarms_per_hour", "alarms_in_unlabelled_per_hour"):
+    for key in worst:
+        counts = cases[key].counts
+        found = (
+            f"{counts['found']:.0f} of {counts['faults']:.0f} injected,"
+            f" {counts['found_felt']:.0f} of {counts['felt']:.0f} detectable"
+        )
+        share = _share(cases[key].measures["recall_injected"])
+        lines.append(_line("  " + _short(" ".join(key)), [share], [found]))
+    for measure, what in (
+        ("false_alarms_per_hour", "ok time"),
+        ("alarms_in_unlabelled_per_hour", "unlabelled time"),
+    ):
+        alarms, hours = RATES[measure]
         if worst := protocol.worst(cells, measure):
-            what = "unlabelled time" if "unlabelled" in measure else "ok time"
-            lines.append(
-                f"The worst {len(worst)} of robot and domain, by alarms per hour of {what}"
-            )
-            alarms, hours = RATES[measure]
-            for key in worst:
-                counts = cells[key].counts
-                rate = f"{_rate(cells[key].measures[measure])} per hour"
-                found = f"{counts[alarms]:.0f} in {counts[hours]:.3g} h"
-                lines.append(_line("  " + _short(" ".join(key)), [rate], [found]))
+            head = f"The worst {len(worst)} of robot and domain, by alarms per hour of {what}"
+            lines.append(head)
+        for key in worst:
+            counts = cells[key].counts
+            rate = f"{_rate(cells[key].measures[measure])} per hour"
+            found = f"{counts[alarms]:.0f} in {counts[hours]:.3g} h"
+            lines.append(_line("  " + _short(" ".join(key)), [rate], [found]))
     return lines
 
 
 def _table(protocol: Protocol, key: str, *, whole: bool) -> list[str]:
+    """A row for each robot, domain or scenario; of many the worst, each cell as wide as needed."""
     parts = protocol.by[key]
-    names = list(parts)
-    head = f"By {key}"
-    lines = []
+    names, head, lines = list(parts), f"By {key}", list[str]()
     if not whole and len(names) > ROWS_SHOWN:
-        names = sorted(names, key=lambda name: _order(parts[name]))[:ROWS_SHOWN]
+        f1 = {name: part.measures["class_f1"] for name, part in parts.items()}
+        names = sorted(names, key=lambda name: 2.0 if isnan(f1[name]) else f1[name])[:ROWS_SHOWN]
         lines = [f"By {key}, the worst {ROWS_SHOWN} of {len(parts)} by F1 of the class"]
         head = ""
     ranked = protocol.ranked if key == "domain" else {}
-    titles = ["runs", "ok h", *(title for title, _ in COLUMNS)]
-    titles += ["AUC", "pAUC"] if ranked else []
-    lines.append(_cells(head, titles, titles))
+    titles = ["runs", "ok h", *COLUMNS, *(("AUC", "pAUC") if ranked else ())]
+    rows = [(head, titles)]
     for name in names:
         part = parts[name]
-        figures = [_figure(measure, part.measures[measure]) for _, measure in COLUMNS]
+        runs = f"{part.counts['runs']:.0f}" + (f"+{part.unanswered}" if part.unanswered else "")
+        figures = [runs, f"{part.counts['ok_hours']:.3g}"]
+        figures += [_form(measure)(part.measures[measure]) for measure in COLUMNS.values()]
         if ranked:
             own = ranked.get(name)
             figures += [_share(own.auc), _share(own.pauc)] if own else ["-", "-"]
-        runs = f"{part.counts['runs']:.0f}" + (f"+{part.unanswered}" if part.unanswered else "")
-        figures = [runs, f"{part.counts['ok_hours']:.3g}", *figures]
-        lines.append(_cells(_short(name), figures, titles))
+        rows.append((_short(name), figures))
+    for name, cells in rows:
+        pairs = zip(cells, titles, strict=True)
+        figures = [cell.rjust(max(len(title), 7) + 2) for cell, title in pairs]
+        lines.append(name.ljust(LONGEST) + "".join(figures))
     if any(part.unanswered for part in parts.values()):
         lines.append("(+n: runs without a verdict)")
     return lines
-
-
-def _order(part: Part) -> float:
-    value = part.measures["class_f1"]
-    return 2.0 if isnan(value) else value
 
 
 def _errors(protocol: Protocol) -> list[str]:
@@ -463,55 +441,45 @@ def _frames(assessment: Assessment) -> list[str]:
         _row("", ["recall", "precision"], ["frames", "blocks", "runs"]),
     ]
     for label, count in zip(evaluation.classes, evaluation.confusion.sum(axis=1), strict=True):
-        figures = [percent(frames[name][label]) for name in ("recall", "precision")]
+        figures = [_ranged(frames[name][label]) for name in ("recall", "precision")]
         behind = [count, assessment.blocks[label], assessment.runs_with[label]]
         lines.append(_row(label, figures, behind))
     error = assessment.calibration_error
-    calibrated = f"{percent(error)} in ten bins" if error else "- (the scores are no probabilities)"
+    calibrated = f"{_ranged(error)} in ten bins" if error else "- (the scores are no probabilities)"
     return [
         *lines,
-        _row("Balanced accuracy", [percent(frames["balanced_accuracy"])]),
-        _row("Failure recall", [percent(frames["failure_recall"])]),
-        _row("False alarm rate", [percent(frames["false_alarm_rate"])]),
+        _row("Balanced accuracy", [_ranged(frames["balanced_accuracy"])]),
+        _row("Failure recall", [_ranged(frames["failure_recall"])]),
+        _row("False alarm rate", [_ranged(frames["false_alarm_rate"])]),
         _row("Calibration error", [calibrated]),
     ]
 
 
 def _paper(assessment: Assessment) -> list[str]:
     frames, evaluation = assessment.frames, assessment.evaluation
-    ok = evaluation.confusion[[name == "ok" for name in evaluation.classes]].sum()
+    ok = evaluation.confusion[[name == OK for name in evaluation.classes]].sum()
     errors = ("false_negative_errors", "false_positive_errors")
     nothing = f"(calling all frames ok: {ok / evaluation.frames:.1%})"
     return [
         "As the paper measures, in shares of ALL frames",
         _row("", [name.replace("_", " ") for name in errors]),
         *(
-            _row(label, [percent(frames[name][label]) for name in errors])
+            _row(label, [_ranged(frames[name][label]) for name in errors])
             for label in evaluation.classes
         ),
-        _row("Failure detection rate", [percent(frames["failure_detection_rate"]), nothing]),
-        _row("Subset accuracy", [percent(frames["subset_accuracy"])]),
+        _row("Failure detection rate", [_ranged(frames["failure_detection_rate"]), nothing]),
+        _row("Subset accuracy", [_ranged(frames["subset_accuracy"])]),
     ]
 
 
-def _confusion(assessment: Assessment) -> list[str]:
-    evaluation = assessment.evaluation
+def _confusion(evaluation: Evaluation) -> list[str]:
     width = max(len(name) for name in evaluation.classes) + 2
-    head = "Frames of row predicted".ljust(CLASS)
+    rows = [("Frames of row predicted", evaluation.classes)]
+    rows += zip(evaluation.classes, evaluation.confusion.tolist(), strict=True)
     return [
-        head + "".join(name.rjust(width) for name in evaluation.classes),
-        *(
-            name.ljust(CLASS) + "".join(str(count).rjust(width) for count in row)
-            for name, row in zip(evaluation.classes, evaluation.confusion.tolist(), strict=True)
-        ),
+        name.ljust(CLASS) + "".join(str(cell).rjust(width) for cell in cells)
+        for name, cells in rows
     ]
-
-
-def _foot(assessment: Assessment) -> list[str]:
-    lines = ["Brackets are 95 % confidence intervals over groups of runs."]
-    if assessment.groups < LEAST_GROUPS:
-        lines.append(f"Measures of fewer than {LEAST_GROUPS} groups have none.")
-    return lines
 
 
 # --- figures, rows and lists
@@ -529,16 +497,16 @@ def _time(value: float) -> str:
     return "-" if isnan(value) else f"{value:.3g} s"
 
 
-def _figure(measure: str, value: float) -> str:
-    if measure == "delay":
-        return _time(value)
-    return (_rate if measure in RATES else _share)(value)
+def _form(measure: str) -> Form:
+    return _time if measure == "delay" else _rate if measure in RATES else _share
 
 
-def _ranged(estimate: Estimate, form: Callable[[float], str]) -> str:
-    bounds = "" if isnan(estimate.low) else f" [{form(estimate.low)}, {form(estimate.high)}]"
-    bounds = "" if isnan(estimate.value) else bounds.replace("%", "").replace(" s", "")
-    return form(estimate.value) + bounds
+def _ranged(estimate: Estimate, form: Form = _share) -> str:
+    """A figure and its bounds as text: ``97.9% [96.1, 98.8]``."""
+    if isnan(estimate.value) or isnan(estimate.low):
+        return form(estimate.value)
+    bounds = f" [{form(estimate.low)}, {form(estimate.high)}]"
+    return form(estimate.value) + bounds.replace("%", "").replace(" s", "")
 
 
 def _line(name: str, figures: Sequence[str], others: Sequence[str] = ()) -> str:
@@ -549,13 +517,6 @@ def _line(name: str, figures: Sequence[str], others: Sequence[str] = ()) -> str:
 def _row(name: str, figures: Sequence[str], counts: Sequence[object] = ()) -> str:
     line = name.ljust(CLASS) + "".join(figure.ljust(WIDE + 1) for figure in figures)
     return (line + "".join(str(count).rjust(NARROW - 2) for count in counts)).rstrip()
-
-
-def _cells(name: str, cells: Sequence[str], titles: Sequence[str]) -> str:
-    """A row, each cell as wide as its title or a figure."""
-    widths = [max(len(title), 7) + 2 for title in titles]
-    figures = (cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
-    return name.ljust(LONGEST) + "".join(figures)
 
 
 def _short(name: str) -> str:

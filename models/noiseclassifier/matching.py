@@ -65,8 +65,7 @@ class Span(Protocol):
 
 def spans_of(items: Iterable[Span]) -> Array:
     """Spans of blocks, events or findings, as they come."""
-    pairs = [(item.start, item.stop) for item in items]
-    return np.array(pairs, dtype=np.float64).reshape(-1, 2)
+    return np.array([(item.start, item.stop) for item in items], dtype=np.float64).reshape(-1, 2)
 
 
 def union(spans: Array) -> Array:
@@ -133,27 +132,15 @@ def match(
 
 
 def meet(spans: Array, wanted: Array, collar: float = COLLAR) -> Mask:
-    """Whether findings meet faults, shape (..., findings, faults).
-
-    Args:
-        spans: Of the findings, shape (..., findings, 2), in [s].
-        wanted: Of the faults, shape (faults, 2), in [s].
-        collar: Time between two that still meet, in [s].
-    """
+    """Whether findings, shape (..., findings, 2), meet faults: shape (..., findings, faults)."""
     early = spans[..., :, None, 0] <= wanted[:, 1] + collar
     late = spans[..., :, None, 1] >= wanted[:, 0] - collar
-    met: Mask = early & late
-    return met
+    return np.asarray(early & late)
 
 
 def one_to_one(met: Mask) -> Array:
-    """Largest number of pairs that meet, each finding and each fault in one pair at most.
-
-    Args:
-        met: Whether findings meet faults, shape (cases, findings, faults).
-    """
-    matched: Array = (_partners(met) >= 0).sum(axis=1).astype(np.float64)
-    return matched
+    """Most pairs of findings and faults that meet, by ``met`` (cases, findings, faults)."""
+    return np.asarray((_partners(met) >= 0).sum(axis=1), dtype=np.float64)
 
 
 def _partners(met: Mask) -> Index:
@@ -178,8 +165,7 @@ def truth_of(start: Array, stop: Array, blocks: Iterable[Block], *, step: float)
     """True class of each frame, `UNCLEAR` where annotations tell none, shape (frames,).
 
     Args:
-        start: Of each frame, shape (frames,), in [s].
-        stop: Of each frame, shape (frames,), in [s].
+        start, stop: Of each frame, shape (frames,), in [s].
         step: Time from one sample to the next, in [s].
     """
     blocks = list(blocks)
@@ -189,25 +175,16 @@ def truth_of(start: Array, stop: Array, blocks: Iterable[Block], *, step: float)
     bad = [block for block in blocks if block.label != OK]
     if not bad:
         return np.where(in_ok, OK, UNCLEAR)
-    shared = overlap(frames, spans_of(bad))
-    whole = np.array([block.stop - block.start for block in bad])
-    enough = shared > np.minimum(whole, (stop - start)[:, None] / 2.0) - slack
-    filled = np.where(enough & (shared > 0.0), shared, 0.0)
+    spans = spans_of(bad)
+    shared = overlap(frames, spans)
+    enough = shared > np.minimum(spans[:, 1] - spans[:, 0], (stop - start)[:, None] / 2.0) - slack
+    filled = np.where(enough, shared, 0.0)
     names = np.array([block.label for block in bad])
     failure = np.where(filled.any(axis=1), names[filled.argmax(axis=1)], UNCLEAR)
     return np.where(in_ok, OK, failure)
 
 
 # --- what is matched
-
-
-def origin_of(name: str, facts: Mapping[str, str]) -> dict[str, str]:
-    """Robot, domain (simulator, drives, sensing and control) and scenario of a recording."""
-    return {
-        "robot": facts.get("robot") or robot_of(name) or UNNAMED,
-        "domain": facts.get("domain") or UNNAMED,
-        "scenario": facts.get("scenario") or UNNAMED,
-    }
 
 
 @dataclass(frozen=True)
@@ -221,14 +198,9 @@ class Unanswered:
     reason: str = ""
     """Why there is no verdict, in a few words."""
 
-    @cached_property
-    def origin(self) -> dict[str, str]:
-        """Where it comes from."""
-        return origin_of(self.name, self.facts)
-
     def as_dict(self) -> dict[str, str]:
         """All of it for JSON."""
-        return {"run": self.name, **self.origin, "reason": self.reason}
+        return {"run": self.name, **origin_of(self), "reason": self.reason}
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,11 +232,6 @@ class Predictions:
     located: tuple[tuple[Event, ...], tuple[Event, ...]] | None = None
 
     @cached_property
-    def origin(self) -> dict[str, str]:
-        """Where the recording comes from."""
-        return origin_of(self.name, self.facts)
-
-    @cached_property
     def spans(self) -> tuple[Event, ...]:
         """Findings by their frames."""
         return self.labels.events() if self.located is None else self.located[0]
@@ -278,6 +245,15 @@ class Predictions:
     def whole_truth(self) -> Words:
         """True class of each frame of the whole recording, `UNCLEAR` where not annotated."""
         return truth_of(self.labels.start, self.labels.stop, self.blocks, step=self.step)
+
+
+def origin_of(one: Unanswered | Predictions) -> dict[str, str]:
+    """Robot, domain (simulator, drives, sensing and control) and scenario of a recording."""
+    known = {
+        "robot": robot_of(one.name),
+        **{name: each for name, each in one.facts.items() if each},
+    }
+    return {key: known.get(key) or UNNAMED for key in ("robot", "domain", "scenario")}
 
 
 def within(recording: Recording) -> tuple[Block, ...]:
@@ -299,7 +275,6 @@ class Outcome:
         faults: All injected faults, or failure blocks where those are not known.
         kind: Kind of each finding, shape (findings,).
         found: Whether each fault is found, shape (faults,).
-        close: Whether the nearest onset of a finding that meets it is right, shape (faults,).
         delay: Time from its start until a live listener knows, NaN unless found, shape (faults,),
             in [s].
         counts: Numbers and times in [h] of the run, by name; of matches also by chance.
@@ -310,7 +285,6 @@ class Outcome:
     faults: tuple[Fault, ...]
     kind: Words
     found: Mask
-    close: Mask
     delay: Array
     counts: dict[str, float]
     score: float
@@ -326,16 +300,16 @@ class Outcome:
         close = met & (np.abs(spans[:, None, 0] - wanted[None, :, 0]) <= CLOSE)
         classified = union(np.stack((labels.start, labels.stop), axis=1))
         ok_blocks = union(spans_of(block for block in run.blocks if block.label == OK))
-        ok = common(ok_blocks, classified)
-        known = np.concatenate((ok, spans_of(bad), wanted))
-        slack = np.minimum(1.5 * run.step, (spans[:, 1] - spans[:, 0]) / 2.0)
-        on_fault = met.any(axis=1) | (overlap(spans, spans_of(bad)) > slack[:, None]).any(axis=1)
-        in_ok = overlap(spans, ok_blocks).sum(axis=1) >= (spans[:, 1] - spans[:, 0]) / 2.0
+        ok, failing = common(ok_blocks, classified), spans_of(bad)
+        known = np.concatenate((ok, failing, wanted))
+        half = (spans[:, 1] - spans[:, 0]) / 2.0
+        slack = np.minimum(1.5 * run.step, half)
+        on_fault = met.any(axis=1) | (overlap(spans, failing) > slack[:, None]).any(axis=1)
+        in_ok = overlap(spans, ok_blocks).sum(axis=1) >= half
         kind = np.where(on_fault, MET, np.where(in_ok, FALSE, UNLABELLED))
-        unknown = np.array([finding.label == UNKNOWN for finding in findings], dtype=bool)
+        label = np.array([finding.label for finding in findings], dtype=str)
         felt = np.array([fault.felt for fault in faults], dtype=bool)
-        same = np.array([[f.label == w.label for w in faults] for f in findings], dtype=bool)
-        same = same.reshape(met.shape)
+        same = label[:, None] == np.array([fault.label for fault in faults], dtype=str)
         counts = {
             "runs": 1.0,
             "faulty": float(len(faults) > 0),
@@ -344,7 +318,7 @@ class Outcome:
             "unlabelled_hours": (duration(classified) - duration(common(classified, known))) / HOUR,
             "findings": len(findings),
             "false_alarms": int((kind == FALSE).sum()),
-            "unknown_false_alarms": int((unknown & (kind == FALSE)).sum()),
+            "unknown_false_alarms": int(((label == UNKNOWN) & (kind == FALSE)).sum()),
             "alarms_in_unlabelled": int((kind == UNLABELLED).sum()),
             "faults": len(faults),
             "felt": int(felt.sum()),
@@ -352,16 +326,8 @@ class Outcome:
         }
         chance = _matches(*_by_chance(run, spans, wanted), felt, same)
         counts |= {f"{name}_by_chance": value for name, value in chance.items()}
-        return cls(
-            run,
-            faults,
-            kind,
-            np.any(met, axis=0),
-            np.any(close, axis=0),
-            _delays(run, faults, met),
-            counts,
-            run_score(labels),
-        )
+        delay = _delays(run, faults, met)
+        return cls(run, faults, kind, np.any(met, axis=0), delay, counts, run_score(labels))
 
 
 def confirmed_at(labels: Labels) -> Index:
@@ -403,8 +369,7 @@ def failure_score(scores: Array, classes: Sequence[str]) -> Array:
     ok = list(classes).index(OK)
     if are_probabilities(scores):
         return 1.0 - scores[:, ok]
-    margin: Array = np.delete(scores, ok, axis=1).max(axis=1) - scores[:, ok]
-    return margin
+    return np.asarray(np.delete(scores, ok, axis=1).max(axis=1) - scores[:, ok])
 
 
 def are_probabilities(scores: Array) -> bool:

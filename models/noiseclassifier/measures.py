@@ -31,7 +31,7 @@ no interval.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from math import isnan, nan
 from typing import Any, Self
 
@@ -48,6 +48,7 @@ from noiseclassifier.matching import (
     Predictions,
     Unanswered,
     are_probabilities,
+    origin_of,
 )
 from noiseclassifier.signals import Array, Index, Mask, Words
 
@@ -101,7 +102,7 @@ OF_ALL = (
 """Measures of frames of all classes."""
 
 
-def ratio(part: Array | np.float64 | float, whole: Array | np.float64 | float) -> Array:
+def ratio(part: Array | float, whole: Array | float) -> Array:
     """Quotient, NaN where the denominator is 0."""
     part, whole = np.broadcast_arrays(np.asarray(part, float), np.asarray(whole, float))
     share: Array = np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
@@ -109,9 +110,13 @@ def ratio(part: Array | np.float64 | float, whole: Array | np.float64 | float) -
 
 
 def plain(value: Any) -> Any:
-    """Numbers for JSON, None where undefined; of a mapping or a list, each of its values."""
+    """Numbers for JSON, None where undefined; of what has several values, each of them."""
+    if is_dataclass(value):
+        value = vars(value)
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     if isinstance(value, list):
         return [plain(each) for each in value]
     return None if isinstance(value, float) and isnan(value) else value
@@ -183,9 +188,8 @@ class Evaluation:
     @property
     def failure_detection_rate(self) -> Array:
         """The paper's: 1 less the false positive errors of `ok`."""
-        mistaken = self.confusion[..., self._ok].sum(axis=(-2, -1))
-        right = self._right[..., self._ok].sum(axis=-1)
-        return ratio(self.frames - mistaken + right, self.frames)
+        missed = self.confusion[..., ~self._ok, :][..., self._ok].sum(axis=(-2, -1))
+        return ratio(self.frames - missed, self.frames)
 
     @property
     def subset_accuracy(self) -> Array:
@@ -200,27 +204,25 @@ class Evaluation:
     @property
     def failure_recall(self) -> Array:
         """Failure frames that were not predicted as `ok`, of the failure frames."""
-        failures = self.confusion[..., ~self._ok, :]
-        return ratio(failures[..., ~self._ok].sum(axis=(-2, -1)), failures.sum(axis=(-2, -1)))
+        return self._flagged(~self._ok)
 
     @property
     def false_alarm_rate(self) -> Array:
         """`ok` frames that were not predicted as `ok`, of the `ok` frames."""
-        ok = self.confusion[..., self._ok, :]
-        return ratio(ok[..., ~self._ok].sum(axis=(-2, -1)), ok.sum(axis=(-2, -1)))
+        return self._flagged(self._ok)
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
         by_class = {
-            name: dict(zip(self.classes, getattr(self, name).tolist(), strict=True))
+            name: dict(zip(self.classes, plain(getattr(self, name)), strict=True))
             for name in BY_CLASS
         }
         return {
             "frames": int(self.frames),
             "classes": list(self.classes),
             "confusion": self.confusion.tolist(),
-            **plain(by_class),
-            **plain({name: float(getattr(self, name)) for name in OF_ALL}),
+            **by_class,
+            **{name: plain(float(getattr(self, name))) for name in OF_ALL},
         }
 
     def __str__(self) -> str:
@@ -254,6 +256,11 @@ class Evaluation:
             ]
         )
 
+    def _flagged(self, classes: Mask) -> Array:
+        """Frames of some classes that were not predicted as `ok`, of the frames of these."""
+        own = self.confusion[..., classes, :]
+        return ratio(own[..., ~self._ok].sum(axis=(-2, -1)), own.sum(axis=(-2, -1)))
+
     @property
     def _right(self) -> NDArray[Any]:
         return np.diagonal(self.confusion, axis1=-2, axis2=-1)
@@ -268,35 +275,21 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A measure, its bounds, and the size of its sample; NaN where undefined."""
+    """A measure, its bounds with 95 %, and the size of its sample; NaN where undefined."""
 
     value: float
-    """The measure."""
     low: float
-    """Lower bound with 95 %."""
     high: float
-    """Upper bound with 95 %."""
-    runs: int
-    """Recordings in the sample."""
-    groups: int
-    """Groups of recordings that share their motion, in the sample."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """All fields for JSON, None where undefined."""
-        return dict(plain(vars(self)))
+    runs: int  # recordings in the sample
+    groups: int  # groups of them that share their motion
 
 
 @dataclass(frozen=True, eq=False)
 class Resampling:
-    """Sets of groups, drawn once for all measures.
+    """Sets of groups, drawn once for all measures."""
 
-    Attributes:
-        group: Group of each recording, as a number, shape (runs,).
-        weights: How often each set has each recording, shape (resamples, runs).
-    """
-
-    group: Index
-    weights: Array
+    group: Index  # of each recording, as a number, shape (runs,)
+    weights: Array  # how often each set has each recording, shape (resamples, runs)
 
     @classmethod
     def of(cls, groups: Sequence[str]) -> Self:
@@ -308,43 +301,38 @@ class Resampling:
 
     def mean_share(self, part: Array, whole: Array, of: Sequence[Mask]) -> Estimate:
         """Estimate the unweighted mean of the shares of several sets of recordings."""
-        behind = [own & (whole > 0) for own in of if (whole * own).sum() > 0]
-        if not behind:
-            return Estimate(nan, nan, nan, 0, 0)
-        value, drawn = self._mean(part, whole, behind)
-        return self.bounded(value, drawn, behind)
+        return self.bounded(*self._mean(part, whole, of))
 
     def mean_rate(self, events: Array, time: Array, of: Sequence[Mask]) -> Estimate:
         """Estimate the unweighted mean of the rates of several sets of recordings."""
-        behind = [own & (time > 0) for own in of if (time * own).sum() > 0]
+        value, drawn, behind = self._mean(events, time, of)
         if not behind:
             return Estimate(nan, nan, nan, 0, 0)
-        value, drawn = self._mean(events, time, behind)
         weights = np.array([1.0 / (len(behind) * time[own].sum()) for own in behind])
         low, high = fay_feuer(np.array([events[own].sum() for own in behind]), weights)
-        runs, groups = self._behind(np.any(behind, axis=0))
-        if groups >= LEAST_GROUPS:
-            middle = _middle(drawn)
-            low, high = min(low, middle[0]), max(high, middle[1])
-        return Estimate(value, low, high, runs, groups)
+        found = self.unbounded(value, drawn, np.any(behind, axis=0))
+        # fmin and fmax take the other where there is no interval of the sets.
+        low, high = float(np.fmin(low, found.low)), float(np.fmax(high, found.high))
+        return Estimate(value, low, high, found.runs, found.groups)
 
-    def _mean(self, part: Array, whole: Array, of: Sequence[Mask]) -> tuple[float, Array]:
-        """Mean ratio of sets of recordings, and of each resample, shape (resamples,)."""
-        value = np.mean([part[own].sum() / whole[own].sum() for own in of])
-        shares = [ratio(self.weights @ (part * own), self.weights @ (whole * own)) for own in of]
+    def _mean(
+        self, part: Array, whole: Array, of: Sequence[Mask]
+    ) -> tuple[float, Array, list[Mask]]:
+        """Mean ratio of sets of recordings, of each resample, and the recordings behind each."""
+        behind = [own & (whole > 0) for own in of if (whole * own).sum() > 0]
+        value = np.mean([part[own].sum() / whole[own].sum() for own in behind]) if behind else nan
+        shares = [
+            ratio(self.weights @ (part * own), self.weights @ (whole * own)) for own in behind
+        ]
         each = np.array(shares)
         known = ~np.isnan(each)
-        return float(value), ratio(np.where(known, each, 0.0).sum(axis=0), known.sum(axis=0))
+        drawn = ratio(np.where(known, each, 0.0).sum(axis=0), known.sum(axis=0))
+        return float(value), drawn, behind
 
     def bounded(self, value: float, drawn: Array, behind: Sequence[Mask]) -> Estimate:
-        """Bounds of a mean of shares of runs.
-
-        Args:
-            drawn: The mean of each set of groups, shape (resamples,).
-            behind: For each share, the runs that it is of, shape (runs,).
-        """
+        """Bounds of a mean of shares, by that of each set and by the runs behind each share."""
         runs = int(np.any(behind, axis=0).sum())
-        groups = min(self._behind(mask)[1] for mask in behind)
+        groups = min((len(np.unique(self.group[mask])) for mask in behind), default=0)
         if groups < LEAST_GROUPS:
             return Estimate(value, nan, nan, runs, groups)
         # The mean of the shares' own bounds lies further out than the bound of their mean.
@@ -354,9 +342,9 @@ class Resampling:
 
     def unbounded(self, value: float, drawn: Array, behind: Mask) -> Estimate:
         """Bounds of any other measure of some runs, by the sets of groups alone."""
-        runs, groups = self._behind(behind)
+        groups = len(np.unique(self.group[behind]))
         low, high = _middle(drawn) if groups >= LEAST_GROUPS else (nan, nan)
-        return Estimate(value, low, high, runs, groups)
+        return Estimate(value, low, high, int(behind.sum()), groups)
 
     def quantile(self, values: Array, owner: Index, share: float) -> Estimate:
         """Estimate a quantile of values, shape (values,), that belong to recordings."""
@@ -374,21 +362,9 @@ class Resampling:
         once = np.ones((1, len(behind)))
         return self.unbounded(float(of_sets(once)[0]), of_sets(self.weights), behind)
 
-    def _behind(self, mask: Mask) -> tuple[int, int]:
-        return int(mask.sum()), len(np.unique(self.group[mask]))
-
-
-def garwood(events: float) -> tuple[float, float]:
-    """Exact bounds of the mean of a Poisson distribution."""
-    from scipy.special import gammaincinv
-
-    # F. Garwood, Fiducial limits for the Poisson distribution, Biometrika 28 (1936)
-    low = float(gammaincinv(events, TAIL)) if events else 0.0
-    return low, float(gammaincinv(events + 1.0, 1.0 - TAIL))
-
 
 def fay_feuer(events: Array, weights: Array) -> tuple[float, float]:
-    """Bounds of a weighted sum of the means of Poisson distributions."""
+    """Bounds of a weighted sum of the means of Poisson distributions; Garwood's for one of them."""
     from scipy.special import gammaincinv
 
     total, variance, most = weights @ events, weights**2 @ events, weights.max()
@@ -409,12 +385,7 @@ def _middle(drawn: Array) -> tuple[float, float]:
 def frame_estimates(
     predictions: Sequence[Predictions], resampling: Resampling
 ) -> tuple[Evaluation, dict[str, Any]]:
-    """Evaluation of the frames of recordings, one frame or more, and its measures with intervals.
-
-    Returns:
-        The evaluation of all frames, and by its names the estimates of its measures, by class for
-        those that each class has.
-    """
+    """Evaluation of all frames, and its measures with intervals, of some also class by class."""
     evaluation = Evaluation.of(
         np.concatenate([one.truth for one in predictions]),
         np.concatenate([one.predicted for one in predictions]),
@@ -452,10 +423,7 @@ def calibration(
 ) -> tuple[dict[str, Array], Estimate] | None:
     """Confidence beside truth in bins, and the expected calibration error.
 
-    Returns:
-        By name: ``low`` and ``high`` edge of the bins, ``frames``, mean ``confidence`` and share
-        ``right``, each of shape (bins,), NaN in empty bins; and the error. None if the scores are
-        no probabilities.
+    None if the scores are no probabilities; NaN in empty bins.
     """
     if not all(are_probabilities(one.labels.scores) for one in predictions):
         return None
@@ -496,28 +464,12 @@ def calibration(
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Counts and measures of some of the runs.
+    """Counts and measures of some of the runs."""
 
-    Attributes:
-        counts: Numbers and times in [h], by name.
-        measures: Shares, rates per hour, and delays in [s], by name; NaN where undefined.
-        by_chance: Shares of findings that are shifted at random, by name.
-        unanswered: Runs without a verdict.
-    """
-
-    counts: dict[str, float]
-    measures: dict[str, float]
-    by_chance: dict[str, float]
-    unanswered: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """All of it for JSON, None where undefined."""
-        return {
-            "unanswered": self.unanswered,
-            "counts": self.counts,
-            "measures": plain(self.measures),
-            "by_chance": plain(self.by_chance),
-        }
+    unanswered: int  # runs without a verdict
+    counts: dict[str, float]  # numbers, and times in [h]
+    measures: dict[str, float]  # shares, rates per hour, delays in [s]; NaN where undefined
+    by_chance: dict[str, float]  # shares of findings that are shifted at random
 
 
 @dataclass(frozen=True)
@@ -532,31 +484,18 @@ class Ranked:
 
 @dataclass(frozen=True, eq=False)
 class Protocol:
-    """Measures of a model at the operating point that ships.
-
-    Attributes:
-        outcomes: Of each run.
-        unanswered: Runs without a verdict.
-        alike: Unweighted means over robots.
-        pooled: Measures of all runs together.
-        by_chance: Unweighted means over robots, of findings that are shifted at random.
-        counts: Of all runs together.
-        by: Parts of the runs, by robot, domain and scenario.
-        cells: Parts of the runs of each robot and domain.
-        cases: Parts of the runs of each robot and scenario.
-        ranked: Ranking of the runs of each domain.
-    """
+    """Measures of a model at the operating point that ships."""
 
     outcomes: tuple[Outcome, ...]
     unanswered: tuple[Unanswered, ...]
-    alike: dict[str, Estimate]
-    pooled: dict[str, Estimate]
-    by_chance: dict[str, float]
-    counts: dict[str, float]
-    by: dict[str, dict[str, Part]]
-    cells: dict[tuple[str, str], Part]
-    cases: dict[tuple[str, str], Part]
-    ranked: dict[str, Ranked]
+    alike: dict[str, Estimate]  # unweighted means over robots
+    pooled: dict[str, Estimate]  # of all runs together
+    by_chance: dict[str, float]  # means over robots, of findings that are shifted at random
+    counts: dict[str, float]  # of all runs together
+    by: dict[str, dict[str, Part]]  # by robot, domain and scenario
+    cells: dict[tuple[str, ...], Part]  # of each robot and domain
+    cases: dict[tuple[str, ...], Part]  # of each robot and scenario
+    ranked: dict[str, Ranked]  # by domain
 
     @classmethod
     def of(
@@ -568,47 +507,54 @@ class Protocol:
         """Measures of findings as they are reported, on one run with a verdict or more."""
         outcomes = tuple(map(Outcome.of, predictions))
         counts = {name: np.array([o.counts[name] for o in outcomes]) for name in outcomes[0].counts}
-        counts["half_of_both"] = (counts["findings"] + counts["faults"]) / 2.0
-        origins = [outcome.run.origin for outcome in outcomes]
+        halves = {"half_of_both": (counts["findings"] + counts["faults"]) / 2.0}
+        owner = np.repeat(np.arange(len(outcomes)), [len(each.delay) for each in outcomes])
+        delay = np.concatenate([each.delay for each in outcomes])
+        delay, owner = delay[~np.isnan(delay)], owner[~np.isnan(delay)]
+        origins, others = ([origin_of(each) for each in runs] for runs in (predictions, unanswered))
 
-        def parts(*keys: str) -> dict[Any, Part]:
-            def key(origin: dict[str, str]) -> Any:
-                names = tuple(origin[name] for name in keys)
-                return names if len(names) > 1 else names[0]
+        def parts(*keys: str) -> dict[tuple[str, ...], Part]:
+            mine, theirs = (
+                [tuple(origin[key] for key in keys) for origin in each]
+                for each in (origins, others)
+            )
+            found = {}
+            for name in sorted({*mine, *theirs}):
+                own = np.array([each == name for each in mine])
+                found[name] = _part(theirs.count(name), counts, halves, own, delay[own[owner]])
+            return found
 
-            mine, others = [key(each) for each in origins], [key(u.origin) for u in unanswered]
-            return {
-                name: _part(
-                    outcomes, counts, np.array([own == name for own in mine]), others.count(name)
-                )
-                for name in sorted({*mine, *others})
-            }
-
-        by = {key: parts(key) for key in KEYS}
-        robots = np.array([origin["robot"] for origin in origins])
-        sets = [robots == robot for robot in np.unique(robots)]
         every = np.ones(len(outcomes), dtype=bool)
-        alike, pooled = (_estimates(counts, resampling, chosen) for chosen in (sets, [every]))
-        delay, owner = _delays(outcomes, every)
+        robots = np.array([origin["robot"] for origin in origins])
+        alike, pooled = (
+            {
+                name: (resampling.mean_rate if name in RATES else resampling.mean_share)(
+                    counts[part], (counts | halves)[whole], sets
+                )
+                for name, (part, whole) in {**RATES, **SHARES}.items()
+            }
+            for sets in ([robots == robot for robot in np.unique(robots)], [every])
+        )
+        by = {key: {name: part for (name,), part in parts(key).items()} for key in KEYS}
+        of_robots = by["robot"].values()
         for name, share in DELAYS.items():
             pooled[name] = resampling.quantile(delay, owner, share)
-            value = _mean([each.measures[name] for each in by["robot"].values()])
-            alike[name] = Estimate(value, np.nan, np.nan, pooled[name].runs, pooled[name].groups)
-        of_robots = by["robot"].values()
-        domains = sorted({origin["domain"] for origin in origins})
+            value = _mean([each.measures[name] for each in of_robots])
+            alike[name] = Estimate(value, nan, nan, pooled[name].runs, pooled[name].groups)
+        domains = np.array([origin["domain"] for origin in origins])
         return cls(
             outcomes,
             tuple(unanswered),
             alike,
             pooled,
             {name: _mean([each.by_chance[name] for each in of_robots]) for name in BY_CHANCE},
-            _totals(counts, every),
+            {name: float(each.sum()) for name, each in counts.items()},
             by,
             parts("robot", "domain"),
             parts("robot", "scenario"),
             {
-                name: _ranked([o for o in outcomes if o.run.origin["domain"] == name])
-                for name in domains
+                str(name): _ranked([outcomes[run] for run in np.flatnonzero(domains == name)])
+                for name in np.unique(domains)
             },
         )
 
@@ -633,16 +579,16 @@ class Protocol:
         """Share of the runs without a verdict."""
         return len(self.unanswered) / (len(self.outcomes) + len(self.unanswered))
 
-    def worst(self, parts: dict[tuple[str, str], Part], measure: str) -> list[tuple[str, str]]:
+    def worst(self, parts: Mapping[tuple[str, ...], Part], measure: str) -> list[tuple[str, ...]]:
         """Name the parts of the lowest share, or of the highest rate; of equals, the largest."""
+        sign, perfect = (-1.0, 0.0) if measure in RATES else (1.0, 1.0)
 
-        def order(key: tuple[str, str]) -> tuple[float, float]:
-            value, size = parts[key].measures[measure], parts[key].counts
-            return (-value if measure in RATES else value, -max(size["faults"], size["ok_hours"]))
+        def order(key: tuple[str, ...]) -> tuple[float, float]:
+            counts = parts[key].counts
+            return sign * parts[key].measures[measure], -max(counts["faults"], counts["ok_hours"])
 
-        perfect = 0.0 if measure in RATES else 1.0
         values = {key: part.measures[measure] for key, part in parts.items()}
-        keys = [key for key, value in values.items() if not np.isnan(value) and value != perfect]
+        keys = [key for key, value in values.items() if not isnan(value) and value != perfect]
         return sorted(keys, key=order)[:WORST]
 
     def missed(self) -> list[dict[str, Any]]:
@@ -666,42 +612,39 @@ class Protocol:
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
 
-        def pairs(parts: dict[tuple[str, str], Part], second: str) -> list[dict[str, Any]]:
-            return [{"robot": a, second: b, **part.as_dict()} for (a, b), part in parts.items()]
+        def pairs(parts: dict[tuple[str, ...], Part], second: str) -> list[dict[str, Any]]:
+            return [{"robot": a, second: b, **vars(part)} for (a, b), part in parts.items()]
 
-        ranking = {"auc": self.auc, "pauc": self.pauc, "official_score": self.official}
-        return {
-            "robots_alike": {name: each.as_dict() for name, each in self.alike.items()},
-            "pooled": {name: each.as_dict() for name, each in self.pooled.items()},
-            "by_chance": plain(self.by_chance),
-            "counts": self.counts,
-            "not_answered": self.not_answered,
-            **plain(ranking),
-            "ranking_by_domain": {name: plain(vars(each)) for name, each in self.ranked.items()},
-            **{
-                f"by_{key}": {name: part.as_dict() for name, part in parts.items()}
-                for key, parts in self.by.items()
-            },
-            "by_robot_and_domain": pairs(self.cells, "domain"),
-            "by_robot_and_scenario": pairs(self.cases, "scenario"),
-            "missed": self.missed(),
-            "false_alarms": self.alarms(FALSE),
-            "alarms_in_unlabelled": self.alarms(UNLABELLED),
-            "unanswered": [each.as_dict() for each in self.unanswered],
-        }
+        found: dict[str, Any] = plain(
+            {
+                "robots_alike": self.alike,
+                "pooled": self.pooled,
+                "by_chance": self.by_chance,
+                "counts": self.counts,
+                "not_answered": self.not_answered,
+                "auc": self.auc,
+                "pauc": self.pauc,
+                "official_score": self.official,
+                "ranking_by_domain": self.ranked,
+                **{f"by_{key}": parts for key, parts in self.by.items()},
+                "by_robot_and_domain": pairs(self.cells, "domain"),
+                "by_robot_and_scenario": pairs(self.cases, "scenario"),
+                "missed": self.missed(),
+                "false_alarms": self.alarms(FALSE),
+                "alarms_in_unlabelled": self.alarms(UNLABELLED),
+                "unanswered": [each.as_dict() for each in self.unanswered],
+            }
+        )
+        return found
 
 
 def auc(good: Array, faulty: Array, *, most: float | None = None) -> float:
-    """Area under the ROC curve; NaN unless there are good and faulty runs.
+    """Area under the ROC curve of scores of good and of faulty runs; NaN unless there are both.
 
-    Args:
-        good: Scores of good runs, shape (good,).
-        faulty: Scores of faulty runs, shape (faulty,).
-        most: False positive rate up to which it counts, standardised as McClish does: 0.5 for
-            scores without information, 1 for perfect ones.
+    With a most false positive rate, it is standardised as McClish does: 0.5 without information.
     """
     if not (len(good) and len(faulty)):
-        return float("nan")
+        return nan
     from sklearn.metrics import roc_auc_score
 
     truth = np.repeat((0, 1), (len(good), len(faulty)))
@@ -710,65 +653,44 @@ def auc(good: Array, faulty: Array, *, most: float | None = None) -> float:
 
 def harmonic_mean(values: Sequence[float]) -> float:
     """Harmonic mean of the values that are defined; NaN without one."""
-    known = np.array([value for value in values if not np.isnan(value)])
+    known = np.array([value for value in values if not isnan(value)])
     if not len(known):
-        return float("nan")
+        return nan
     return float(len(known) / (1.0 / known).sum()) if known.all() else 0.0
 
 
-def _totals(counts: dict[str, Array], own: Mask) -> dict[str, float]:
-    return {name: float(each[own].sum()) for name, each in counts.items() if name != "half_of_both"}
+def _mean(values: Sequence[float]) -> float:
+    """Mean of the values that are defined; NaN without one."""
+    known = [value for value in values if not isnan(value)]
+    return float(np.mean(known)) if known else nan
 
 
 def _part(
-    outcomes: Sequence[Outcome], counts: dict[str, Array], own: Mask, unanswered: int
+    unanswered: int,
+    counts: Mapping[str, Array],
+    halves: Mapping[str, Array],
+    own: Mask,
+    delay: Array,
 ) -> Part:
-    total = {name: each[own].sum() for name, each in counts.items()}
+    """Counts and measures of some runs, with the delays of the faults that are found in them."""
+    total = {name: float(each[own].sum()) for name, each in {**counts, **halves}.items()}
     measures = {
         name: float(ratio(total[part], total[whole]))
         for name, (part, whole) in {**RATES, **SHARES}.items()
     }
-    delay, _ = _delays(outcomes, own)
     for name, share in DELAYS.items():
-        known = len(delay) > 0
-        value = np.quantile(delay, share, method="inverted_cdf") if known else np.nan
-        measures[name] = float(value)
+        there = len(delay) > 0
+        measures[name] = float(np.quantile(delay, share, method="inverted_cdf")) if there else nan
     by_chance = {}
     for name in BY_CHANCE:
         part, whole = SHARES[name]
         whole = f"{whole}_by_chance" if whole in MATCHES else whole
         by_chance[name] = float(ratio(total[f"{part}_by_chance"], total[whole]))
-    return Part(_totals(counts, own), measures, by_chance, unanswered)
-
-
-def _estimates(
-    counts: dict[str, Array], resampling: Resampling, sets: Sequence[Mask]
-) -> dict[str, Estimate]:
-    """Means of the measures of sets of runs, weighed alike."""
-    found = {
-        name: resampling.mean_rate(counts[part], counts[whole], sets)
-        for name, (part, whole) in RATES.items()
-    }
-    for name, (part, whole) in SHARES.items():
-        found[name] = resampling.mean_share(counts[part], counts[whole], sets)
-    return found
-
-
-def _delays(outcomes: Sequence[Outcome], own: Mask) -> tuple[Array, Index]:
-    """Delays of the faults that are found, and the number of the run of each."""
-    number = np.repeat(np.arange(len(outcomes)), [len(each.delay) for each in outcomes])
-    delay = np.concatenate([each.delay for each in outcomes])
-    kept = ~np.isnan(delay) & own[number]
-    return delay[kept], number[kept]
+    return Part(unanswered, {name: total[name] for name in counts}, measures, by_chance)
 
 
 def _ranked(outcomes: Sequence[Outcome]) -> Ranked:
-    scored = [each for each in outcomes if not np.isnan(each.score)]
+    scored = [each for each in outcomes if not isnan(each.score)]
     good = np.array([each.score for each in scored if not each.faults])
     faulty = np.array([each.score for each in scored if each.faults])
     return Ranked(auc(good, faulty), auc(good, faulty, most=MOST), len(good), len(faulty))
-
-
-def _mean(values: Sequence[float]) -> float:
-    known = [value for value in values if not np.isnan(value)]
-    return float(np.mean(known)) if known else float("nan")
