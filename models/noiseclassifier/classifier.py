@@ -68,8 +68,7 @@ class Classifier:
         profile: How a signal becomes features.
         classes: Names of the classes that it was trained with, in the profile's order.
         estimator: Decides on standardised features.
-        mean: Mean of each feature, to be subtracted, shape (features,).
-        scale: Scale of each feature, to divide by, shape (features,).
+        mean, scale: Of each feature, to be subtracted and divided by, shape (features,).
         runs: SHA-256 of each training recording, by name.
         metrics: Measures of the training set, and of a validation set if one was given.
         versions: Of the software that trained it.
@@ -128,15 +127,11 @@ class Classifier:
         return Evaluation.of(examples.labels, predicted, self.classes)
 
     def at(self, rate: float, signals: Collection[str]) -> "Classifier":
-        """The model itself, if it fits.
-
-        Args:
-            rate: Sample rate of a log, in [Hz], which must be the model's or above.
-            signals: Names of the signals that there are.
+        """The model itself, if it takes logs of that rate, in [Hz], or below, and of those signals.
 
         Raises:
             MissingSignalError: If it needs another one.
-            RateError: If the rate is lower.
+            RateError: If the rate is lower than the model's.
         """
         if not feeds(signals, self.profile.signals):
             lacking = [name for name in self.profile.signals if name not in signals]
@@ -162,13 +157,10 @@ class Classifier:
         return self.estimator.score(self.decision(frames))
 
     def decision(self, frames: Real) -> Array:
-        """Decision values of frames.
+        """Decision values, shape (frames, decisions); `noiseclassifier.estimators` define them.
 
         Args:
             frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length).
-
-        Returns:
-            Shape (frames, decisions); `noiseclassifier.estimators` define their meaning.
 
         Raises:
             SignalError: If the frames have another shape or values that are not finite.
@@ -176,11 +168,7 @@ class Classifier:
         return self.decide(features_in_chunks(frames, self.profile))
 
     def decide(self, plain: Real) -> Array:
-        """Decision values, shape (frames, decisions).
-
-        Args:
-            plain: Features, not yet standardised, shape (frames, features).
-        """
+        """Decision values by features, not yet standardised, shape (frames, features)."""
         chunks = range(0, max(len(plain), 1), CHUNK)
         parts = ((plain[first : first + CHUNK] - self.mean) / self.scale for first in chunks)
         return np.concatenate([self.estimator.decision(part) for part in parts])
@@ -223,14 +211,8 @@ class Classifier:
         relative to the past and to the rest, the decision with the lower failure score counts.
 
         Args:
-            pieces: Signals and their validity as `classify` takes them, one piece or more.
-            rate: Sample rate, in [Hz], as `classify` takes it.
-            start: Time of the first sample, in [s].
+            pieces: Signals and their validity, one piece or more; all else as `classify` has it.
             whole: Whether what is found is compared with the rest of the signal.
-
-        Raises:
-            RateError: If the model is of another rate.
-            SignalError: As `classify`.
         """
         self.check_rate(rate, "lower the signal's rate, or take another model")
         starts: list[Index] = []
@@ -260,19 +242,15 @@ class Classifier:
             return labels
         places, features = again
         other = self.decide(features)
-        fewer = self._failure(other) < self._failure(found[places])
+        own, others = (
+            self.estimator.score(each)[:, 1:].sum(axis=1) for each in (found[places], other)
+        )
+        fewer = others < own
         found[places[fewer]] = other[fewer]
         return self.labels(found, begins, rate, start=start)
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
-        """Labels of frames from their decision values.
-
-        Args:
-            decisions: Decision values, shape (frames, decisions).
-            starts: First sample of each frame, shape (frames,).
-            rate: Sample rate of the signal, in [Hz].
-            start: Time of its first sample, in [s].
-        """
+        """Labels of frames by decision values and first samples, shape (frames,) from a start."""
         return Labels(
             start + starts / rate,
             start + (starts + self.profile.length) / rate,
@@ -310,33 +288,13 @@ class Classifier:
             FileError: If the file is missing, damaged, no model file, of another version, or
                 a model for any rate.
         """
-        manifest, arrays = modelfile.read(path)
-        if "recipe" in manifest:
+        model = load(path)
+        if not isinstance(model, cls):
             raise FileError(path, "is a model for any rate; read it by noiseclassifier.load")
-        return cls.of(manifest, arrays, modelfile.digest(path))
-
-    @classmethod
-    def of(cls, manifest: Mapping[str, Any], arrays: Mapping[str, Array], sha256: str = "") -> Self:
-        """Make a classifier of what `modelfile.read` gave."""
-        profile = Profile.of(manifest["profile"])
-        return cls(
-            profile,
-            tuple(manifest["classes"]),
-            ESTIMATORS[profile.estimator].of(arrays, profile),
-            arrays["mean"],
-            arrays["scale"],
-            manifest["runs"],
-            manifest["metrics"],
-            manifest["versions"],
-            sha256,
-        )
+        return model
 
     def _choose(self, decisions: Array) -> Words:
         return np.array((*self.classes, UNKNOWN))[self.estimator.choose(decisions)]
-
-    def _failure(self, decisions: Array) -> Array:
-        """Score of any failure, shape (frames,)."""
-        return np.asarray(self.estimator.score(decisions)[:, 1:].sum(axis=1))
 
 
 class Stream:
@@ -390,9 +348,6 @@ class Stream:
                 of that shape or, joint by joint, (joints, samples).
             valid: False in gaps, shape (samples,); frames that touch a gap are left out.
 
-        Returns:
-            Labels, most often none.
-
         Raises:
             SignalError: If the samples are not finite, not one-dimensional, or not all that the
                 model needs; none is taken.
@@ -409,11 +364,9 @@ class Stream:
         self._frames.skip(samples)
 
     def finish(self) -> Labels:
-        """End the signal; what is pushed next begins another one.
+        """End the signal, by the label of a last frame that is flush with its end, if there is one.
 
-        Returns:
-            The label of the last frame, flush with the end, if the profile asks for one where no
-            hop leads.
+        What is pushed next begins another signal.
         """
         return self._labels(self._frames.finish())
 
@@ -426,11 +379,7 @@ class Stream:
 
 
 def targets_of(labels: Words, known: Sequence[str]) -> tuple[tuple[str, ...], Index]:
-    """Classes that the frames of a training set have, in order, and the number of each frame's.
-
-    Raises:
-        DatasetError: If they are fewer than two, or not all known.
-    """
+    """Classes that the frames of a training set have, in order, and the number of each frame's."""
     there = set(labels.tolist())
     classes = tuple(name for name in known if name in there)
     if len(classes) < 2 or there - set(classes):
@@ -470,9 +419,6 @@ class General:
             recipe: All settings.
             thin: They hold every ``thin``-th `ok` frame, for which the odds are corrected.
 
-        Returns:
-            The model; equal input gives an equal one.
-
         Raises:
             DatasetError: If the frames are of fewer than two classes.
         """
@@ -503,14 +449,11 @@ class General:
         return Evaluation.of(frames.labels, names[self.estimator.choose(decisions)], self.classes)
 
     def at(self, rate: float, signals: Collection[str] = (NOISE,)) -> Classifier:
-        """Bind the model to a rate and to the signals of a log.
+        """Bind the model to a rate and to the signals of a log: to as many of these as it can take.
 
         Args:
             rate: Sample rate, in [Hz]; above ``HIGHEST``, the log has to be decimated to that.
             signals: Names of the signals that there are.
-
-        Returns:
-            A classifier of that rate, which takes as many of the signals as it can.
 
         Raises:
             RateError: If the rate is below ``LOWEST``.
@@ -523,33 +466,9 @@ class General:
             raise MissingSignalError([NOISE], signals)
         profile = self.recipe.bound(min(rate, HIGHEST), taken)
         there = self.recipe.places(profile)
-        return Classifier(
-            profile,
-            self.classes,
-            self.estimator.at(there),
-            self.mean[there],
-            self.scale[there],
-            self.runs,
-            self.metrics,
-            self.versions,
-            self.sha256,
-        )
-
-    @classmethod
-    def of(cls, manifest: Mapping[str, Any], arrays: Mapping[str, Array], sha256: str = "") -> Self:
-        """Make a model of what `modelfile.read` gave."""
-        recipe = LogBands.of(manifest["recipe"])
-        return cls(
-            recipe,
-            tuple(manifest["classes"]),
-            Detector.of(arrays, recipe.bound(HIGHEST)),
-            arrays["mean"],
-            arrays["scale"],
-            manifest["runs"],
-            manifest["metrics"],
-            manifest["versions"],
-            sha256,
-        )
+        estimator, mean, scale = self.estimator.at(there), self.mean[there], self.scale[there]
+        known = (self.runs, self.metrics, self.versions, self.sha256)
+        return Classifier(profile, self.classes, estimator, mean, scale, *known)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, whole or not at all; the same model gives the same bytes.
@@ -615,24 +534,23 @@ def load(path: str | Path) -> Model:
         FileError: If the file is missing, damaged, no model file, or of another version.
     """
     manifest, arrays = modelfile.read(path)
-    kind = General if "recipe" in manifest else Classifier
-    return kind.of(manifest, arrays, modelfile.digest(path))
+    classes, mean, scale = tuple(manifest["classes"]), arrays["mean"], arrays["scale"]
+    known = *(manifest[name] for name in ("runs", "metrics", "versions")), modelfile.digest(path)
+    if "recipe" in manifest:
+        recipe = LogBands.of(manifest["recipe"])
+        trees = Detector.of(arrays, recipe.bound(HIGHEST))
+        return General(recipe, classes, trees, mean, scale, *known)
+    profile = Profile.of(manifest["profile"])
+    estimator = ESTIMATORS[profile.estimator].of(arrays, profile)
+    return Classifier(profile, classes, estimator, mean, scale, *known)
 
 
 def nearest(
     models: Mapping[str, Model], rate: float, signals: Collection[str] = (NOISE,)
 ) -> tuple[str, Classifier]:
-    """Model of the nearest rate at or below the signals' rate, bound to them.
+    """Model of the nearest rate at or below the signals' rate, in [Hz], by name and bound to them.
 
     Of models of one rate, it is the one of most signals. A general model has any rate.
-
-    Args:
-        models: Models of any rates, by name.
-        rate: Sample rate of the signals, in [Hz].
-        signals: Names of the signals that there are.
-
-    Returns:
-        Its name, and the model at its rate.
 
     Raises:
         MissingSignalError: If each model needs a signal that is missing.

@@ -134,17 +134,12 @@ def rounded(samples: Real, profile: Profile) -> Array:
 
 
 def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) -> Array:
-    """Logarithm of the amplitude of each frequency band, in each window of a Fourier transform.
+    """Logarithm of the amplitude of each frequency band, in windows of shape (rows, ..., window).
 
-    Args:
-        windows: Samples of the windows, shape (rows, ..., window).
-        resolution: The one of the profile's that the windows are of.
-
-    Returns:
-        Shape (..., energies), in [Np]: of each norm, and then, in a relative profile, the
-        difference of each norm from the one before; then the same of the loudest joint of each
-        signal that goes joint by joint, and the difference of that joint from the mean of all
-        joints. They do not depend on the windows beside, bit for bit.
+    The shape is (..., energies), in [Np]: of each norm, and then, in a relative profile, the
+    difference of each norm from the one before; then the same of the loudest joint of each signal
+    that goes joint by joint, and the difference of that joint from the mean of all joints. They do
+    not depend on the windows beside, bit for bit.
     """
     spectrum = _transform(windows)
     if profile.bands == "log":
@@ -175,23 +170,14 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
 
 
 def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
-    """Features of each frame: log-band energies of its windows, pooled over time.
-
-    Args:
-        energies: For each of the profile's resolutions, log-band energies of the frames' windows,
-            shape (frames, time, energies).
-
-    Returns:
-        Features, not yet standardised, shape (frames, features).
-    """
+    """Features of frames, by the energies of each resolution, shape (frames, time, energies)."""
     if profile.bands != "log":
         flat = dct(energies[0]).reshape(len(energies[0]), feature_count(profile))
         return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
     count, rows = len(profile.statistics), []
     for each, resolution in zip(energies, profile.resolutions, strict=True):
-        found, bands = pool(each, count), len(resolution.edges) - 1
-        apart = found.reshape(len(found), count, -1, bands)  # spectrum by spectrum
-        rows.append(apart.swapaxes(1, 2).reshape(len(found), -1))
+        apart = pool(each, count).reshape(len(each), count, -1, resolution.bands)
+        rows.append(apart.swapaxes(1, 2).reshape(len(each), -1))  # spectrum by spectrum
     if not profile.relative:
         return np.concatenate(rows, axis=1)
     means, above = _level(profile)
@@ -202,14 +188,7 @@ def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
 
 
 def pool(energies: Array, count: int = len(STATISTICS)) -> Array:
-    """Mean, maximum and standard deviation over time of each log-band energy.
-
-    Args:
-        count: How many of these statistics, 2 or 3.
-
-    Returns:
-        Statistics, which do not depend on the order in time, shape (frames, count, energies).
-    """
+    """Mean, maximum and, of 3, standard deviation over time, shape (frames, count, energies)."""
     # A frame at a time is too little for NumPy's methods, which take longer than their ufuncs.
     frames, windows, bands = energies.shape
     found = np.empty((frames, count, bands))
@@ -230,23 +209,18 @@ def pool(energies: Array, count: int = len(STATISTICS)) -> Array:
 
 @lru_cache
 def _level(profile: Profile) -> tuple[Index, Array]:
-    """Weights by which features become relative to the level of the frame.
+    """Places of the features whose mean is the level of a frame; how often each is above it.
 
-    Returns:
-        Places of the means of the norms, of which the level of the frame is the mean, shape
-        (means,); and how often that level is subtracted from each feature: once from the means and
-        maxima of norms and loudest joints, minus once from the last feature, which thereby is the
-        level itself, shape (features,).
+    The level is the mean of the means of the norms. It is subtracted once from the means and maxima
+    of norms and loudest joints, and minus once from the last feature, which thereby is the level.
     """
     means, above = [], []
     for each in profile.resolutions:
         for name in spectra(profile):
-            difference = " less " in name
             for statistic in profile.statistics:
-                counts = not difference and statistic != "deviation"
-                mean = counts and statistic == "mean" and not by_joint(name)
-                means += [mean] * (len(each.edges) - 1)
-                above += [float(counts)] * (len(each.edges) - 1)
+                counts = " less " not in name and statistic != "deviation"
+                means += [counts and statistic == "mean" and not by_joint(name)] * each.bands
+                above += [float(counts)] * each.bands
     return np.flatnonzero(means), np.array([*above, -1.0])
 
 
@@ -258,14 +232,7 @@ def feature_count(profile: Profile) -> int:
 
 
 def standard(plain: Real, profile: Profile) -> tuple[Array, Array]:
-    """Mean and scale for the standardisation of features; 0 and 1 for a profile without it.
-
-    Args:
-        plain: Features of the training set, NaN where they are missing, shape (frames, features).
-
-    Returns:
-        Mean and scale of each feature, shape (features,) each.
-    """
+    """Mean and scale of each feature, NaN where it is missing, for the standardisation."""
     if not profile.least_deviation:
         return np.zeros(plain.shape[1]), np.ones(plain.shape[1])
     deviation: Array = np.nanstd(plain, axis=0, dtype=np.float64)
@@ -277,65 +244,40 @@ def standard(plain: Real, profile: Profile) -> tuple[Array, Array]:
 
 
 def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
-    """Amplitudes of the short-time Fourier transform (paper, Sec. III-A), not padded.
-
-    Args:
-        frames: Stretches of noise signal, shape (frames, length).
-
-    Returns:
-        Amplitudes, shape (frames, time, frequency).
-    """
+    """Amplitudes of the short-time Fourier transform (paper, Sec. III-A), not padded."""
     return np.abs(_transform(_windows_of(frames, window, stride)))
 
 
 def compress(spectrum: Array, *, comb: bool = False) -> Array:
     """Sum three bins into one band (the mean would shift every logarithm by the same log 3).
 
-    Args:
-        spectrum: Amplitudes, shape (frames, time, frequency), a multiple of three bins.
-        comb: Whether to sum the bins that NoisyTest 0.0.1 sums, a third of the spectrum apart,
-            in place of adjacent ones.
-
-    Returns:
-        Amplitudes of the bands, shape (frames, time, frequency / 3).
+    They are adjacent, or those that NoisyTest 0.0.1 sums, a third of the spectrum apart.
     """
     bands: Array = spectrum[..., _bins_of_bands(spectrum.shape[-1], comb=comb)].sum(axis=-2)
     return bands
 
 
 def dct(energies: Array) -> Array:
-    """Cosine transform of each band over time, of type II, orthonormal.
+    """Cosine transform over time, of type II, orthonormal: (..., time, frequency) to the reverse.
 
-    Args:
-        energies: Log-band energies, shape (..., time, frequency).
-
-    Returns:
-        Coefficients, shape (..., frequency, time). Distances between frames stay what they
-        were: the transform is a rotation, so that no decision depends on it.
+    Distances between frames stay what they were: no decision depends on this rotation.
     """
     coefficients: Array = np.swapaxes(energies, -1, -2) @ _cosines(energies.shape[-2])
     return coefficients
 
 
 def band_shares(rate: float, resolution: Resolution) -> Array:
-    """Share of each bin in the mean power of each band between a resolution's edges.
+    """Share of each bin in the mean power of each band, columns of sum 1, shape (frequency, bands).
 
     A bin stands for half a bin's width on each side of its frequency and counts by the part of it
     that lies in the band, so that a band narrower than a bin is never empty.
-
-    Args:
-        rate: Sample rate of the signal, in [Hz].
-
-    Returns:
-        Shares, each column summing to 1, shape (frequency, bands).
     """
     width = rate / resolution.window
     centre = width * np.arange(resolution.window // 2 + 1)[:, None]
     low, high = np.array(resolution.edges[:-1]), np.array(resolution.edges[1:])
     overlap = np.minimum(centre + width / 2, high) - np.maximum(centre - width / 2, low)
     share = np.maximum(overlap, 0.0)
-    normalised: Array = share / share.sum(axis=0)
-    return normalised
+    return np.asarray(share / share.sum(axis=0))
 
 
 def _windows_of(frames: Array, window: int, stride: int) -> Array:
@@ -346,8 +288,7 @@ def _windows_of(frames: Array, window: int, stride: int) -> Array:
 def _power_shares(rate: float, resolution: Resolution) -> Array:
     """Matrix from squares of a transform to mean powers, shape (frequency, bands)."""
     amplitude = 2.0 / _hann(resolution.window).sum()
-    shares: Array = amplitude**2 * band_shares(rate, resolution)
-    return shares
+    return np.asarray(amplitude**2 * band_shares(rate, resolution))
 
 
 def _transform(windows: Array) -> NDArray[np.complex128]:
@@ -456,15 +397,9 @@ class Rest:
             self._features = self._features[kept]
 
     def relative(self, flagged: Mask) -> tuple[Index, Array] | None:
-        """Features of flagged frames relative to all others.
+        """Places of flagged frames, and their features unchanged and relative to those of others.
 
-        Args:
-            flagged: Whether a frame belongs to a finding, shape (frames,), only such that may be
-                failures.
-
-        Returns:
-            Places of the flagged frames, and their features unchanged and relative to the median
-            of the others; None if one of both is missing.
+        None if there are no flagged frames, or too few others.
         """
         own = flagged[self._place]
         if self._features is None or not own.any() or np.count_nonzero(~own) < FEWEST:
@@ -485,26 +420,14 @@ def _relative(features: Array, location: Array, spread: Array) -> Array:
 
 
 def frame_features(signal: Signals, profile: Profile, valid: Mask | None = None) -> Frames:
-    """Features of all frames of a whole signal.
-
-    Args:
-        signal: The noise estimate, shape (samples,), or signals by name.
-        profile: How it is framed, and what to compute.
-        valid: False in gaps, shape (samples,); frames that touch a gap are left out.
-    """
+    """Features of all frames of a whole signal but those that touch a gap."""
     return _joined([*features_of_pieces([(signal, valid)], profile)])
 
 
 def features_of_pieces(
     pieces: Iterable[tuple[Signals, Mask | None]], profile: Profile
 ) -> Iterator[Frames]:
-    """Features of all frames of a signal that comes in pieces, the same as of the whole one.
-
-    Args:
-        pieces: The noise estimate, shape (samples,), or signals by name, and False in gaps, shape
-            (samples,); one piece or more.
-        profile: How it is framed, and what to compute.
-    """
+    """Features of all frames of a signal that comes in pieces, each with False in gaps."""
     frames = None
     for signal, valid in pieces:
         samples = stacked(signal, profile.signals)
@@ -525,16 +448,10 @@ class FrameFeatures:
     bit. Each Fourier transform is computed once, for all frames that share it: many at a time,
     since they take little longer than one, and all but the last few before the chunk that
     completes a frame. Memory does not grow.
-
-    Args:
-        profile: How the signal is framed, and what to compute.
-        rows: Number of norms, and of joints of all signals that go joint by joint.
-
-    Attributes:
-        count: Samples so far.
     """
 
     def __init__(self, profile: Profile, rows: int) -> None:
+        """Start a signal of so many norms and joints of the signals that go joint by joint."""
         self._profile = profile
         # Room for a frame, and for as much as is taken at once.
         self._at_once = LENGTHS * profile.length
@@ -548,7 +465,7 @@ class FrameFeatures:
         self._begin()
 
     def _begin(self) -> None:
-        self.count = 0
+        self.count = 0  # samples so far
         self._held = 0  # samples in the buffer
         self._first = int(self._profile.drop_first_sample)
         self._frame = self._first  # start of the next frame
@@ -558,12 +475,7 @@ class FrameFeatures:
         self._due = self._next_due(0)  # count with which there is work to do
 
     def push(self, samples: Real, valid: Mask | None = None) -> Frames:
-        """Features of the frames that samples complete.
-
-        Args:
-            samples: Any number of them, also none, shape (samples,) or (rows, samples).
-            valid: False in gaps, shape (samples,); frames that touch a gap are left out.
-        """
+        """Features of the frames that samples, shape (samples,) or (rows, samples), complete."""
         count = samples.shape[-1]
         if samples.ndim > 1 and len(samples) != len(self._samples):
             raise SignalError(
@@ -583,11 +495,7 @@ class FrameFeatures:
         return self._take(rounded(samples, self._profile), valid)
 
     def skip(self, samples: int) -> None:
-        """Skip a gap: the same as pushing so many samples that are not valid.
-
-        Args:
-            samples: How many were lost; a gap of hours takes no longer than one of seconds.
-        """
+        """Skip a gap as if so many samples were pushed that are not valid, however many."""
         length, hop = self._profile.length, self._profile.hop
         self._lose(min(samples, length))
         # Pending frames lie wholly in the gap now, and so would all that are skipped.
@@ -638,8 +546,7 @@ class FrameFeatures:
     def _advance(self, chunk: int) -> list[Frames]:
         """Transform the windows that are complete, and pool the windows of complete frames.
 
-        Args:
-            chunk: Samples of the last chunk; the next one is expected to have as many.
+        The next chunk is expected to have as many samples as this one.
         """
         profile = self._profile
         for windows in self._windows:
@@ -683,12 +590,6 @@ class _Windows:
 
     Frames start every hop, and their windows at the same phases of each hop. Windows are numbered
     in order of time. Samples are counted from the start of the first frame.
-
-    Args:
-        samples: Buffer of the signal, shape (rows, samples).
-
-    Attributes:
-        done: How many windows are transformed.
     """
 
     def __init__(self, samples: Array, profile: Profile, resolution: Resolution) -> None:
@@ -709,19 +610,14 @@ class _Windows:
         one = log_band_energies(self._windows[:, 0], profile, resolution)
         self._energies = np.zeros((self._rows, *one.shape))
         self._at_once = max(1, AT_ONCE // (samples.shape[0] * resolution.window))
-        self.done = 0
+        self.done = 0  # how many windows are transformed
 
     def jump(self, hops: int) -> None:
         """Skip so many hops of a gap."""
         self.done += hops * len(self._phases)
 
     def advance(self, count: int, base: int) -> None:
-        """Transform the windows that are complete.
-
-        Args:
-            count: Samples so far.
-            base: Number of the first one in the buffer.
-        """
+        """Transform the windows that are complete; ``base`` is the first sample in the buffer."""
         hops, phase = divmod(count - self._resolution.window, self._profile.hop)
         complete = hops * len(self._phases) + bisect_right(self._phases, phase)
         if complete <= self.done:

@@ -67,21 +67,9 @@ def versions() -> dict[str, str]:
 def write(
     path: str | Path, model: Any, settings: Mapping[str, Any], *, overwrite: bool = False
 ) -> None:
-    """Write a model file, whole or not at all.
-
-    Args:
-        model: A classifier, or a general model.
-        settings: Its profile, its rate, and its recipe if it is for any rate.
-        overwrite: Whether a file that exists may be replaced.
-    """
-    manifest = {
-        "format": FORMAT,
-        **settings,
-        "classes": list(model.classes),
-        "runs": dict(model.runs),
-        "metrics": dict(model.metrics),
-        "versions": dict(model.versions),
-    }
+    """Write a model file, whole or not at all; settings are profile, rate, and recipe if any."""
+    known = {name: dict(getattr(model, name)) for name in ("runs", "metrics", "versions")}
+    manifest = {"format": FORMAT, **settings, "classes": list(model.classes), **known}
     arrays = {**model.estimator.arrays(), "mean": model.mean, "scale": model.scale}
     text = json.dumps(manifest, sort_keys=True, allow_nan=False)
     content = io.BytesIO()
@@ -115,37 +103,25 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        if overwrite:
-            temporary.replace(path)
-        else:
-            _place(temporary, path)
+        if not overwrite:
+            try:
+                os.link(temporary, path)  # unless another process has taken the name meanwhile
+                return
+            except FileExistsError:
+                raise
+            except OSError:  # a file system without hard links: an empty file claims the name
+                path.open("xb").close()
+        temporary.replace(path)
+    except FileExistsError:
+        raise OutputError(path, EXISTS) from None
     except OSError as error:
         raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def _place(temporary: Path, path: Path) -> None:
-    """Give a file its final name, unless another process has taken it meanwhile."""
-    try:
-        os.link(temporary, path)
-        return
-    except FileExistsError:
-        raise OutputError(path, EXISTS) from None
-    except OSError:  # a file system without hard links: the name is claimed by an empty file
-        try:
-            path.open("xb").close()
-        except FileExistsError:
-            raise OutputError(path, EXISTS) from None
-    temporary.replace(path)
-
-
 def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Manifest and arrays of a model file, once its table of contents is checked.
-
-    Returns:
-        The manifest and the arrays, which are finite and of the shapes that it asks for.
-    """
+    """Manifest and arrays of a model file, which are finite and of the shapes that it asks for."""
     try:
         if not stat.S_ISREG(Path(path).stat().st_mode) and not Path(path).is_dir():
             raise FileError(path, "is no regular file")
@@ -203,11 +179,9 @@ def _member(path: str | Path, archive: zipfile.ZipFile, name: str, dimensions: i
         raise FileError(path, f"array {name!r} is damaged ({_one_line(error)})") from error
     fits = dtype.kind == "U" if name == "manifest" else dtype == np.dtype("<f8")
     if not fits or len(shape) != dimensions:
-        raise FileError(
-            path,
-            f"array {name!r} is of type {dtype} and shape {shape},"
-            f" expected {'text' if name == 'manifest' else 'float64'}, {dimensions}-D",
-        )
+        wanted = f"{'text' if name == 'manifest' else 'float64'}, {dimensions}-D"
+        problem = f"array {name!r} is of type {dtype} and shape {shape}, expected {wanted}"
+        raise FileError(path, problem)
     if size != len(content) - header.tell() or min(shape, default=0) < 0 or not dtype.itemsize:
         raise FileError(path, f"array {name!r} is damaged: its size is not what it declares")
     array: NDArray[Any] = np.load(io.BytesIO(content), allow_pickle=False)
@@ -235,21 +209,15 @@ def _manifest(path: str | Path, text: str) -> dict[str, Any]:
             f"is of format {given!r}, this version reads {', '.join(map(repr, known))}:"
             " train it again, or read it by the version that wrote it",
         )
-    found = dict(manifest) if given == FORMAT else _renamed(manifest)
-    profile = found.get("profile")
-    if isinstance(profile, dict) and profile.get("estimator") == "baseline":
-        raise FileError(path, f"is a baseline of good runs: {ACCEPT}")
-    return found
-
-
-def _renamed(manifest: dict[str, Any]) -> dict[str, Any]:
-    """Give the entries of versions 4 and 5 the names of version 6."""
     profile = manifest.get("profile")
     if isinstance(profile, dict):
-        names = {"machine": "estimator"}
-        profile = {names.get(name, name): value for name, value in profile.items()}
-        profile.setdefault("reference", False)
-    return {**manifest, "profile": profile}
+        if given != FORMAT:  # versions 4 and 5 know no reference, and have another name
+            names = {"machine": "estimator"}
+            profile = {names.get(name, name): value for name, value in profile.items()}
+            manifest["profile"] = {"reference": False, **profile}
+        if manifest["profile"].get("estimator") == "baseline":
+            raise FileError(path, f"is a baseline of good runs: {ACCEPT}")
+    return dict(manifest)
 
 
 _JSON_TYPES = {
@@ -267,10 +235,8 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
     """Check a manifest, and the arrays against it."""
     for name, kind in _JSON_TYPES.items():
         if not isinstance(manifest.get(name), kind):
-            raise FileError(
-                path,
-                f"manifest has {name} = {str(manifest.get(name))[:80]}, expected a {kind.__name__}",
-            )
+            value = str(manifest.get(name))[:80]
+            raise FileError(path, f"manifest has {name} = {value}, expected a {kind.__name__}")
     try:
         profile = Profile.of(manifest["profile"])
         count = feature_count(profile)

@@ -4,10 +4,10 @@ A `Profile` is in samples and of one rate: NoisyTest's, the paper's, or the prof
 seconds and hertz (`LogBands`) has at that rate.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import ceil, isfinite
 from typing import Any, Literal, Self, TypeAlias, get_args
 
@@ -55,16 +55,16 @@ class Resolution:
     """Window, stride and bands of a Fourier transform.
 
     Long windows resolve frequency, short ones resolve time.
-
-    Attributes:
-        window: Samples of the Hann window of one transform.
-        stride: Samples from one transform to the next.
-        edges: Edges of the bands, ascending, in [Hz]; none unless bands are spaced by logarithms.
     """
 
-    window: int
-    stride: int
-    edges: tuple[float, ...]
+    window: int  # samples of the Hann window of one transform
+    stride: int  # samples from one transform to the next
+    edges: tuple[float, ...]  # of the bands, ascending, in [Hz]; none unless spaced by logarithms
+
+    @property
+    def bands(self) -> int:
+        """Number of bands between the edges."""
+        return len(self.edges) - 1
 
     def transforms(self, length: int) -> int:
         """Number of transforms of so many samples."""
@@ -171,8 +171,10 @@ class Profile:
 
     def __post_init__(self) -> None:
         """Check every setting once."""
-        for check in (_check_types, _check_ranges, _check_signals, _check_bands):
-            check(self)
+        _check_types(self)
+        for fits, problem in chain(_rules(self), _rules_of_signals(self)):
+            if not fits:
+                raise ProfileError(problem)
 
     @classmethod
     def noisytest(cls, kernel: Kernel = "rbf") -> Self:
@@ -276,11 +278,10 @@ def spectra(profile: Profile) -> tuple[str, ...]:
 
 @lru_cache
 def columns(profile: Profile) -> tuple[str, ...]:
-    """Names of the features of log bands, in order.
+    """Names of the features of log bands, in order, the same at any rate.
 
-    A feature has one name at any rate: the spectrum, the kind of window, the statistic and the
-    lower edge of the band, in [Hz], after `RELATIVE` where it is relative to the reference. The
-    last one of a relative profile is the level of the frame.
+    They tell the spectrum, the kind of window, the statistic and the lower edge of the band, in
+    [Hz]. The last one of a relative profile is the level of the frame.
     """
     plain = [
         f"{spectrum} {kind} {statistic} {edge:.4g}"
@@ -311,75 +312,73 @@ def _check_types(profile: Profile) -> None:
             raise ProfileError(f"{field.name} is {value!r}, expected {wanted}")
 
 
-def _check_ranges(profile: Profile) -> None:
-    for name in _ABOVE_ZERO:
-        if getattr(profile, name) <= 0:
-            raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected more than 0")
-    for name in _ZERO_OR_MORE:
-        if getattr(profile, name) < 0:
-            raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected 0 or more")
-    if not 2 <= profile.leaves <= MOST_LEAVES:
-        raise ProfileError(f"leaves is {profile.leaves!r}, expected 2 to {MOST_LEAVES}")
-    if profile.alarm >= 1:
-        raise ProfileError(f"alarm is {profile.alarm!r}, expected a probability below 1")
-    if profile.quick_window and (profile.bands != "log" or profile.quick_stride <= 0):
-        raise ProfileError(
-            f"quick_window is {profile.quick_window} with quick_stride {profile.quick_stride} and"
-            f" bands {profile.bands!r}, expected a stride of more than 0 and 'log'"
+def _rules(profile: Profile) -> Iterator[tuple[bool, str]]:
+    """Whether settings fit, and what is wrong if not; each rule relies on the ones before."""
+    for name in (*_ABOVE_ZERO, *_ZERO_OR_MORE):
+        value, least = getattr(profile, name), "more than 0" if name in _ABOVE_ZERO else "0 or more"
+        yield (
+            value > 0 or (value == 0 and name in _ZERO_OR_MORE),
+            f"{name} is {value!r}, expected {least}",
         )
+    yield (
+        2 <= profile.leaves <= MOST_LEAVES,
+        f"leaves is {profile.leaves!r}, expected 2 to {MOST_LEAVES}",
+    )
+    yield profile.alarm < 1, f"alarm is {profile.alarm!r}, expected a probability below 1"
+    yield (
+        not profile.quick_window or (profile.bands == "log" and profile.quick_stride > 0),
+        f"quick_window is {profile.quick_window} with quick_stride {profile.quick_stride} and"
+        f" bands {profile.bands!r}, expected a stride of more than 0 and 'log'",
+    )
     longest = max(each.window for each in profile.resolutions)
-    if longest > profile.length:
-        raise ProfileError(
-            f"window of {longest} samples is longer than a frame of {profile.length}"
-        )
+    yield (
+        longest <= profile.length,
+        f"window of {longest} samples is longer than a frame of {profile.length}",
+    )
 
 
-def _check_signals(profile: Profile) -> None:
+def _rules_of_signals(profile: Profile) -> Iterator[tuple[bool, str]]:
     names, norms, log = profile.signals, profile.norms, profile.bands == "log"
     signals = f"signals are {', '.join(names) or 'none'}"
-    if not names or len(set(names)) < len(names):
-        raise ProfileError(f"{signals}, expected one or more, each once")
-    if not norms or any(map(by_joint, names[:norms])):
-        raise ProfileError(
-            f"{signals}, expected norms, and after them those that go joint by joint"
-        )
-    if norms < len(names) and not (log and profile.differences):
-        raise ProfileError(
-            f"{signals}, with bands {profile.bands!r}, relative {profile.relative} and reference"
-            f" {profile.reference}, expected 'log' and one of both for those that go joint by joint"
-        )
-    if EFFORT in names and (names[-1] != EFFORT or not profile.reference):
-        raise ProfileError(
-            f"{signals} with reference {profile.reference}, expected {EFFORT} last, and True"
-        )
-    if profile.reference and (not log or profile.relative):
-        raise ProfileError(
-            f"reference is True with bands {profile.bands!r} and relative {profile.relative},"
-            " expected 'log' and False"
-        )
+    yield 0 < len(names) == len(set(names)), f"{signals}, expected one or more, each once"
+    yield (
+        norms > 0 and not any(map(by_joint, names[:norms])),
+        f"{signals}, expected norms, and after them those that go joint by joint",
+    )
+    yield (
+        norms == len(names) or (log and profile.differences),
+        f"{signals}, with bands {profile.bands!r}, relative {profile.relative} and reference"
+        f" {profile.reference}, expected 'log' and one of both for those that go joint by joint",
+    )
+    yield (
+        EFFORT not in names or (names[-1] == EFFORT and profile.reference),
+        f"{signals} with reference {profile.reference}, expected {EFFORT} last, and True",
+    )
+    yield (
+        not profile.reference or (log and not profile.relative),
+        f"reference is True with bands {profile.bands!r} and relative {profile.relative},"
+        " expected 'log' and False",
+    )
     classes = profile.classes
-    if len(set(classes)) < len(classes) or len(classes) < 2 or classes[0] != "ok":
-        raise ProfileError(
-            f"classes are {', '.join(classes) or 'none'}, expected 'ok' and others, each once"
+    yield (
+        1 < len(classes) == len(set(classes)) and classes[0] == "ok",
+        f"classes are {', '.join(classes) or 'none'}, expected 'ok' and others, each once",
+    )
+    yield (
+        log or profile.bins % 3 == 0,
+        f"window of {profile.window} samples has {profile.bins} bins, expected a multiple of three"
+        " (256, 1024, 4096)",
+    )
+    for edges in (each.edges for each in profile.resolutions * log):
+        yield (
+            len(edges) > 1 and all(low < high for low, high in pairwise(edges)),
+            f"edges are {edges}, expected two or more, ascending",
         )
-
-
-def _check_bands(profile: Profile) -> None:
-    if profile.bands != "log":
-        if profile.bins % 3:
-            raise ProfileError(
-                f"window of {profile.window} samples has {profile.bins} bins, expected a multiple"
-                " of three (256, 1024, 4096)"
-            )
-        return
-    for edges in (each.edges for each in profile.resolutions):
-        if len(edges) < 2 or any(low >= high for low, high in pairwise(edges)):
-            raise ProfileError(f"edges are {edges}, expected two or more, ascending")
-        if edges[0] < 0 or edges[-1] > profile.rate / 2:
-            raise ProfileError(
-                f"edges reach from {edges[0]:g} to {edges[-1]:g} Hz,"
-                f" expected 0 to half the rate, {profile.rate / 2:g} Hz"
-            )
+        yield (
+            edges[0] >= 0 and edges[-1] <= profile.rate / 2,
+            f"edges reach from {edges[0]:g} to {edges[-1]:g} Hz, expected 0 to half the rate,"
+            f" {profile.rate / 2:g} Hz",
+        )
 
 
 # --- for any rate
@@ -451,13 +450,7 @@ class LogBands:
     the class of the nearest training frames."""
 
     def at(self, rate: float) -> Profile:
-        """Profile for a sample rate, each duration rounded to the nearest sample, windows up.
-
-        Args:
-            rate: Sample rate of the signal, in [Hz].
-
-        Returns:
-            The profile: at 1 kHz a frame is 400 samples, every 100.
+        """Profile for a sample rate, in [Hz], durations rounded to the nearest sample, windows up.
 
         Raises:
             ProfileError: If fewer than ``FEWEST`` bands lie below half the rate.
@@ -469,10 +462,11 @@ class LogBands:
                 f"a rate of {rate:g} Hz leaves {len(edges) - 1} bands up to {rate / 2:g} Hz,"
                 f" expected {FEWEST} or more: take a rate of {ceil(2 * least)} Hz at least"
             )
+        shared = {field.name for field in fields(Profile)} & {field.name for field in fields(self)}
+        shared -= {"hop", "window", "stride", "quick_stride"}  # in samples there, in seconds here
         return Profile(
+            **{name: getattr(self, name) for name in shared},
             name="logbands",
-            classes=self.classes,
-            signals=self.signals,
             rate=rate,
             length=round(self.frame * rate),
             hop=round(self.hop * rate),
@@ -484,16 +478,7 @@ class LogBands:
             quick_window=round(self.quick * rate) if quick else 0,
             quick_stride=round(self.quick_stride * rate) if quick else 0,
             quick_edges=quick,
-            relative=self.relative,
-            reference=self.reference,
-            floor=self.floor,
-            least_deviation=self.least_deviation,
-            estimator=self.estimator,
-            alarm=self.alarm,
-            rounds=self.rounds,
-            leaves=self.leaves,
             kernel="rbf",
-            regularization=self.regularization,
             # Two frames' n standardised features differ by 2 n in squares, whatever the rate.
             gamma=self.softness / (len(STATISTICS) * (len(edges) - 1)),
             multiclass="one-vs-one",
