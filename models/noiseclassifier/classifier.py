@@ -127,7 +127,7 @@ class Classifier:
         return Evaluation.of(examples.labels, predicted, self.classes)
 
     def at(self, rate: float, signals: Collection[str]) -> "Classifier":
-        """The model itself, if it takes logs of that rate, in [Hz], or below, and of those signals.
+        """The model itself, if a log of that rate, in [Hz], and of these signals feeds it.
 
         Raises:
             MissingSignalError: If it needs another one.
@@ -250,7 +250,7 @@ class Classifier:
         return self.labels(found, begins, rate, start=start)
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
-        """Labels of frames by decision values and first samples, shape (frames,) from a start."""
+        """Labels of frames by their decision values and first samples; the signal has a start."""
         return Labels(
             start + starts / rate,
             start + (starts + self.profile.length) / rate,
@@ -364,9 +364,9 @@ class Stream:
         self._frames.skip(samples)
 
     def finish(self) -> Labels:
-        """End the signal, by the label of a last frame that is flush with its end, if there is one.
+        """End the signal; what is pushed next begins another one.
 
-        What is pushed next begins another signal.
+        Returns the label of a last frame, flush with the end, if the profile asks for one.
         """
         return self._labels(self._frames.finish())
 

@@ -46,7 +46,7 @@ class Dataset:
         Args:
             recordings: Annotated signals at the profile's rate, each of another name.
             profile: How blocks are cut and framed, and which labels there are.
-            training: Whether the frames are for training; see `cut`.
+            training: Whether blocks that are shorter than a frame are padded, or else widened.
 
         Raises:
             RateError: If a recording has another rate than the profile.
@@ -114,16 +114,7 @@ class Examples:
     ) -> Self:
         """Features of recordings, read one after the other; only the features are kept.
 
-        Args:
-            recordings: Annotated signals at the profile's rate, each of another name; those
-                without a frame are skipped.
-            profile: How blocks are cut and framed, and what to compute.
-            training: Whether the frames are for training; see `cut`.
-
-        Raises:
-            NoFrameError: If there is no frame at all.
-            DatasetError: If a name repeats.
-            ModelsError: As `Dataset.of` does.
+        Arguments and errors are those of `Dataset.of`; recordings without a frame are skipped.
         """
         found: list[Self] = []
         hashes: dict[str, str] = {}
@@ -140,12 +131,12 @@ class Examples:
     def joined(cls, parts: Iterable[Self]) -> Self:
         """Examples of all parts, one or more."""
         every = list(parts)
-        return cls(
-            np.concatenate([part.features for part in every]),
-            np.concatenate([part.labels for part in every]),
-            np.concatenate([part.runs for part in every]),
-            {name: digest for part in every for name, digest in part.hashes.items()},
+        features, labels, runs = (
+            np.concatenate([getattr(part, name) for part in every])
+            for name in ("features", "labels", "runs")
         )
+        hashes = {name: digest for part in every for name, digest in part.hashes.items()}
+        return cls(features, labels, runs, hashes)
 
     @property
     def groups(self) -> Words:

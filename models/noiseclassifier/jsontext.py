@@ -23,12 +23,8 @@ LONG_KEY = re.compile(
 
 
 def text_of(path: str | Path) -> str:
-    """Text of a file in UTF-8, with or without a byte order mark.
-
-    Args:
-        path: A regular file: a device or a pipe may have no end.
-    """
-    path = Path(path)
+    """Text of a regular file in UTF-8, with or without a byte order mark."""
+    path = Path(path)  # a device or a pipe may have no end
     about = path.stat()
     if not (stat.S_ISREG(about.st_mode) or stat.S_ISDIR(about.st_mode)):
         raise ValueError("is no regular file; save what it holds to one")

@@ -231,22 +231,12 @@ def interval(start: float, stop: float) -> str:
 
 
 def confirmed(suspect: Mask, evidence: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:
-    """Keep the frames of those stretches that hold enough frames of evidence.
-
-    Args:
-        suspect: Whether a frame is not `ok` by itself, shape (frames,).
-        evidence: Whether it is evidence of a finding, shape (frames,).
-        apart: Whether a frame and the next neither overlap nor touch, shape (frames - 1,).
-
-    Returns:
-        The frames that are kept, shape (frames,).
-    """
+    """Keep the suspect frames of those stretches that hold enough frames of evidence."""
     begins, weight = sides(suspect, apart)
     stretch = np.cumsum(begins)
     own = suspect & evidence
     enough = np.bincount(stretch[own], weight[own], minlength=len(suspect) + 1) >= least
-    kept: Mask = suspect & enough[stretch]
-    return kept
+    return np.asarray(suspect & enough[stretch])
 
 
 def sides(suspect: Mask, apart: Mask) -> tuple[Mask, Index]:

@@ -58,25 +58,15 @@ MEASURED, ERROR = JOINTS[1], JOINTS[2]
 
 @dataclass(frozen=True)
 class Line:
-    """A strong line of a joint that was followed from window to window.
+    """A strong line of a joint that was followed from window to window."""
 
-    Attributes:
-        row: The joint.
-        frequency: In the latest window, in [Hz].
-        strength: Least strength of its windows, in [dB].
-        windows: How many it was followed through.
-        first: Number of the first one's first sample.
-        stop: Number of the sample after its last window.
-        sharp: Largest strength of a window, in [dB].
-    """
-
-    row: int
-    frequency: float
-    strength: float
-    windows: int
-    first: int
-    stop: int
-    sharp: float
+    row: int  # the joint
+    frequency: float  # in the latest window, in [Hz]
+    strength: float  # least strength of its windows, in [dB]
+    windows: int  # how many it was followed through
+    first: int  # number of the first one's first sample
+    stop: int  # number of the sample after its last window
+    sharp: float  # largest strength of a window, in [dB]
 
     @property
     def found(self) -> bool:
@@ -225,15 +215,10 @@ class Lasting(Windows):
 
 
 def strong(window: Array, rate: float) -> list[tuple[int, float, float]]:
-    """Strong lines of a window.
+    """Joint, frequency in [Hz] and strength in [dB] of each strong line of a window.
 
-    Args:
-        window: Measured velocities, and tracking errors if there are any, shape (1 or 2, joints,
-            samples), in [rad/s].
-        rate: Sample rate, in [Hz].
-
-    Returns:
-        Joint, frequency in [Hz] and strength in [dB] of each.
+    It holds measured velocities, and tracking errors if there are any, in [rad/s], of shape
+    (1 or 2, joints, samples).
     """
     line, frequency = spectrum(window[0], rate)
     loud = line >= 10.0 ** ((STRONG + FLOOR) / 10.0)
@@ -263,14 +248,7 @@ def strong(window: Array, rate: float) -> list[tuple[int, float, float]]:
 
 
 def spectrum(window: Array, rate: float) -> tuple[Array, Array]:
-    """Mean square of the line at each frequency of a Hann window.
-
-    Args:
-        rate: Sample rate, in [Hz].
-
-    Returns:
-        Shape (..., frequencies), and the frequencies, in [Hz].
-    """
+    """Mean square of the line at each frequency, shape (..., frequencies), and these in [Hz]."""
     taper, response = _taper(window.shape[-1] - 1)
     # Of the differences: slow motion, which is far louder, would leak into all frequencies.
     waves = np.fft.rfft(np.diff(window, axis=-1) * taper, axis=-1)

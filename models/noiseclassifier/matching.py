@@ -205,30 +205,18 @@ class Unanswered:
 
 @dataclass(frozen=True, eq=False)
 class Predictions:
-    """Annotations of one recording, and predictions of a model.
-
-    Attributes:
-        name: Of the recording.
-        group: Of the recording, as `recording.group_of` names it.
-        step: Time from one sample to the next, in [s].
-        blocks: Annotations, in order; each ends with the recording at the latest.
-        truth: Class of each frame that is cut from a block, shape (frames,).
-        predicted: Predicted class of it, shape (frames,).
-        labels: Predictions on the whole recording.
-        events: All injected faults; empty where they are not known.
-        facts: Robot, scenario and domain of the recording.
-        located: Findings by their frames, and from onset to end; by default the labels' findings.
-    """
+    """Annotations of one recording, and predictions of a model."""
 
     name: str
-    group: str
-    step: float
-    blocks: tuple[Block, ...]
-    truth: Words
-    predicted: Words
-    labels: Labels
-    events: tuple[Fault, ...] = ()
+    group: str  # as `recording.group_of` names it
+    step: float  # time from one sample to the next, in [s]
+    blocks: tuple[Block, ...]  # in order; each ends with the recording at the latest
+    truth: Words  # class of each frame that is cut from a block, shape (frames,)
+    predicted: Words  # predicted class of it, shape (frames,)
+    labels: Labels  # of the whole recording
+    events: tuple[Fault, ...] = ()  # all injected faults; empty where they are not known
     facts: Mapping[str, str] = field(default_factory=dict)
+    # Findings by their frames, and from onset to end; None: those of the labels.
     located: tuple[tuple[Event, ...], tuple[Event, ...]] | None = None
 
     @cached_property
@@ -268,26 +256,15 @@ def within(recording: Recording) -> tuple[Block, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Findings and faults of one run.
-
-    Attributes:
-        run: The predictions.
-        faults: All injected faults, or failure blocks where those are not known.
-        kind: Kind of each finding, shape (findings,).
-        found: Whether each fault is found, shape (faults,).
-        delay: Time from its start until a live listener knows, NaN unless found, shape (faults,),
-            in [s].
-        counts: Numbers and times in [h] of the run, by name; of matches also by chance.
-        score: Score of the run, see `run_score`.
-    """
+    """Findings and faults of one run."""
 
     run: Predictions
-    faults: tuple[Fault, ...]
-    kind: Words
-    found: Mask
-    delay: Array
-    counts: dict[str, float]
-    score: float
+    faults: tuple[Fault, ...]  # all injected ones, or failure blocks where those are not known
+    kind: Words  # of each finding, shape (findings,)
+    found: Mask  # whether each fault is, shape (faults,)
+    delay: Array  # from its start until a live listener knows, NaN unless found, in [s]
+    counts: dict[str, float]  # numbers, and times in [h]; of matches also by chance
+    score: float  # see `run_score`
 
     @classmethod
     def of(cls, run: Predictions) -> "Outcome":

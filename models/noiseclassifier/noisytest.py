@@ -101,10 +101,9 @@ LATEST = 1e12
 
 
 def read_folder(folder: str | Path, *, rate: float | None = None) -> Iterator[Recording]:
-    """Recordings of a folder, in sorted order.
+    """Recordings of a folder that holds a ``.toml`` beside each ``.log``, in sorted order.
 
     Args:
-        folder: Folder that holds a ``.toml`` beside each ``.log``.
         rate: Sample rate that all must have, in [Hz]; by default, each has its own.
     """
     logs = sorted(Path(folder).glob("*.log"))
@@ -116,12 +115,7 @@ def read_folder(folder: str | Path, *, rate: float | None = None) -> Iterator[Re
 
 
 def read_recording(log: str | Path, *, rate: float | None = None) -> Recording:
-    """Recording of a noise signal and the annotations beside it.
-
-    Args:
-        log: The ``.log``; the annotations are in the ``.toml`` of the same name.
-        rate: Sample rate that it must have, in [Hz]; by default, from its times.
-    """
+    """Recording of a ``.log`` and the annotations in the ``.toml`` of the same name."""
     log = Path(log)
     blocks = read_annotations(log.with_suffix(".toml"))
     time, noise = read_log(log)

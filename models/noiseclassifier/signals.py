@@ -60,12 +60,9 @@ def feeds(there: Collection[str], names: Sequence[str]) -> bool:
 
 
 def stacked(signals: Signals, names: Sequence[str]) -> Real:
-    """Signals by their names, norms first, as rows of one array.
+    """A norm alone, shape (samples,), or several signals, norms first, shape (rows, samples).
 
     ``noise`` is computed from ``measured`` and ``desired`` where it is missing.
-
-    Returns:
-        A norm alone, shape (samples,); several signals as rows, shape (rows, samples).
     """
     there = named(signals)
     if lacking := [name for name in names if name not in there]:

@@ -94,13 +94,9 @@ class Grid:
                 yield value
                 value += step
 
-        axes: dict[str, tuple[Value, ...]] = {
-            "stride": tuple(range(224, 1026, 10)),
-            "regularization": tuple(added_up(0.5, 2.5, 0.1)),
-        }
-        if kernel == "rbf":
-            axes["gamma"] = tuple(added_up(4.5e-4, 6.0e-4, 1.0e-5))
-        return cls(axes)
+        gamma = {"gamma": tuple(added_up(4.5e-4, 6.0e-4, 1.0e-5))} if kernel == "rbf" else {}
+        strides = tuple(range(224, 1026, 10))
+        return cls({"stride": strides, "regularization": tuple(added_up(0.5, 2.5, 0.1)), **gamma})
 
     @classmethod
     def of(cls, texts: Iterable[str], kernel: Kernel = "rbf") -> Self:
@@ -202,16 +198,10 @@ def _number(name: str, text: str) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Recordings to train points on, and to measure them by.
-
-    Attributes:
-        recordings: Annotated signals.
-        splits: Indices of the training recordings, and of the test recordings; each is tested in
-            one split at most.
-    """
+    """Recordings to train points on and to measure them by; each is tested in one split at most."""
 
     recordings: Sequence[Recording]
-    splits: Sequence[tuple[Index, Index]]
+    splits: Sequence[tuple[Index, Index]]  # indices of the training recordings, and of the others
 
     @classmethod
     def against(cls, training: Sequence[Recording], validation: Sequence[Recording]) -> Self:
@@ -247,24 +237,13 @@ class Measures:
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """Decisions of points, which share their features, on all test frames.
-
-    Attributes:
-        classes: Names of the classes.
-        truth: Class of each frame, as an index, shape (frames,).
-        runs: Name of the recording that each is from, shape (frames,).
-        chosen: Class of each, as an index, shape (points, frames); of one that is unknown, beyond
-            the classes.
-        margins: Margins of the classes, or logarithms of their probabilities, shape (points,
-            frames, classes).
-        training_frames: Number of training frames in all.
-    """
+    """Decisions of points, which share their features, on all test frames."""
 
     classes: tuple[str, ...]
-    truth: Index
-    runs: Words
-    chosen: Index
-    margins: Array
+    truth: Index  # class of each frame, as an index, shape (frames,)
+    runs: Words  # name of the recording that each is from, shape (frames,)
+    chosen: Index  # its predicted class, beyond the classes if unknown, shape (points, frames)
+    margins: Array  # or logarithms of the probabilities, shape (points, frames, classes)
     training_frames: int
 
     def measures(self) -> list[Measures]:
@@ -274,13 +253,13 @@ class Validation:
         for chosen, margins in zip(self.chosen, self.margins, strict=True):
             cells = np.zeros((len(names), len(names)), dtype=np.int64)
             np.add.at(cells, (self.truth, chosen), 1)
-            found = Evaluation(names, cells)
+            evaluation = Evaluation(names, cells)
             values = (
-                found.balanced_accuracy,
+                evaluation.balanced_accuracy,
                 balanced_log_loss(margins, self.truth),
-                found.failure_recall,
-                found.false_alarm_rate,
-                found.subset_accuracy,
+                evaluation.failure_recall,
+                evaluation.false_alarm_rate,
+                evaluation.subset_accuracy,
             )
             measures.append(Measures(*(round(float(value), DIGITS) for value in values)))
         return measures
@@ -300,10 +279,9 @@ def measure(profiles: Sequence[Profile], trial: Trial) -> list[Measures]:
 
 
 def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
-    """Train points, and decide on all test frames by each.
+    """Train points that share their features, and decide on all test frames by each.
 
-    Args:
-        profiles: Points that share their features; those of one gamma should follow each other.
+    Those of one gamma should follow each other.
     """
     known = trial.examples(profiles[0], training=True)
     fresh = trial.examples(profiles[0], training=False)
@@ -411,10 +389,6 @@ def balanced_log_loss(margins: Array, truth: Index) -> float:
     counts of frames: two points hardly ever have the same. The slope a > 0 has the least loss
     (Platt's scaling without a bias, one for all classes), so that the loss does not depend on the
     width of the margins; it changes no decision.
-
-    Args:
-        margins: Margins of the classes, shape (frames, classes).
-        truth: Class of each frame, as an index, shape (frames,).
     """
     from scipy.optimize import minimize_scalar
 

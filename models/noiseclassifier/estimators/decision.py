@@ -71,18 +71,13 @@ class Probable(ABC):
     Its decision values are the logarithm of the probability of each class, and then the novelty
     score: how far the farthest feature lies above nearly all training frames, in standard
     deviations. Out of distribution, a low probability of failure means nothing.
-
-    Attributes:
-        calibration: Scale of the logits, then an offset for each class, shape (1 + classes,).
-        frequency: Share of each class in the training frames, shape (classes,).
-        alarm: Alarm threshold: a probability of any failure.
     """
 
     DIMENSIONS: ClassVar[Mapping[str, int]]
 
-    calibration: Array
-    frequency: Array
-    alarm: float
+    calibration: Array  # scale of the logits, then an offset for each class, (1 + classes,)
+    frequency: Array  # share of each class in the training frames, shape (classes,)
+    alarm: float  # alarm threshold: a probability of any failure
 
     @classmethod
     def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
@@ -117,8 +112,7 @@ class Probable(ABC):
     @cached_property
     def _expected(self) -> Array:
         """Logarithms of the failures' frequencies, shape (classes - 1,)."""
-        expected: Array = np.log(self.frequency[1:])
-        return expected
+        return np.asarray(np.log(self.frequency[1:]))
 
     def choose(self, decisions: Array) -> Index:
         """Choose a failure if failures are probable enough, or else `ok`.
@@ -134,15 +128,12 @@ class Probable(ABC):
 
     def above_threshold(self, decisions: Array) -> Mask:
         """Which frames are above the alarm threshold, whatever their novelty, (frames,)."""
-        above: Mask = decisions[:, 0] <= log1p(-self.alarm)
-        return above
+        return np.asarray(decisions[:, 0] <= log1p(-self.alarm))
 
     def novel(self, decisions: Array) -> Mask:
         """Which frames are out of distribution, shape (frames,)."""
-        novel: Mask = decisions[:, -1] > NOVELTY_LIMIT
-        return novel
+        return np.asarray(decisions[:, -1] > NOVELTY_LIMIT)
 
     def score(self, decisions: Array) -> Array:
         """Probability of each class, shape (frames, classes)."""
-        probabilities: Array = np.exp(decisions[:, :-1])
-        return probabilities
+        return np.asarray(np.exp(decisions[:, :-1]))

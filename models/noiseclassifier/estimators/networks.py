@@ -32,16 +32,7 @@ TAIL = 1e-3
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Networks(Probable):
-    """Networks whose probabilities are averaged, their calibration, and bounds of the features.
-
-    Attributes:
-        hidden: Weights to the hidden layers, shape (networks, features, units).
-        hidden_bias: Shape (networks, units).
-        output: Weights to the classes, shape (networks, units, classes).
-        output_bias: Shape (networks, classes).
-        known: Lowest and highest value of each feature in nearly all training frames, shape
-            (2, features).
-    """
+    """Networks whose probabilities are averaged, their calibration, and bounds of the features."""
 
     DIMENSIONS: ClassVar[Mapping[str, int]] = {
         "hidden": 3,
@@ -53,11 +44,11 @@ class Networks(Probable):
         "known": 2,
     }
 
-    hidden: Array
-    hidden_bias: Array
-    output: Array
-    output_bias: Array
-    known: Array
+    hidden: Array  # weights to the hidden layers, shape (networks, features, units)
+    hidden_bias: Array  # shape (networks, units)
+    output: Array  # weights to the classes, shape (networks, units, classes)
+    output_bias: Array  # shape (networks, classes)
+    known: Array  # lowest and highest value in nearly all training frames, shape (2, features)
 
     @classmethod
     def fit(cls, features: Array, targets: Index, groups: Words, profile: Profile) -> "Networks":

@@ -20,25 +20,15 @@ from noiseclassifier.signals import Array, Index, Words
 
 @dataclass(frozen=True, eq=False)
 class SupportVectorMachines:
-    """All SVMs of a classifier, over the same vectors.
-
-    Attributes:
-        vectors: Support vectors, shape (vectors, features); with the linear kernel they may be
-            the SVMs' weights, shape (svms, features).
-        coefficients: Weight y_i alpha_i of each vector, shape (svms, vectors).
-        intercept: Bias b, shape (svms,).
-        kernel: The kernel function.
-        gamma: Parameter of the RBF kernel.
-        multiclass: How the SVMs are combined.
-    """
+    """All SVMs of a classifier, over the same vectors."""
 
     DIMENSIONS: ClassVar[Mapping[str, int]] = {"vectors": 2, "coefficients": 2, "intercept": 1}
 
-    vectors: Array
-    coefficients: Array
-    intercept: Array
+    vectors: Array  # shape (vectors, features); if linear, of each SVM alone, its weights
+    coefficients: Array  # weight y_i alpha_i of each vector, shape (svms, vectors)
+    intercept: Array  # bias b, shape (svms,)
     kernel: Kernel
-    gamma: float
+    gamma: float  # of the RBF kernel
     multiclass: Multiclass
 
     @classmethod
@@ -129,11 +119,8 @@ def svm_count(classes: int, multiclass: Multiclass) -> int:
 
 def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:
     """Class of each frame: with most votes of the pairs, or with the largest decision value."""
-    ballot = decisions
-    if multiclass == "one-vs-one":
-        ballot = _votes(decisions, classes)
-    chosen: Index = ballot.argmax(axis=1)
-    return chosen
+    ballot = _votes(decisions, classes) if multiclass == "one-vs-one" else decisions
+    return np.asarray(ballot.argmax(axis=1))
 
 
 def score(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:

@@ -45,19 +45,8 @@ class Trees(Probable):
     """Trees whose leaves are summed up, their calibration, and bounds of the features.
 
     Trees are in the order of rounds, one for each class in each; their leaves from left to right.
-    A tree with fewer splits than others has some that rule nothing out.
-
-    Attributes:
-        feature: Index of the feature of a split, shape (trees, splits).
-        threshold: A frame is on the right of a split if its feature exceeds this, shape
-            (trees, splits).
-        left: The first leaf on the left of a split, and the first one that is not, shape
-            (2, trees, splits).
-        missing: 1 where a frame without the feature is on the right of the split, else 0, shape
-            (trees, splits).
-        leaf: What a leaf adds to its tree's class, shape (trees, leaves).
-        prior: What classes start from, shape (classes,).
-        known: Highest value of each feature in nearly all training frames, shape (features,).
+    A tree with fewer splits than others has some that rule nothing out. A frame is on the right of
+    a split if its feature exceeds the threshold.
     """
 
     DIMENSIONS: ClassVar[Mapping[str, int]] = {
@@ -72,13 +61,13 @@ class Trees(Probable):
         "known": 1,
     }
 
-    feature: Array
-    threshold: Array
-    left: Array
-    missing: Array
-    leaf: Array
-    prior: Array
-    known: Array
+    feature: Array  # index of the feature of a split, shape (trees, splits)
+    threshold: Array  # shape (trees, splits)
+    left: Array  # first leaf on the left, and first one that is not, shape (2, trees, splits)
+    missing: Array  # 1 where a frame without the feature is on the right, shape (trees, splits)
+    leaf: Array  # what a leaf adds to its tree's class, shape (trees, leaves)
+    prior: Array  # what classes start from, shape (classes,)
+    known: Array  # highest value in nearly all training frames, shape (features,)
 
     @classmethod
     def fit(
