@@ -8,7 +8,7 @@ other recording is a group of its own. No split depends on chance or on the orde
 
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import combinations
@@ -78,10 +78,10 @@ class Recording:
 
     def __post_init__(self) -> None:
         """Check everything once, and hash what came without a hash."""
-        _check_signal(self)
         plain = tuple(Block(float(each[0]), float(each[1]), str(each[2])) for each in self.blocks)
         object.__setattr__(self, "blocks", plain)
-        _check_blocks(self)
+        for problem in _problems(self):
+            raise RecordingError(self.name, problem)
         if not self.sha256:
             hashed = hashlib.sha256()
             for signal in named(self.signal).values():
@@ -101,46 +101,34 @@ class Recording:
         return time
 
 
-def _check_signal(recording: Recording) -> None:
-    name, count, valid = recording.name, recording.samples, recording.valid
+def _problems(recording: Recording) -> Iterator[str]:
+    """What is wrong with the samples and the blocks of a recording."""
+    count, valid, start, rate = recording.samples, recording.valid, recording.start, recording.rate
     for kind, signal in named(recording.signal).items():
         many = by_joint(kind)
         if signal.ndim != 1 + many or signal.shape[-1:] != (count,) or not signal.size:
             expected = "(joints, samples)" if many else "(samples,)"
-            raise RecordingError(
-                name, f"a signal of shape {signal.shape}, expected {expected}, one or more"
-            )
+            yield f"a signal of shape {signal.shape}, expected {expected}, one or more"
         if not np.isfinite(signal).all():
             place = tuple(np.argwhere(~np.isfinite(signal))[0].tolist())
             what = f"sample {place[-1]}" + f" of {kind}" * (kind != NOISE)
-            raise RecordingError(name, f"{what} is not finite ({signal[place]})")
+            yield f"{what} is not finite ({signal[place]})"
     if valid is not None and valid.shape != (count,):
-        raise RecordingError(name, f"valid has shape {valid.shape}, the signal {(count,)}")
-    if not (isfinite(recording.rate) and recording.rate > 0 and isfinite(recording.start)):
-        raise RecordingError(
-            name,
-            f"rate {recording.rate} Hz and start {recording.start} s, expected finite numbers,"
-            " the rate above 0",
-        )
-
-
-def _check_blocks(recording: Recording) -> None:
-    name, step = recording.name, 1.0 / recording.rate
+        yield f"valid has shape {valid.shape}, the signal {(count,)}"
+    if not (isfinite(rate) and rate > 0 and isfinite(start)):
+        yield f"rate {rate} Hz and start {start} s, expected finite numbers, the rate above 0"
     # Annotations are written with few digits: one sample more or less is no contradiction.
-    begin = recording.start - step
-    end = recording.start + (recording.samples + 1) * step
+    step = 1.0 / rate
+    begin, end = start - step, start + (count + 1) * step
     for block in recording.blocks:
         if not block.start < block.stop:
-            raise RecordingError(name, f"{_words(block)} stops before it starts, or lasts no time")
+            yield f"{_words(block)} stops before it starts, or lasts no time"
         if block.start < begin or block.start >= end or end < block.stop < inf:
-            raise RecordingError(
-                name,
-                f"{_words(block)} is outside of the recording, which lasts from"
-                f" {recording.start:g} s to {end - step:g} s",
-            )
+            lasts = f"which lasts from {start:g} s to {end - step:g} s"
+            yield f"{_words(block)} is outside of the recording, {lasts}"
     for early, late in combinations(sorted(recording.blocks), 2):
         if late.start < early.stop - step and late.label != early.label:
-            raise RecordingError(name, f"{_words(early)} and {_words(late)} overlap and contradict")
+            yield f"{_words(early)} and {_words(late)} overlap and contradict"
 
 
 def _words(block: Block) -> str:
