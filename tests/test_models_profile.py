@@ -188,6 +188,7 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
         ({"classes": ("ok", "ok")}, "expected 'ok' and others"),
         ({"classes": "ok"}, "classes is 'ok', expected a tuple of str"),
         ({"bands": "log"}, r"edges are \(\), expected two or more, ascending"),
+        ({"bands": "log", "edges": (10.0, float("nan"))}, r"edges are \(10.0, nan\), expected two"),
         ({"bands": "log", "edges": (10.0, 6000.0)}, "to 6000 Hz, expected 0 to half the rate"),
         ({"bands": "log", "edges": (-1.0, 100.0)}, "from -1 to 100 Hz, expected 0 to half the"),
         (
