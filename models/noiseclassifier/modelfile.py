@@ -280,7 +280,7 @@ def _check_arrays(
         raise FileError(path, f"is adapted to good runs: {ACCEPT}")
     if not (arrays["scale"] > 0).all():
         raise FileError(path, "array 'scale' holds values that are not above 0")
-    indices = Trees.highest(profile, features=count) if issubclass(estimator, Trees) else {}
-    for name, most in indices.items():
+    indices = {"feature": count - 1, "left": profile.leaves, "missing": 1}
+    for name, most in indices.items() if issubclass(estimator, Trees) else ():
         if arrays[name].min() < 0 or arrays[name].max() > most:
             raise FileError(path, f"array {name!r} holds values beyond 0 to {most}")

@@ -6,7 +6,6 @@ from array import array
 from collections.abc import Iterator
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -153,16 +152,11 @@ def parse_annotations(text: str) -> Iterator[Block]:
     if len(ranges) != len(labels):
         raise AnnotationError(f"{len(ranges)} chunk_ranges and {len(labels)} chunk_labels")
     for count, (span, label) in enumerate(zip(ranges, labels, strict=True), start=1):
-        yield _block(span, label, f"chunk {count}")
-
-
-def _block(span: Any, label: Any, where: str) -> Block:
-    numbers = isinstance(span, list) and [
-        type(each) in (int, float) and -LATEST < each < LATEST for each in span
-    ]
-    if numbers != [True, True] or not isinstance(label, str):
-        raise AnnotationError(
-            f"{span!r} with label {label!r}, expected [start, stop] in seconds and text", where
-        )
-    start, stop = float(span[0]), float(span[1])
-    return Block(start, inf if stop == END else stop, label)
+        numbers = isinstance(span, list) and [
+            type(each) in (int, float) and -LATEST < each < LATEST for each in span
+        ]
+        if numbers != [True, True] or not isinstance(label, str):
+            expected = "expected [start, stop] in seconds and text"
+            raise AnnotationError(f"{span!r} with label {label!r}, {expected}", f"chunk {count}")
+        start, stop = map(float, span)
+        yield Block(start, inf if stop == END else stop, label)

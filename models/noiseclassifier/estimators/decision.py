@@ -77,6 +77,7 @@ class Probable(ABC):
 
     calibration: Array  # scale of the logits, then an offset for each class, (1 + classes,)
     frequency: Array  # share of each class in the training frames, shape (classes,)
+    known: Array  # highest value of each feature in nearly all training frames, in the last row
     alarm: float  # alarm threshold: a probability of any failure
 
     @classmethod
@@ -93,11 +94,6 @@ class Probable(ABC):
         """Decision values of one frame."""
         return len(self.calibration)
 
-    @property
-    @abstractmethod
-    def maximum(self) -> Array:
-        """Highest value of each feature in nearly all training frames, shape (features,)."""
-
     @abstractmethod
     def logits(self, features: Array) -> Array:
         """Logits of the classes, not calibrated, shape (frames, classes)."""
@@ -106,7 +102,8 @@ class Probable(ABC):
         """Probability of each class, and novelty of the frame."""
         decisions = np.empty((len(features), self.width))
         decisions[:, :-1] = calibrated(self.logits(features), self.calibration)
-        np.fmax.reduce(features - self.maximum, 1, out=decisions[:, -1])
+        highest = self.known if self.known.ndim == 1 else self.known[-1]
+        np.fmax.reduce(features - highest, 1, out=decisions[:, -1])
         return decisions
 
     @cached_property

@@ -32,7 +32,10 @@ TAIL = 1e-3
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Networks(Probable):
-    """Networks whose probabilities are averaged, their calibration, and bounds of the features."""
+    """Networks whose probabilities are averaged, their calibration, and bounds of the features.
+
+    Known are the lowest and the highest value of each feature, shape (2, features).
+    """
 
     DIMENSIONS: ClassVar[Mapping[str, int]] = {
         "hidden": 3,
@@ -48,7 +51,6 @@ class Networks(Probable):
     hidden_bias: Array  # shape (networks, units)
     output: Array  # weights to the classes, shape (networks, units, classes)
     output_bias: Array  # shape (networks, classes)
-    known: Array  # lowest and highest value in nearly all training frames, shape (2, features)
 
     @classmethod
     def fit(cls, features: Array, targets: Index, groups: Words, profile: Profile) -> "Networks":
@@ -94,12 +96,6 @@ class Networks(Probable):
             "frequency": (classes,),
             "known": (2, features),
         }
-
-    @property
-    def maximum(self) -> Array:
-        """Highest value of each feature in nearly all training frames, shape (features,)."""
-        maximum: Array = self.known[1]
-        return maximum
 
     def logits(self, features: Array) -> Array:
         """Logits of the classes, features being raised to their bound, shape (frames, classes)."""

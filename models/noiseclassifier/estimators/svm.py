@@ -53,7 +53,9 @@ class SupportVectorMachines:
         arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
     ) -> dict[str, tuple[int, ...]]:
         """Expected shape of each array; there may be any number of support vectors."""
-        vectors, svms = len(arrays["vectors"]), svm_count(classes, profile.multiclass)
+        pairs = classes * (classes - 1) // 2
+        svms = pairs if profile.multiclass == "one-vs-one" else classes
+        vectors = len(arrays["vectors"])
         return {
             "vectors": (vectors, features),
             "coefficients": (svms, vectors),
@@ -110,11 +112,6 @@ class SupportVectorMachines:
     def _squares(self) -> Array:
         squares: Array = np.einsum("ij,ij->i", self.vectors, self.vectors)
         return squares
-
-
-def svm_count(classes: int, multiclass: Multiclass) -> int:
-    """Number of SVMs for so many classes."""
-    return classes * (classes - 1) // 2 if multiclass == "one-vs-one" else classes
 
 
 def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:

@@ -67,7 +67,6 @@ class Trees(Probable):
     missing: Array  # 1 where a frame without the feature is on the right, shape (trees, splits)
     leaf: Array  # what a leaf adds to its tree's class, shape (trees, leaves)
     prior: Array  # what classes start from, shape (classes,)
-    known: Array  # highest value in nearly all training frames, shape (features,)
 
     @classmethod
     def fit(
@@ -160,16 +159,6 @@ class Trees(Probable):
             "frequency": (classes,),
             "known": (features,),
         }
-
-    @staticmethod
-    def highest(profile: Profile, *, features: int) -> dict[str, int]:
-        """Highest value of each array that holds indices; the lowest is 0."""
-        return {"feature": features - 1, "left": profile.leaves, "missing": 1}
-
-    @property
-    def maximum(self) -> Array:
-        """Highest value of each feature in nearly all training frames, shape (features,)."""
-        return self.known
 
     def logits(self, features: Array) -> Array:
         """Sums of the leaves that frames lead to, and the prior, shape (frames, classes)."""
