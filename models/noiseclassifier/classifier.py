@@ -93,15 +93,11 @@ class Classifier:
         *,
         validation: Dataset | Examples | None = None,
     ) -> Self:
-        """Train a classifier; needs scikit-learn.
+        """Train a classifier; equal input gives an equal one. It needs scikit-learn.
 
         Args:
             dataset: Annotated frames cut by the same profile, or their features.
-            profile: All settings.
             validation: Others, for measures.
-
-        Returns:
-            The classifier; equal input gives an equal model.
 
         Raises:
             DatasetError: If the frames are of fewer than two classes.
@@ -183,9 +179,6 @@ class Classifier:
             rate: Its sample rate, in [Hz], which must be the model's, up to ``profile.NOMINAL``.
             start: Time of its first sample, in [s].
             valid: False in gaps, shape (samples,); frames that touch a gap are left out.
-
-        Returns:
-            Start, stop, class and scores of each frame.
 
         Raises:
             RateError: If the model is of another rate.
@@ -270,10 +263,6 @@ class Classifier:
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, whole or not at all; the same model gives the same bytes.
 
-        Args:
-            path: The file to write, by convention ``*.npz``.
-            overwrite: Whether a file that exists may be replaced.
-
         Raises:
             OutputError: If the file exists or cannot be written.
         """
@@ -356,11 +345,7 @@ class Stream:
         return self._labels(self._frames.push(plain, valid))
 
     def skip(self, samples: int) -> None:
-        """Skip a gap: the same as pushing so many samples that are not valid.
-
-        Args:
-            samples: How many were lost; a gap of hours takes no longer than one of seconds.
-        """
+        """Skip a gap: the same as pushing so many samples that are not valid, at once."""
         self._frames.skip(samples)
 
     def finish(self) -> Labels:
@@ -412,11 +397,10 @@ class General:
 
     @classmethod
     def train(cls, frames: Examples, recipe: LogBands, *, thin: int = 1) -> Self:
-        """Train a model; needs scikit-learn.
+        """Train a model; equal input gives an equal one. It needs scikit-learn.
 
         Args:
             frames: Of logs of any rates and signals, see `frames_of`.
-            recipe: All settings.
             thin: They hold every ``thin``-th `ok` frame, for which the odds are corrected.
 
         Raises:
@@ -453,7 +437,6 @@ class General:
 
         Args:
             rate: Sample rate, in [Hz]; above ``HIGHEST``, the log has to be decimated to that.
-            signals: Names of the signals that there are.
 
         Raises:
             RateError: If the rate is below ``LOWEST``.
@@ -495,8 +478,6 @@ def frames_of(
     every other frame is enough.
 
     Args:
-        recordings: Annotated, of any rates.
-        recipe: How they are framed, and what to compute.
         thin: Keep every ``thin``-th `ok` frame.
         inputs: Signals to take.
 

@@ -45,7 +45,6 @@ class Dataset:
 
         Args:
             recordings: Annotated signals at the profile's rate, each of another name.
-            profile: How blocks are cut and framed, and which labels there are.
             training: Whether blocks that are shorter than a frame are padded, or else widened.
 
         Raises:

@@ -25,9 +25,6 @@ def read_log(path: str | Path) -> tuple[Array, Array]:
     Comments start with ``#``, anywhere; empty lines, a missing header and a missing last line end
     are all right.
 
-    Args:
-        path: The file.
-
     Returns:
         Times in [s] and the noise estimate, each of shape (samples,).
 

@@ -159,10 +159,6 @@ def held_out(group: str, share: float = SHARE) -> bool:
 
     The first 8 bytes of the SHA-256 of the group's name (UTF-8), read as a fraction of 2^64, lie
     below the share. A group that is held out at one share is held out at all larger ones.
-
-    Args:
-        group: What `group_of` gives.
-        share: Of very many groups, those that are held out.
     """
     return int.from_bytes(_digest(group)[:8], "big") / 2.0**64 < share
 
@@ -175,7 +171,6 @@ def folds(groups: Sequence[str], count: int) -> list[tuple[Index, Index]]:
 
     Args:
         groups: Group of each recording or frame, shape (items,).
-        count: How many folds, two or more.
 
     Returns:
         For each fold, indices of the training items, and of the test items; each item is
@@ -230,8 +225,7 @@ def check_apart(
     """Refuse to test a model on its training set: a check against overlapping frames.
 
     Args:
-        train: SHA-256 of each training recording, by name.
-        test: SHA-256 of each test recording, by name.
+        train, test: SHA-256 of each recording, by name.
         advice: What to do about it.
 
     Raises:
