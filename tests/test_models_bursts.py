@@ -46,6 +46,16 @@ def test_a_tone_of_half_a_second_is_one_burst_however_loud(rms, rate):
     assert event.stop == pytest.approx(4.5, abs=0.3)
 
 
+@pytest.mark.parametrize("rate", [300.0, 997.0, 1000.0])
+@pytest.mark.parametrize("duration", [0.4, 0.7, 1.1])
+def test_a_tone_is_one_burst_however_long_it_lasts(duration, rate):
+    """Wherever it begins."""
+    for start in (2.01, 3.3, 4.77):
+        velocity = with_tone(motion(rate=rate), 90.0, 0.1, start, start + duration, rate=rate)
+        (event,) = found(velocity, rate=rate)
+        assert event.start < start + duration / 2 < event.stop
+
+
 @pytest.mark.parametrize("whole", [True, False])
 def test_motion_and_the_noise_of_sensors_are_no_burst(whole):
     """Whatever is known of it."""

@@ -22,8 +22,9 @@ from noiseclassifier.signals import Array
 
 WINDOW, HOP = 0.5, 0.125
 """Duration of a window, and time from one to the next, in [s]."""
-MARGIN = (WINDOW - HOP) / 2
-"""Time by which a burst begins after its window, and ends before it, in [s]."""
+MARGIN = (WINDOW - HOP) / 2 - 0.01
+"""Time by which a burst begins after its window, and ends before it, in [s]: those of windows that
+follow each other overlap, and are one."""
 LOWEST = 13.0
 """Lowest frequency, in [Hz]."""
 WIDTH = 5
