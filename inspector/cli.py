@@ -6,10 +6,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache, wraps
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -17,17 +18,13 @@ from typer.core import TyperCommand, TyperGroup
 from inspector.errors import EXIT, OUTPUT_LOST, OptionError, Status
 from inspector.text import printable
 
-if TYPE_CHECKING:
-    from inspector.commands.config import Config
-
 
 class Entry(NamedTuple):
-    """A command of `inspector`: what its help says first, what it says last, and what it reads."""
+    """A command of `inspector`: what its help says first, and what it says last."""
 
     panel: str
     summary: str
     example: str
-    reads_logs: bool = True
 
 
 COMMANDS = {
@@ -38,11 +35,8 @@ COMMANDS = {
         "Inspect",
         "Show samples from standard input as they arrive.",
         "live --rate 1000 --robot panda < samples.csv",
-        reads_logs=False,
     ),
-    "robots": Entry(
-        "Inspect", "List the robots that are available by name.", "robots", reads_logs=False
-    ),
+    "robots": Entry("Inspect", "List the robots that are available by name.", "robots"),
     "classify": Entry(
         "Check", "Classify runs and print verdicts.", "classify run.npz --format junit"
     ),
@@ -50,7 +44,6 @@ COMMANDS = {
         "Check",
         "Compare runs with a reference: better, same or worse.",
         "diff reference/ candidate/ --report changes/",
-        reads_logs=False,
     ),
     "accept": Entry(
         "Check", "Accept good runs: what is normal.", 'accept runs/ --reason "first release"'
@@ -67,13 +60,11 @@ COMMANDS = {
         "Check",
         "Join the results of several jobs into one.",
         "merge one.json two.json --report noise/",
-        reads_logs=False,
     ),
     "history": Entry(
         "Check",
         "Show the results of many commits, and where they changed.",
         "history results/ -o history.html",
-        reads_logs=False,
     ),
     "import": Entry(
         "Import and export", "Convert logs of robots to run files.", "import log.csv -o run.npz"
@@ -87,31 +78,37 @@ COMMANDS = {
         "Train",
         "Train a model on annotated runs.",
         "train data/ --part training --rate 1000 -o model.npz",
-        reads_logs=False,
     ),
     "tune": Entry(
         "Train",
         "Tune a profile's settings by grid search; resumes if killed.",
         "tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl",
-        reads_logs=False,
     ),
     "evaluate": Entry(
         "Train",
         "Evaluate a model on annotated runs that it was not trained on.",
         "evaluate model.npz data/ --part test",
-        reads_logs=False,
     ),
     "simulate": Entry(
-        "Simulate",
-        "Simulate runs with annotated failures.",
-        "simulate run talos --scenario 7",
-        reads_logs=False,
+        "Simulate", "Simulate runs with annotated failures.", "simulate run talos --scenario 7"
     ),
-    "config": Entry("Help", "Print the settings in force.", "config", reads_logs=False),
-    "help": Entry(
-        "Help", "Print the help of a command or a topic: logs.", "help logs", reads_logs=False
-    ),
+    "config": Entry("Help", "Print the settings in force.", "config"),
+    "help": Entry("Help", "Print the help of a command or a topic: logs.", "help logs"),
 }
+MODULES = {
+    "Inspect": "inspector.commands.inspect",
+    "Check": "inspector.commands.check",
+    "Import and export": "inspector.commands.convert",
+    "Train": "inspector.commands.train",
+    "Simulate": "inspector.commands.simulate",
+    "Help": "inspector.cli",
+}
+"""The module of the commands of each panel."""
+READ_LOGS = {"view", "noise", "listen", "classify", "accept", "audit", "smoothness"} | {
+    "import",
+    "export",
+}
+"""Commands that take the options on reading logs."""
 RENAMED = {
     "adapt": "accept",
     "baseline": "accept",
@@ -135,29 +132,19 @@ Next: `inspector --help` lists all commands, `inspector COMMAND -h` explains one
 `inspector help logs` lists the options on reading logs.
 Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost.
 Tutorial: docs/tutorial.md"""
+END = """\
+Options
+  --version   Print the version.
+  -h, --help  Print this help.
+
+`inspector COMMAND -h` explains a command, `inspector help logs` reading logs."""
 LOGS = "How logs are read (--robot, --rate, --map, ...): `inspector help logs`."
-OUTPUTS = frozenset(
-    (
-        "output",
-        "save",
-        "csv",
-        "picture",
-        "report",
-        "labels_to",
-        "save_mapping",
-        "resume",
-        "to",
-        "train",
-    )
-)
+OUTPUTS = {"output", "save", "csv", "picture", "report", "labels_to", "save_mapping", "resume"} | {
+    "train"
+}
 """Names of options that are written; all other paths are read."""
-
-
 UNSET = OUTPUTS | {"overwrite", "write", "ctx", "localise", "in_ci", "help"}
 """Names of parameters that no file of settings sets."""
-SHARED = {"model", "jobs"}
-"""Settings of all commands, besides those on reading logs."""
-
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as of a shell."""
@@ -165,11 +152,14 @@ UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.E
 """Errors of the system about a path that a user typed, or of a disk: no bugs."""
 
 
+# --- commands
+
+
 class LogCommand(TyperCommand):
-    """A command that opens logs: it also takes `options.log_options`, as a Reading in `ctx.obj`."""
+    """A command that opens logs: it also takes `shared.log_options`, as a Reading in `ctx.obj`."""
 
     def __init__(self, *args: Any, params: list[Any], help: str, **settings: Any) -> None:  # noqa: A002
-        from inspector.commands.options import log_options
+        from inspector.commands.shared import log_options
 
         own = {each.name for each in params}  # a command's own option of that name stands
         self.reading = _converted(log_options, "logs")
@@ -222,16 +212,14 @@ def _converted(function: Callable[..., Any], name: str, **settings: Any) -> Any:
 @cache
 def _command(name: str) -> Any:
     """Import a command."""
-    entry = COMMANDS[name]
-    word = "import_" if name == "import" else name
-    module = import_module(f"inspector.commands.{word}")
-    found = module.app if name == "simulate" else getattr(module, word)
-    example = f"Example: inspector {entry.example}"
-    if isinstance(found, typer.Typer):
-        group = typer.main.get_command(found)
+    module = import_module(MODULES[COMMANDS[name].panel])
+    example = f"Example: inspector {COMMANDS[name].example}"
+    if name == "simulate":
+        group = typer.main.get_command(module.app)
         group.name, group.epilog = name, example
         return group
-    cls = LogCommand if entry.reads_logs else TyperCommand
+    found = getattr(module, name, None) or getattr(module, f"{name}_")  # import_, help_
+    cls = LogCommand if name in READ_LOGS else TyperCommand
     return _converted(_protected(found), name, cls=cls, epilog=example)
 
 
@@ -260,41 +248,17 @@ class _Group(TyperGroup):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print a line for each command, by panels."""
         lines = ["Usage: inspector [OPTIONS] COMMAND [ARGS]...", "", ABOUT]
-        panel = ""
-        for name, entry in COMMANDS.items():
-            if entry.panel != panel:
-                lines += ["", entry.panel]
-                panel = entry.panel
-            lines.append(f"  {name:11} {entry.summary}")
-        lines += [
-            "",
-            "Options",
-            "  --version   Print the version.",
-            "  -h, --help  Print this help.",
-        ]
-        lines += [
-            "",
-            "`inspector COMMAND -h` explains a command, `inspector help logs` reading logs.",
-        ]
-        formatter.write("\n".join(lines) + "\n")
-
-    def settings(self, name: str, found: "Config") -> dict[str, Any]:
-        """What a file of settings has for a command, by its parameters."""
-        log: Any = self.commands["import"]
-        shared = frozenset({each.opts[0].lstrip("-") for each in log.added} | SHARED)
-        given: list[Any] = self.commands[name].params
-        own = {each.opts[0].lstrip("-"): each.name for each in given if each.name not in UNSET}
-        logs = COMMANDS[name].reads_logs or name in ("live", "smoothness")
-        return found.of(name, own, shared, applied=shared if logs else frozenset(SHARED))
+        for panel in MODULES:
+            own = {name: each for name, each in COMMANDS.items() if each.panel == panel}
+            lines += ["", panel, *(f"  {name:11} {each.summary}" for name, each in own.items())]
+        formatter.write("\n".join([*lines, "", END, ""]))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find a command, and the settings of the project for it."""
         name, command, rest = super().resolve_command(ctx, args)
-        if name and name not in ("config", "help", "robots") and not {"-h", "--help"} & set(rest):
-            from inspector.commands.config import find
-
-            if (found := find()) is not None:
-                ctx.default_map = {name: self.settings(name, found)}
+        takes_none = name in ("config", "help", "robots") or {"-h", "--help"} & set(rest)
+        if name and not takes_none and (found := find_settings()) is not None:
+            ctx.default_map = {name: found.of(name, self.commands)}
         return name, command, rest
 
     def invoke(self, ctx: Any) -> Any:
@@ -343,6 +307,148 @@ def _inspector(
     """Detect impacts, jumps and oscillations in robot joint data."""
     if ctx.invoked_subcommand is None:
         typer.echo(START)
+
+
+def help_(
+    ctx: typer.Context,
+    topic: Annotated[
+        str, typer.Argument(help="A command, or logs: how logs are read.", show_default=False)
+    ] = "",
+) -> None:
+    """Print the help of a command or a topic: logs."""
+    parent: Any = ctx.parent
+    if not topic:
+        typer.echo(parent.get_help())
+        return
+    if topic == "logs":
+        typer.echo("Options on reading logs, taken by all commands that open logs:\n")
+        for option in _command("import").added:
+            typer.echo(f"  {option.opts[0]:15} {option.help}")
+        return
+    command = parent.command.commands.get(topic)
+    if command is None:
+        raise typer.BadParameter(f"{topic!r} is no command and no topic", param_hint="TOPIC")
+    with command.make_context(topic, [], parent=parent, resilient_parsing=True) as inner:
+        typer.echo(inner.get_help())
+
+
+# --- settings of a project
+
+FILES = ("inspector.toml", "pyproject.toml")
+TABLE = "noise-inspector"
+SHARED = frozenset(("model", "jobs"))
+"""Settings of all commands, besides those on reading logs."""
+PATHS = {"mapping", "desired", "model", "reference", "candidate", "runs", "package-root"}
+"""Settings that are paths, which are meant from the folder of the file."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a project: `[tool.noise-inspector]` in pyproject.toml, or inspector.toml.
+
+    Keys are the long names of options, without dashes before them. Options on reading logs, `model`
+    and `jobs` stand at the top and hold for all commands that have them; a table such as
+    ``[tool.noise-inspector.classify]`` is for one command, with its arguments (``runs``). The
+    command line wins. Nothing that is written can be set here: a file must not replace others.
+    """
+
+    path: Path
+    shared: Mapping[str, Any]
+    own: Mapping[str, Mapping[str, Any]]
+
+    def of(self, name: str, commands: Mapping[str, Any]) -> dict[str, Any]:
+        """The settings of a command, by the names of its parameters; refuses unknown ones."""
+        given = commands[name].params
+        own = {each.opts[0].lstrip("-"): each.name for each in given if each.name not in UNSET}
+        shared = SHARED | {each.opts[0].lstrip("-") for each in commands["import"].added}
+        tables = (("", self.shared, shared), (f" [{name}]", self.own.get(name, {}), own))
+        for where, table, known in tables:
+            if unknown := next((key for key in table if key not in known), None):
+                from noisemodel.types import hint
+
+                told = f"no setting {unknown!r}{hint(unknown, sorted(known))}"
+                raise OptionError(f"{self.path}:{where} {told}")
+        # In commands that open no log, options of these names mean something else.
+        applied = shared if name in READ_LOGS or name == "live" else SHARED
+        values = {key: value for key, value in self.shared.items() if key in applied}
+        values |= self.own.get(name, {})
+        return {own[key]: self._meant(key, value) for key, value in values.items() if key in own}
+
+    def _meant(self, key: str, value: Any) -> Any:
+        """A value, a path from the folder of the file."""
+        if isinstance(value, list):
+            return [self._meant(key, each) for each in value]
+        of_robot = key == "robot" and str(value).endswith((".urdf", ".xml"))
+        if not isinstance(value, str) or not (key in PATHS or of_robot):
+            return value
+        there = self.path.parent / value
+        return str(there) if there.exists() or key != "model" else value
+
+
+def find_settings() -> Settings | None:
+    """Read the nearest file of settings, from the working folder up to the repository's top."""
+    start = Path.cwd().absolute()
+    for folder in (start, *start.parents):
+        for name in FILES:
+            if (folder / name).exists() and (found := _read_settings(folder / name)) is not None:
+                return found
+        if (folder / ".git").exists():
+            break
+    return None
+
+
+def _read_settings(path: Path) -> Settings | None:
+    """The settings of a file; None of a pyproject.toml without any."""
+    import tomllib
+
+    try:
+        if not path.is_file() or path.stat().st_size > 2**20:
+            raise ValueError("no file of less than 1 MB")
+        content: Any = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        start = b""
+        if path.is_file():
+            with path.open("rb") as stream:
+                start = stream.read(2**20)
+        if path.name == FILES[0] or f"[tool.{TABLE}".encode() in start:
+            raise OptionError(f"{path}: cannot be read ({error})") from error
+        return None  # a file of others, wrong in ways that are none of ours
+    if path.name == FILES[1]:
+        tools = content.get("tool")
+        content = tools.get(TABLE) if isinstance(tools, dict) else None
+        if content is None:
+            return None
+    if not isinstance(content, dict):
+        raise OptionError(f"{path}: [tool.{TABLE}] is no table")
+    own = {key: value for key, value in content.items() if isinstance(value, dict)}
+    return Settings(path, {k: v for k, v in content.items() if k not in own}, own)
+
+
+def config(ctx: typer.Context) -> None:
+    """Print the settings of this project that are in force.
+
+    They are in inspector.toml, or in the table tool.noise-inspector of pyproject.toml: options on
+    reading logs, model and jobs for all commands, and a table for each command, such as classify.
+    The command line wins.
+    """
+    found = find_settings()
+    if found is None:
+        typer.echo("no settings: no inspector.toml, no [tool.noise-inspector] in pyproject.toml")
+        return
+    commands = _Commands()
+    for name in found.own:
+        if name not in COMMANDS:
+            raise OptionError(f"{found.path}: no command {name!r}")
+    for name in commands:
+        found.of(name, commands)  # refuses what is not known
+    typer.echo(f"{found.path}:")
+    for table, settings in {"": found.shared, **found.own}.items():
+        for key, value in settings.items():
+            line = f"{table + '.' if table else ''}{key} = {value!r}"
+            typer.echo("  " + line.replace("'", '"'))
+
+
+# --- how the program runs and ends
 
 
 def main() -> None:

@@ -112,6 +112,13 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
         os.close(held)
 
 
+def write_whole(path: str | Path, content: str | bytes, *, overwrite: bool = False) -> None:
+    """Write a file whole or not at all, text in UTF-8; see `replacing`."""
+    data = content.encode() if isinstance(content, str) else content
+    with replacing(path, overwrite=overwrite) as temporary:
+        temporary.write_bytes(data)
+
+
 def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
     """Refuse an output before long work is done for it, unless it may replace what exists."""
     path = Path(path)

@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 import noisemodel
 from inspector import cli
 from inspector.cli import app
-from inspector.commands.noise import GEOMETRIES
-from inspector.commands.options import KINDS, say_assumed
+from inspector.commands.shared import GEOMETRIES, KINDS, say_assumed
 from noisemodel import surface
 
 

@@ -5,6 +5,7 @@ import io
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from samplelogs import JOINTS, write_lerobot
 
-from inspector.commands.smoothness import By
+from inspector.commands.check import Scores
 from inspector.smoothness import (
     SCORES,
     as_text,
@@ -299,7 +300,7 @@ def test_an_episode_without_the_score_has_no_rank_and_comes_last():
 
 
 def test_the_command_knows_all_scores():
-    assert {by.value for by in By} == set(SCORES)
+    assert set(get_args(Scores)) == set(SCORES)
 
 
 @pytest.fixture

@@ -1,1 +1,1 @@
-"""The commands of the command line, one module each."""
+"""The commands of `inspector`, a module for each panel of its help, and what they share."""

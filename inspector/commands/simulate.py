@@ -2,14 +2,20 @@
 
 import json
 from collections import Counter
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.core import TyperGroup
 
-from inspector.commands.options import Dask, Overwrite, jobs_or_dask
+from inspector.commands.shared import (
+    AsJson,
+    Dask,
+    Overwrite,
+    argument,
+    jobs_or_dask,
+    option,
+)
 
 if TYPE_CHECKING:
     from noiseclassifier.scenarios.dataset import Folder
@@ -24,15 +30,6 @@ class OneRunUnlessNamed(TyperGroup):
         return super().parse_args(ctx, args if named else ["run", *args])
 
 
-class Side(StrEnum):
-    """Domains by what they are for."""
-
-    ALL = "all"
-    SOURCE = "source"
-    TARGET = "target"
-    LOGGER = "logger"
-
-
 app = typer.Typer(
     cls=OneRunUnlessNamed,
     no_args_is_help=True,
@@ -41,21 +38,21 @@ app = typer.Typer(
     Needs the extra `sim`. The default command is `run`.
     `inspector simulate --list` prints scenarios and robots.""",
 )
-List = Annotated[bool, typer.Option("--list", help="Print what there is, simulate nothing.")]
-To = Annotated[Path, typer.Option("--output", "-o", help="The folder to write.")]
-Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")]
-Seconds = Annotated[float | None, typer.Option(help="In seconds; by default the motion's.")]
-Names = Annotated[str, typer.Option(help="Names of robots, talos,go2,panda; by default all.")]
-First = Annotated[int, typer.Option(help="The first random seed.")]
+List = Annotated[bool, option("Print what there is, simulate nothing.", "--list")]
+To = Annotated[Path, option("The folder to write.", "--output", "-o")]
+Jobs = Annotated[int, option("Parallel runs.", "--jobs", "-j", min=1)]
+Seconds = Annotated[float | None, option("In seconds; by default the motion's.")]
+Names = Annotated[str, option("Names of robots, talos,go2,panda; by default all.")]
+First = Annotated[int, option("The first random seed.")]
 
 
 @app.command(epilog="Example: inspector simulate run talos --scenario 7 --seed 1 -o run.npz")
 def run(
-    robot: Annotated[str, typer.Argument(help="A robot that --list prints.")] = "",
-    scenario: Annotated[str, typer.Option(help="Name or number of a scenario.")] = "straight",
-    seed: Annotated[int, typer.Option(help="Random seed, at least 0.")] = 0,
+    robot: Annotated[str, argument("A robot that --list prints.")] = "",
+    scenario: Annotated[str, option("Name or number of a scenario.")] = "straight",
+    seed: Annotated[int, option("Random seed, at least 0.")] = 0,
     duration: Seconds = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The file.")] = Path("run.npz"),
+    output: Annotated[Path, option("The file.", "--output", "-o")] = Path("run.npz"),
     list_: List = False,
     overwrite: Overwrite = False,
 ) -> None:
@@ -80,20 +77,18 @@ def run(
 
 @app.command(epilog="Example: inspector simulate dataset --robots talos,go2 --seeds 8 -o data/")
 def dataset(
-    robots: Annotated[str, typer.Option(help="Names of robots: talos,go2,panda.")],
+    robots: Annotated[str, option("Names of robots: talos,go2,panda.")],
     output: To,
-    seeds: Annotated[int, typer.Option(help="Seeds per robot and scenario.")] = 8,
+    seeds: Annotated[int, option("Seeds per robot and scenario.")] = 8,
     first_seed: First = 0,
-    scenarios: Annotated[str, typer.Option(help="Names or numbers; by default all.")] = "",
-    only: Annotated[
-        Literal["ok"] | None, typer.Option(help="Only scenarios without a failure.")
-    ] = None,
-    rate: Annotated[float, typer.Option(help="At which runs are kept, in Hz.")] = 10_000.0,
+    scenarios: Annotated[str, option("Names or numbers; by default all.")] = "",
+    only: Annotated[Literal["ok"] | None, option("Only scenarios without a failure.")] = None,
+    rate: Annotated[float, option("At which runs are kept, in Hz.")] = 10_000.0,
     duration: Seconds = None,
     jobs: Jobs = 1,
     dask: Dask = "",
-    overwrite: Annotated[bool, typer.Option(help="Replace damaged files; others stay.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    overwrite: Annotated[bool, option("Replace damaged files; others stay.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Simulate a data set; resumes if killed: only missing runs are made."""
     from noiseclassifier.scenarios.dataset import (
@@ -118,11 +113,11 @@ def dataset(
 def domains(
     output: To = Path(),
     robots: Names = "",
-    seeds: Annotated[int, typer.Option(help="Seeds per robot; each draws a domain.")] = 8,
+    seeds: Annotated[int, option("Seeds per robot; each draws a domain.")] = 8,
     first_seed: First = 10_000,
-    faults: Annotated[int, typer.Option(help="Faulty runs per robot and seed.")] = 2,
-    always: Annotated[str, typer.Option(help="Faults of every robot that can have them.")] = "",
-    throughout: Annotated[int, typer.Option(help="Faults of whole runs, per robot and seed.")] = 0,
+    faults: Annotated[int, option("Faulty runs per robot and seed.")] = 2,
+    always: Annotated[str, option("Faults of every robot that can have them.")] = "",
+    throughout: Annotated[int, option("Faults of whole runs, per robot and seed.")] = 0,
     jobs: Jobs = 1,
     list_: List = False,
 ) -> None:
@@ -151,13 +146,14 @@ def domains(
 
 @app.command(epilog="Example: inspector simulate logs data/ -o logs/ --copies 2")
 def logs(
-    data: Annotated[Path, typer.Argument(help="A folder of `inspector simulate domains`.")],
+    data: Annotated[Path, argument("A folder of `inspector simulate domains`.")],
     output: To,
-    copies: Annotated[int, typer.Option(min=1, help="Logs of each run.")] = 1,
-    rate: Annotated[float | None, typer.Option(help="Of all, in Hz; drawn by default.")] = None,
+    copies: Annotated[int, option("Logs of each run.", min=1)] = 1,
+    rate: Annotated[float | None, option("Of all, in Hz; drawn by default.")] = None,
     side: Annotated[
-        Side, typer.Option(help="What to learn from, or to measure on only.")
-    ] = Side.ALL,
+        Literal["all", "source", "target", "logger"],
+        option("What to learn from, or to measure on only."),
+    ] = "all",
 ) -> None:
     """Write logs of wide domains: ripple, sensing and sampling, with labels decided anew."""
     from noiseclassifier.scenarios.dataset import Folder, write_logs
@@ -167,7 +163,7 @@ def logs(
         raise typer.BadParameter(f"{data}: there is no such folder")
     folder = Folder.opened(data, wide=True, any_recipe=True)
     rates, labelled, lost = Counter[float](), 0, 0
-    for _, run in write_logs(logs_of(folder, copies=copies, rate=rate, side=side.value), output):
+    for _, run in write_logs(logs_of(folder, copies=copies, rate=rate, side=side), output):
         rates[run.rate] += 1
         labelled += sum(event["labelled"] > 0 for event in run.meta["events"])
         lost += sum(not event["labelled"] for event in run.meta["events"])

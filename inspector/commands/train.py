@@ -1,10 +1,22 @@
-"""`inspector train`: train a model on annotated runs."""
+"""Commands on models: `train`, `tune` and `evaluate`."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Literal
 
 import typer
 
-from inspector.commands.options import InPart, Inputs, Output, Overwrite
+from inspector.commands.shared import (
+    AsJson,
+    Dask,
+    InPart,
+    Inputs,
+    NumberOfJobs,
+    Output,
+    Overwrite,
+    argument,
+    jobs_or_dask,
+    option,
+)
 
 
 def train(
@@ -12,17 +24,16 @@ def train(
     output: Output,
     profile: Annotated[
         str,
-        typer.Option(
-            help="general, for any rate; or of one rate: joints, norms, scalar, logbands,"
+        option(
+            "general, for any rate; or of one rate: joints, norms, scalar, logbands,"
             " noisytest-rbf, noisytest-linear, paper-rbf or paper-linear."
         ),
     ] = "general",
     rate: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "Rate of a model of one rate in [Hz], by default 10000; faster runs are decimated.",
             min=1.0,
-            help="Rate of a model of one rate in [Hz], by default 10000; faster runs are"
-            " decimated.",
         ),
     ] = None,
     part: InPart = "all",
@@ -34,3 +45,124 @@ def train(
     measures, left_out = train_model(inputs, profile, rate, output, part=part, overwrite=overwrite)
     typer.echo(f"{measures}\n{left_out}")
     typer.echo(f"{output}: written; the measures above are of the training frames")
+
+
+def tune(
+    training: Inputs,
+    output: Annotated[
+        Path,
+        option("Results file, one line of JSON per point; resumes if it exists.", "--output", "-o"),
+    ],
+    validation: Annotated[
+        list[Path] | None, option("Runs of a validation set, instead of folds; repeatable.")
+    ] = None,
+    folds: Annotated[
+        int | None, option("Folds of the cross-validation.", min=2, show_default="5")
+    ] = None,
+    part: InPart = "all",
+    profile: Annotated[
+        str,
+        option(
+            "joints, norms, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
+            " paper-linear."
+        ),
+    ] = "noisytest-rbf",
+    rate: Annotated[
+        float, option("Rate of the model in [Hz]; faster runs are decimated.", min=1.0)
+    ] = 10000.0,
+    grid: Annotated[
+        list[str] | None,
+        option(
+            "paper, or a setting and its values: stride=224:1024:100, C=0.1:1000:x10,"
+            " gamma=1e-4,1e-3, bands=comb,adjacent; repeatable.",
+            show_default="paper",
+        ),
+    ] = None,
+    criterion: Annotated[
+        Literal["balanced-accuracy", "log-loss", "subset-accuracy"],
+        option("Ranks the points; the log-loss breaks ties."),
+    ] = "balanced-accuracy",
+    train: Annotated[
+        Path | None, option("Train the best point on all training runs, write the model.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        option(
+            "Draw the accuracy along each setting around the best point, as PNG (needs the"
+            " extra `report`)."
+        ),
+    ] = None,
+    rows: Annotated[int, option("Number of points to print.", min=1)] = 10,
+    as_json: AsJson = False,
+    jobs: NumberOfJobs = 1,
+    dask: Dask = "",
+    overwrite: Overwrite = False,
+) -> None:
+    """Tune a profile's settings by grid search; resumes if killed."""
+    if validation and folds:
+        raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
+    from json import dumps
+
+    from inspector.report.picture import require
+    from inspector.training.tune import Search
+    from inspector.training.tune import tune as tune_profile
+    from noisemodel.files import refuse_existing
+
+    if picture:
+        refuse_existing(picture, overwrite=overwrite)
+        require()
+    search = Search(
+        training=training,
+        validation=validation or (),
+        part=part,
+        folds=folds or 5,
+        profile=profile,
+        rate=rate,
+        grid=grid or ("paper",),
+    )
+    where = jobs_or_dask(jobs, dask)
+    tuned = tune_profile(search, output, model=train, jobs=where, overwrite=overwrite)
+    report = dumps(tuned.as_dict(criterion, rows=rows), indent=2)
+    typer.echo(report if as_json else tuned.table(criterion, rows=rows))
+    if picture:
+        tuned.draw(picture, criterion, overwrite=overwrite)
+    if train:
+        tuned.train(train, criterion, overwrite=overwrite)
+        typer.echo(f"{train}: written, the best point trained on all training runs", err=as_json)
+
+
+def evaluate(
+    model: Annotated[Path, argument("A model file, or the name of a shipped one.")],
+    inputs: Inputs,
+    as_json: AsJson = False,
+    output: Annotated[Path | None, option("Write JSON to this file.", "--output", "-o")] = None,
+    picture: Annotated[Path | None, option("Write a PNG (needs the extra `report`).")] = None,
+    part: InPart = "all",
+    by: Annotated[
+        Literal["robot", "domain", "scenario"] | None,
+        option("Print one whole table: by robot, domain or scenario."),
+    ] = None,
+    seen_too: Annotated[
+        bool,
+        option("Accept runs that the model was trained on; the report lists them.", "--seen-too"),
+    ] = False,
+    overwrite: Overwrite = False,
+) -> None:
+    """Evaluate a model on annotated runs that it was not trained on."""
+    from inspector.library import model_files
+    from inspector.training import train as training
+    from noiseclassifier.assessment import table
+    from noisemodel.files import refuse_existing, write_whole
+
+    for path in filter(None, (output, picture)):
+        refuse_existing(path, overwrite=overwrite)
+    if picture:
+        training.require()
+    (file,) = model_files([model])
+    report = training.evaluate(file, inputs, part=part, seen_too=seen_too)
+    text = training.as_json(report, file)
+    if output:
+        write_whole(output, f"{text}\n", overwrite=overwrite)
+    if picture:
+        training.draw(report, picture, title=file.stem, overwrite=overwrite)
+    typer.echo(text if as_json else table(report, by or ""))

@@ -1,0 +1,136 @@
+"""Commands that import and export: `import` and `export`."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from inspector.commands.shared import ModelFiles, Overwrite, RunFile, argument, opened, option
+from inspector.errors import EXIT, OUTPUT_LOST, Status, worst
+
+
+def import_(
+    ctx: typer.Context,
+    logs: Annotated[
+        list[Path], argument("CSV, Parquet, HDF5, npz, ROS bags, LeRobot data sets, folders.")
+    ],
+    output: Annotated[
+        Path | None,
+        option("The run file to write; a folder for several runs.", "--output", "-o"),
+    ] = None,
+    save_mapping: Annotated[Path | None, option("Save these options as a mapping (TOML).")] = None,
+    list_: Annotated[
+        bool, option("List the contents of the logs, write nothing.", "--list")
+    ] = False,
+    overwrite: Overwrite = False,
+) -> None:
+    """Convert logs of robots to run files.
+
+    The exit status is 3 if a log cannot be read, 5 if a run file cannot be written; the others are.
+    Called again after an interruption, it writes the run files that a folder lacks.
+    """
+    from inspector.logs.read import import_logs, listing
+    from inspector.text import printable, progress
+
+    reading = ctx.obj
+    if list_:
+        for line in (line for log in logs for line in listing(log, reading.options)):
+            typer.echo(printable(line))
+        return
+    if output is None:
+        raise typer.BadParameter("name the run file to write", param_hint="'--output' / '-o'")
+    statuses = [0]
+    for result in import_logs(
+        logs,
+        output,
+        reading.options,
+        desired=reading.desired,
+        episodes=reading.episodes,
+        overwrite=overwrite,
+        progress=lambda items, total: progress(items, "import", total=total),
+    ):
+        if result.problem:
+            statuses.append(OUTPUT_LOST if result.lost else EXIT[Status.BAD_INPUT])
+            typer.echo(f"inspector: {result.problem}", err=True)
+            continue
+        if result.kept:
+            typer.echo(f"{result.path}: kept, it is there already")
+            continue
+        for remark in result.remarks:
+            typer.echo(f"  {remark}")
+        typer.echo(f"{result.path}: {result.duration:.2f} s at {result.rate:g} Hz")
+    if save_mapping:
+        reading.options.save(save_mapping, overwrite=overwrite)
+    raise typer.Exit(worst(statuses))
+
+
+def export(
+    ctx: typer.Context,
+    run: RunFile,
+    output: Annotated[
+        Path,
+        option(
+            "The file to write: .mcap, .csv or .parquet; labels as .toml (NoisyTest), .csv or"
+            " .txt (Audacity); a run as .npz.",
+            "--output",
+            "-o",
+        ),
+    ],
+    labels: Annotated[
+        Literal["findings", "annotated"] | None,
+        option("Write a label file of the findings or annotated blocks."),
+    ] = None,
+    annotate: Annotated[
+        Path | None, option("Write the run with the labels of this file instead.")
+    ] = None,
+    kind: Annotated[str, option("Extended noise: normal, rms, mean, paper, A, B or C.")] = "normal",
+    model: ModelFiles = None,
+    layouts: Annotated[
+        bool, option("Write layouts for Foxglove and PlotJuggler beside .mcap.", "--layouts")
+    ] = False,
+    overwrite: Overwrite = False,
+) -> None:
+    """Write noise, labels and scores for other tools.
+
+    Foxglove and PlotJuggler read MCAP, which holds the joints' motion as well; data frames read
+    CSV and Parquet; annotation tools and spreadsheets read label files.
+    """
+    from inspector.library import load_library
+    from inspector.text import counted
+    from noisemodel.files import refuse_existing
+
+    if labels and annotate:
+        raise typer.BadParameter("name one of --labels and --annotate")
+    refuse_existing(output, overwrite=overwrite)
+    if annotate:
+        from inspector.export.labels import read_labels
+
+        recorded = opened(run, ctx.obj).run
+        blocks = read_labels(annotate, recorded)
+        replace(recorded, blocks=blocks).save(output, overwrite=overwrite)
+        typer.echo(f"{output}: {counted(len(blocks), 'label')}")
+        return
+    library = load_library(model)
+    recorded = opened(run, ctx.obj).run
+    if labels:
+        from inspector.analysis import analyse
+        from inspector.export.labels import write_labels
+
+        found = labels == "findings"
+        spans = analyse(recorded, library).findings if found else recorded.blocks
+        write_labels(spans, output, overwrite=overwrite)
+        for each in spans:
+            typer.echo(f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s")
+        typer.echo(f"{output}: {counted(len(spans), 'label')}")
+        return
+    from inspector.export.tables import LAYOUTS
+    from inspector.export.tables import export as write
+
+    written = write(recorded, output, library, kind=kind, overwrite=overwrite, layouts=layouts)
+    typer.echo(f"{run}: {written.analysis.headline}")
+    for remark in written.remarks:
+        typer.echo(f"  {remark}")
+    typer.echo(f"{output}: {written}")
+    if layouts:
+        typer.echo(f"  layouts: {', '.join(str(output.with_suffix(each)) for each in LAYOUTS)}")

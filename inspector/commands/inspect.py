@@ -1,0 +1,562 @@
+"""Commands that inspect runs: `view`, `noise`, `listen`, `live` and `robots`."""
+
+import hashlib
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from inspector.commands.shared import (
+    GEOMETRIES,
+    Kind,
+    Limits,
+    ModelFiles,
+    NumberOfJobs,
+    Overwrite,
+    PackageRoot,
+    argument,
+    one_at_a_time,
+    one_of,
+    opened,
+    option,
+    say_warnings,
+)
+from inspector.errors import EXIT, Status
+
+if TYPE_CHECKING:
+    from inspector.analysis import Analysis
+    from inspector.library import Library
+    from inspector.logs.read import Opened, Reading
+    from inspector.reference.judging import Comparison
+    from inspector.verdict import Verdict
+
+# --- view
+
+SUFFIXES = ("", ".rrd", ".png", ".html")
+"""Of what is written; without a suffix a recording."""
+SIZE = "1440x900"
+
+Shown = Annotated[
+    list[Path] | None,
+    argument("Runs, logs, or a recording (.rrd) for a picture; else the demo."),
+]
+Target = Annotated[
+    Path | None, option("Write a recording .rrd, a picture .png or a .html.", "--output", "-o")
+]
+SaveOf06 = Annotated[Path | None, typer.Option(hidden=True)]
+NoRobot = Annotated[bool, option("Do not draw the robot and the noise of its links.", "--no-robot")]
+Floor = Annotated[float | None, option("Darkest level of spectrograms, in dB re 1 rad/s.", max=0.0)]
+Terms = Annotated[bool, option("Show the terms A, B and C of the paper separately.", "--terms")]
+At = Annotated[float | None, option("Time of a picture, in s; else the worst finding.")]
+Size = Annotated[str, option("Width and height of a picture.")]
+Web = Annotated[bool, option("Serve it to a browser on this machine until Ctrl-C.", "--web")]
+Port = Annotated[int, option("Port of --web; 0 takes a free one.", min=0, max=65535)]
+Align = Annotated[
+    Literal["auto", "start", "none"] | None,
+    option("Align two runs by motion (auto), or several by start."),
+]
+GoodRuns = Annotated[
+    Path | None, option("Show where one run is louder than these good ones.", "--reference")
+]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is shown of runs, and how.
+
+    Attributes:
+        links: Kind of the noise of the links; empty where no robot is drawn.
+        at: Time of a picture, in [s]; None where that is the worst finding's.
+    """
+
+    reading: "Reading"
+    library: "Library"
+    links: str
+    floor: float | None
+    terms: bool
+    at: float | None
+    size: str
+    align: str | None
+    reference: Path | None
+    overwrite: bool
+
+
+def view(
+    ctx: typer.Context,
+    runs: Shown = None,
+    output: Target = None,
+    save: SaveOf06 = None,
+    model: ModelFiles = None,
+    no_robot: NoRobot = False,
+    kind: Kind = "normal",
+    floor: Floor = None,
+    terms: Terms = False,
+    at: At = None,
+    size: Size = SIZE,
+    web: Web = False,
+    port: Port = 0,
+    align: Align = None,
+    reference: GoodRuns = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Show a run, or several side by side.
+
+    Two runs are before and after a change. A picture needs a Vulkan driver (Debian:
+    mesa-vulkan-drivers libvulkan1), a page matplotlib.
+
+    Runs that cannot be read are named, and the others shown (exit status 3).
+    """
+    from inspector.library import demo_run, load_library
+    from inspector.recording import viewer
+    from noisemodel.files import refuse_existing
+
+    paths, output = runs or [demo_run()], output or save
+    one_at_a_time(ctx.obj, len(paths))
+    if web and output:
+        raise typer.BadParameter("name one of --web and -o")
+    if port:
+        viewer.free_port(port)
+    target = output or viewer.scratch_path(_together(paths))
+    library = load_library(model)
+    links, overwrite = "" if no_robot else kind, overwrite or output is None
+    request = Request(ctx.obj, library, links, floor, terms, at, size, align, reference, overwrite)
+    _check(paths, target, request)
+    refuse_existing(target, overwrite=overwrite)
+    if target.suffix.lower() in (".png", ".html"):
+        write = _picture if target.suffix.lower() == ".png" else _page
+        write(paths[0], target, request)
+        return
+    found = _read(paths, request.reading)
+    write_recording = _one if len(found) == 1 else _two if len(paths) == 2 else _several
+    seconds = write_recording(found, target, request)
+    _show(target, seconds, web=web, port=port, saved=output is not None)
+    if len(found) < len(paths):
+        raise typer.Exit(EXIT[Status.BAD_INPUT])
+
+
+def _together(paths: list[Path]) -> Path:
+    """A name of several runs, the same for the same ones."""
+    if len(paths) == 1:
+        return paths[0]
+    others = "\n".join(str(path.resolve()) for path in paths[1:])
+    key = hashlib.sha256(others.encode()).hexdigest()[:8]
+    return paths[0].with_name(f"{paths[0].stem}-and-{len(paths) - 1}-{key}")
+
+
+def _check(paths: list[Path], target: Path, asked: Request) -> None:
+    """Refuse options that do not go together, and what cannot be written."""
+    suffix, several = target.suffix.lower(), len(paths) > 1
+    if suffix not in SUFFIXES:
+        raise typer.BadParameter(f"{target}: name a .rrd, .png or .html file", param_hint="'-o'")
+    refused = {
+        "--align takes two runs or more": asked.align and not several,
+        "--align auto takes two runs; more lie side by side from start": (
+            asked.align == "auto" and len(paths) > 2
+        ),
+        "--reference takes one run": asked.reference is not None and several,
+        "--terms takes one run": asked.terms and several,
+        "--floor takes one run": asked.floor is not None and several,
+        f"{suffix} takes one run; several are written as .rrd": (
+            suffix in (".png", ".html") and several
+        ),
+        "--at and --size take -o FILE.png": (
+            (asked.at is not None or asked.size != SIZE) and suffix != ".png"
+        ),
+    }
+    for problem, is_so in refused.items():
+        if is_so:
+            raise typer.BadParameter(problem)
+
+
+def _picture(run: Path, output: Path, request: Request) -> None:
+    """Write a PNG of what the viewer shows, without a display."""
+    from tempfile import TemporaryDirectory
+
+    from inspector.export.sound import worst_time
+    from inspector.recording import viewer
+    from inspector.recording.run import write
+
+    viewer.require_driver()
+    points, at = viewer.parse_size(request.size), request.at
+    with TemporaryDirectory() as folder:
+        recording, seconds = run, at or 0.0
+        if run.suffix != ".rrd":
+            source = opened(run, request.reading)
+            first, last = (float(source.run.time[place]) for place in (0, -1))
+            if at is not None and not first <= at <= last:
+                raise typer.BadParameter(
+                    f"--at {at:g}: the run lasts from {first:.2f} s to {last:.2f} s"
+                )
+            found, _, beside = _analysed(source, request)
+            recording = Path(folder) / "run.rrd"
+            seconds = worst_time(found) if at is None else at
+            write(found, recording, floor=request.floor, beside=beside)
+        complaints = viewer.shoot(
+            recording, output, seconds, size=points, overwrite=request.overwrite
+        )
+    typer.echo(f"{output}: {run} at {seconds:.2f} s")
+    for complaint in complaints:
+        typer.echo(f"  the viewer reports: {complaint}", err=True)
+
+
+def _page(run: Path, output: Path, request: Request) -> None:
+    """Write one HTML page about a run: pictures, tables, sound."""
+    from inspector.audit.audit import text
+    from inspector.report import html
+    from inspector.report.picture import require
+
+    require("a report")
+    found, verdict, beside = _analysed(opened(run, request.reading), request)
+    assert found.audit is not None
+    html.write(
+        found,
+        output,
+        audit=text(found.name, found.audit),
+        verdict=verdict,
+        beside=beside,
+        overwrite=request.overwrite,
+        floor=request.floor,
+    )
+    typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
+
+
+def _read(paths: list[Path], reading: "Reading") -> list["Opened"]:
+    """Open the runs that can be read, and name the others; their remarks are printed later."""
+    from inspector.errors import InspectorError
+    from inspector.verdict import EXPECTED
+
+    found = []
+    for path in paths:
+        try:
+            found.append(opened(path, reading, said=False))
+        except EXPECTED as error:
+            if len(paths) == 1:
+                raise
+            typer.echo(f"inspector: {error}", err=True)
+    if not found:
+        raise InspectorError(f"none of {len(paths)} runs can be read")
+    return found
+
+
+def _analysed(
+    run: "Opened", request: Request
+) -> "tuple[Analysis, Verdict | None, Comparison | None]":
+    """A run with what was found in it, beside its reference if there is one."""
+    from datetime import date
+
+    from inspector.analysis import analyse_file
+    from inspector.reference.verdicts import References, seen
+    from inspector.verdict import Verdict
+
+    kind, path = request.links, run.source.shown
+    found = analyse_file(run, request.library, links=bool(kind), kind=kind, terms=request.terms)
+    if request.reference is None:
+        return found, None, None
+    references = References.found([path], request.reference, request.reading)
+    verdict, beside = references(found, Verdict.of(path, found))
+    verdict = references.judge(verdict, None, date.today())
+    return seen(found, verdict), verdict, beside
+
+
+def _one(runs: list["Opened"], target: Path, request: Request) -> float:
+    """Write the recording of a run; returns the time of its worst moment, in [s]."""
+    from inspector.export.sound import of_recording, worst_time
+    from inspector.recording.run import write
+    from inspector.report import findings
+
+    (run,) = runs
+    found, verdict, beside = _analysed(run, request)
+    floor, overwrite, sound = request.floor, request.overwrite, of_recording(found)
+    write(found, target, overwrite=overwrite, sound=sound, floor=floor, beside=beside)
+    typer.echo(f"{run.source.shown}: {found.headline}")
+    if verdict is None:
+        lines = [findings.sentence(found, event) for event in found.findings]
+    else:
+        lines = [*findings.failing(verdict), *findings.excused(verdict)]
+        lines += [f"beside {verdict.beside.path}: {verdict.beside.words}"] if verdict.beside else []
+    for line in (*lines, *found.remarks):
+        typer.echo(f"  {line}")
+    return worst_time(found)
+
+
+def _two(runs: list["Opened"], target: Path, request: Request) -> None:
+    """Write the recording of a run before and after a change."""
+    from inspector.compare.pair import Align, changes, compare, summary
+    from inspector.compare.recording import write
+
+    before, after = runs
+    how, kind = Align(request.align or "auto"), request.links
+    pair = compare(before, after, request.library, how=how, robot=bool(kind), kind=kind)
+    write(pair, target, overwrite=request.overwrite)
+    typer.echo(f"{before.source.shown} → {after.source.shown}: {summary(pair)}")
+    typer.echo(f"  aligned {pair.alignment}")
+    for each in (*changes(pair), *pair.remarks):
+        typer.echo(f"  {each}")
+
+
+def _several(runs: list["Opened"], target: Path, request: Request) -> None:
+    """Write the recording of several runs, side by side."""
+    from inspector.compare.many import lay, write
+
+    several = lay(runs, request.library, from_start=request.align != "none")
+    write(several, target, overwrite=request.overwrite)
+    for index, (name, side) in enumerate(zip(several.names, several.sides, strict=True)):
+        mark = " (worst)" if index == several.worst else ""
+        typer.echo(f"{name}: {side.headline}{mark}")
+
+
+def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: bool) -> None:
+    """Open a recording, or say how it is opened."""
+    from inspector.recording import viewer
+
+    if web:
+        viewer.serve(target, lambda url: typer.echo(f"open {url}"), port=port)
+        return
+    problem = ""
+    if not saved and viewer.has_display():
+        problem = viewer.open_window(target, seconds)
+        if not problem:
+            return
+    typer.echo(f"recording: {target} ({target.stat().st_size / 1e6:.1f} MB)")
+    typer.echo(viewer.how_to_open(target))
+    if problem:
+        raise viewer.DisplayError(f"{problem}; --web shows it in a browser, -o FILE.rrd writes it")
+
+
+# --- noise
+
+_model_option = partial(option, rich_help_panel="Comparing noise models")
+
+COMPARED = ("simplified", "C", "paper", "mean", "rms", "normal")
+
+NoiseRuns = Annotated[list[Path] | None, argument("A run file or log; with --compare several.")]
+Kinds = Annotated[
+    list[str] | None, option("simplified, paper, A, B, C, mean, rms, normal; repeatable.")
+]
+Csv = Annotated[Path | None, option("Write the noise over time, or all numbers.")]
+Compare = Annotated[
+    bool, _model_option("Compare noise models on run files with positions.", "--compare")
+]
+Robots = Annotated[str, _model_option("Compare them on robots that move: talos,go2 or all.")]
+Geometry = Annotated[
+    str, _model_option("visual, collision, hull or auto.", callback=one_of(GEOMETRIES))
+]
+Seed = Annotated[int, _model_option("Random seed of the generated motion.", min=0)]
+SaveCompared = Annotated[Path | None, _model_option("Write a recording (.rrd).")]
+PictureCompared = Annotated[Path | None, _model_option("Write a PNG (needs the extra `report`).")]
+
+
+def noise(
+    ctx: typer.Context,
+    runs: NoiseRuns = None,
+    kind: Kinds = None,
+    csv: Csv = None,
+    compare: Compare = False,
+    robots: Robots = "",
+    geometry: Geometry = "auto",
+    seed: Seed = 0,
+    save: SaveCompared = None,
+    picture: PictureCompared = None,
+    jobs: NumberOfJobs = 1,
+    overwrite: Overwrite = False,
+) -> None:
+    """Print noise levels by joint and link.
+
+    With --compare or --robots, noise models are compared; the exit status is 3 if nothing could be.
+    """
+    kinds = [name for each in kind or () for name in each.split(",")]
+    if not compare and not robots:
+        if len(runs or ()) != 1:
+            raise typer.BadParameter("name one run; --compare takes several")
+        if save or picture:
+            raise typer.BadParameter("--save and --picture take --compare")
+        _print_levels((runs or [])[0], ctx.obj, kinds, csv, overwrite=overwrite)
+        return
+    import noisemodel as nm
+    from inspector.compare.models import Outputs
+    from inspector.text import progress
+
+    names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
+    sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
+    if not sources:
+        raise typer.BadParameter("name run files, or robots with --robots")
+    outputs = Outputs(csv, save, picture, overwrite=overwrite)
+    outputs.check(len(sources))
+    found = nm.compare(
+        sources,
+        kinds=kinds or COMPARED,
+        surface=geometry,
+        seed=seed,
+        jobs=jobs,
+        progress=partial(progress, what="compare"),
+    )
+    for left_out in found.left_out:
+        typer.echo(f"inspector: {left_out.name}: {left_out.reason}", err=True)
+    if not found:
+        raise typer.Exit(3)
+    outputs.write(found)
+    typer.echo(found)
+
+
+def _print_levels(
+    run: Path, reading: "Reading", kinds: list[str], csv: Path | None, *, overwrite: bool
+) -> None:
+    """Print the noise levels of a run, and write the noise over time."""
+    from inspector.analysis import default_kinds, estimate, noise_level, write_csv
+
+    recorded = opened(run, reading).run
+    say_warnings(recorded)
+    estimates = tuple(estimate(recorded, each) for each in kinds or default_kinds(recorded))
+    if csv:
+        write_csv(recorded, estimates, csv, overwrite=overwrite)
+    typer.echo(f"{run}: {recorded.duration:.2f} s at {recorded.rate:g} Hz")
+    for each in estimates:
+        typer.echo(str(noise_level(recorded, each)))
+
+
+# --- listen
+
+
+def listen(
+    ctx: typer.Context,
+    runs: Annotated[list[Path], argument("Run files or logs; several are written at one gain.")],
+    output: Annotated[
+        Path, option("WAV file; several get .a, .b ... in its name.", "--output", "-o")
+    ],
+    kind: Annotated[str, option("simplified (of joints), normal or rms (of links).")] = "",
+    joint: Annotated[str, option("The noise of this joint only.")] = "",
+    link: Annotated[str, option("The noise of this link only.")] = "",
+    gain: Annotated[
+        float | None,
+        option("In dB; at 0, full scale is 1 rad/s (or √W). By default, the peak fits."),
+    ] = None,
+    speed: Annotated[float, option("Playback speed; the pitch changes by the same factor.")] = 1.0,
+    overwrite: Overwrite = False,
+) -> None:
+    """Write the noise of runs as sound, one WAV file per run."""
+    from inspector.export import sound as sonification
+
+    one_at_a_time(ctx.obj, len(runs))
+    settings = sonification.Settings(kind, joint, link, speed)
+    paths = sonification.output_paths(output, len(runs), overwrite=overwrite)
+    recorded = [opened(run, ctx.obj).run for run in runs]
+    for each in recorded:
+        say_warnings(each)
+    sounds = [sonification.sonify(each, settings) for each in recorded]
+    level = sonification.common_gain(sounds) if gain is None else gain
+    sonification.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
+    for run, path, sound in zip(runs, paths, sounds, strict=True):
+        typer.echo(f"{run}: {sound}")
+        typer.echo(f"{path}: {sound.description(level)}")
+
+
+# --- live
+
+LiveRate = Annotated[float, option("Sampling rate in [Hz].", min=1.0, show_default=False)]
+LiveRobot = Annotated[
+    str | None,
+    option("The robot to draw: a name that `robots` lists, a URDF or an MJCF (robot.xml)."),
+]
+Names = Annotated[str, option("Joints in the order of the columns: elbow,wrist,...")]
+SaveLive = Annotated[Path | None, option("Write the recording to this file, open no viewer.")]
+Connect = Annotated[
+    str | None, option("Send to the viewer at PORT or HOST:PORT; by default one is opened.")
+]
+LiveFormat = Annotated[
+    Literal["text", "json"], option("Of findings: lines of text, or JSON lines.")
+]
+FailFast = Annotated[bool, option("End at the first finding that counts.", "--fail-fast")]
+LiveReference = Annotated[
+    Path | None,
+    option(
+        "Compare the stream with these accepted runs, or a folder of good ones: every 3 s the"
+        " last 6 s, and all of it at the end. A finding is reported at most 4.3 s late."
+    ),
+]
+
+
+def live(
+    rate: LiveRate,
+    robot: LiveRobot = None,
+    package_root: PackageRoot = None,
+    limit: Limits = None,
+    names: Names = "",
+    save: SaveLive = None,
+    connect: Connect = None,
+    format: LiveFormat = "text",  # noqa: A002
+    fail_fast: FailFast = False,
+    reference: LiveReference = None,
+    model: ModelFiles = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Show samples from standard input as they arrive.
+
+    Findings are printed as they come.
+
+    CSV has a header: time,elbow.velocity,elbow.velocity_desired,elbow.position
+    JSON lines have one object each: {"time": 0.1, "velocity": [0.2]}
+    Ctrl-C ends the recording.
+
+    Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost, 70 bug.
+    """
+    import sys
+
+    from inspector.library import load_library
+    from inspector.live import LiveError, LiveSession
+    from inspector.live.pipe import Gate, follow
+    from inspector.reference.store import Reference
+
+    del package_root, limit  # have been set
+    if sys.stdin.isatty():
+        raise LiveError(
+            "samples are read from standard input; pipe them in: robot | inspector live"
+        )
+    known = None if reference is None else Reference.load(reference)
+    gate = Gate(_tell, as_json=format == "json", reference=known)
+    session = partial(
+        LiveSession,
+        rate,
+        robot=robot,
+        library=load_library(model),
+        save=save,
+        connect=connect,
+        overwrite=overwrite,
+        keep_levels=known is not None,
+        on_warning=partial(typer.echo, err=True),
+        on_finding=gate.take,
+        on_levels=None if known is None else gate.compare,
+    )
+    summary = follow(
+        sys.stdin.buffer,
+        tuple(name.strip() for name in names.split(",") if name.strip()),
+        lambda found: session(joint_names=found),
+        enough=lambda: fail_fast and gate.failed,
+    )
+    raise typer.Exit(gate.end(summary))
+
+
+def _tell(line: str) -> None:
+    with suppress(OSError):  # the recording goes on; the command line says what is lost
+        typer.echo(line)
+
+
+# --- robots
+
+
+def robots() -> None:
+    """List the robots that are available by name.
+
+    Others are given by the path of a URDF or of an MJCF (robot.xml). Robots of MuJoCo Menagerie are
+    listed if mujoco-menagerie is installed, which downloads each at its first use.
+    """
+    from noisemodel import ROBOTS
+    from noisemodel.robot import menagerie_names
+
+    for name, robot in ROBOTS.items():
+        base = "floating" if robot.floating_base else "fixed"
+        typer.echo(f"{name:28} {base:10} {robot.urdf}")
+    for name, category in menagerie_names().items():
+        typer.echo(f"{name:40} {category}")

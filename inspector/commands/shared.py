@@ -1,0 +1,327 @@
+"""What commands share: options, those on reading logs, checks of values, and outputs."""
+
+import os
+import sys
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
+
+import typer
+
+from inspector.errors import OUTPUT_LOST, Unknown, worst
+
+if TYPE_CHECKING:
+    from inspector.logs.read import Opened, Reading
+    from noisemodel import Run
+    from noisemodel.parallel import Jobs
+
+Result = TypeVar("Result")
+
+# Names that the modules have as well, which would take too long to import here.
+KINDS = ("normal", "rms", "mean", "paper", "A", "B", "C")
+GEOMETRIES = ("visual", "collision", "hull", "auto")
+PARTS = ("all", "training", "test")
+LIMITS = ("joints", "columns", "triangles", "bodies")
+
+ASSUMED = 100
+"""Most characters of what was assumed of a log, unless all is asked for."""
+
+
+def option(text: str, *names: str, **settings: Any) -> Any:
+    """An option by its help, with its names where they are not the parameter's."""
+    return typer.Option(*names, help=text, **settings)
+
+
+def argument(text: str) -> Any:
+    """An argument by its help."""
+    return typer.Argument(help=text, show_default=False)
+
+
+# --- checks of values
+
+
+def finite(value: float | None) -> float | None:
+    """Refuse what no number can be compared with."""
+    if value is not None and not isfinite(value):
+        raise typer.BadParameter(f"{value} is no finite number")
+    return value
+
+
+def one_of(names: Collection[str]) -> Callable[[str], str]:
+    """Refuse what is none of several names."""
+
+    def checked(value: str) -> str:
+        if value not in names:
+            raise typer.BadParameter(f"{value!r} is none of {', '.join(names)}")
+        return value
+
+    return checked
+
+
+# These go to the environment, which the workers of this process have as well.
+
+
+def _allow(folder: Path | None) -> Path | None:
+    if folder is not None:
+        os.environ["NOISE_PACKAGE_ROOT"] = str(folder)
+    return folder
+
+
+def _raise_limit(gigabytes: float | None) -> float | None:
+    if gigabytes is not None:
+        finite(gigabytes)
+        os.environ["NOISE_MAX_UNPACKED"] = str(int(gigabytes * 1e9))
+    return gigabytes
+
+
+def _raise_limits(limits: list[str] | None) -> list[str] | None:
+    for each in limits or ():
+        name, _, number = each.partition("=")
+        if name not in LIMITS or not number.isdecimal():
+            raise typer.BadParameter(f"{each!r} is none of {', '.join(f'{n}=N' for n in LIMITS)}")
+        os.environ[f"NOISE_LIMIT_{name.upper()}"] = number
+    return limits
+
+
+# --- what several commands take
+
+RunFile = Annotated[Path, argument("A run file, or any log: CSV, bag, ...")]
+Runs = Annotated[list[Path], argument("Run files, logs, folders of them.")]
+Inputs = Annotated[
+    list[Path], argument("Annotated runs, samples, folders of them, or NoisyTest folders.")
+]
+Output = Annotated[Path, option("The file to write.", "--output", "-o")]
+Overwrite = Annotated[bool, option("Replace a file that exists.", "--overwrite")]
+NumberOfJobs = Annotated[int, option("Parallel processes.", "--jobs", "-j", min=1)]
+Dask = Annotated[
+    str,
+    option(
+        "Work on this Dask scheduler, tcp://HOST:PORT, instead of --jobs.",
+        metavar="ADDRESS",
+        show_default=False,
+    ),
+]
+ModelFiles = Annotated[
+    list[Path] | None, option("A model file, or the name of a shipped one; repeatable.")
+]
+Kind = Annotated[str, option(f"Extended noise, one of {', '.join(KINDS)}.", callback=one_of(KINDS))]
+InPart = Annotated[
+    str,
+    option(
+        f"Which runs, one of {', '.join(PARTS)}; test are those held out as the test set.",
+        callback=one_of(PARTS),
+    ),
+]
+TextOrJson = Annotated[Literal["text", "json"], option("Output format.")]
+AsJson = Annotated[bool, option("Print JSON.", "--json")]
+UnknownFrames = Annotated[Unknown, option("What to do with frames out of distribution.")]
+OnBadInput = Annotated[Literal["fail", "ignore"], option("What to do with unreadable files.")]
+Write = Annotated[
+    list[str] | None, option("FORMAT=FILE: write another format as well; repeatable.")
+]
+ReportUrl = Annotated[str, option("Where the report's folder is published.")]
+
+
+# --- how logs are read
+
+_log_option = partial(option, rich_help_panel="Reading logs")
+
+Limits = Annotated[
+    list[str] | None,
+    _log_option(
+        f"Raise a size limit: {', '.join(LIMITS)}; repeatable.",
+        callback=_raise_limits,
+        metavar="NAME=N",
+    ),
+]
+PackageRoot = Annotated[
+    Path | None, _log_option("A further folder of packages, for robots' meshes.", callback=_allow)
+]
+MaxUnpacked = Annotated[
+    float | None,
+    _log_option("Refuse compressed files that expand beyond this many GB.", callback=_raise_limit),
+]
+Robot = Annotated[
+    str | None, _log_option('Robot name (see `inspector robots`), URDF or MJCF, or "none".')
+]
+Rate = Annotated[float | None, _log_option("Rate of the log in [Hz], if it is known.", min=1.0)]
+Force = Annotated[
+    bool, _log_option("Take --rate even if positions and velocities contradict it.", "--force")
+]
+Map = Annotated[
+    list[str] | None,
+    _log_option("velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable.", "--map"),
+]
+Mapping_ = Annotated[Path | None, _log_option("A saved mapping (TOML).")]
+Joints = Annotated[str | None, _log_option("Names of the columns of arrays: a,b,c.")]
+Columns = Annotated[
+    str | None, _log_option("Names of a CSV's columns, without a header: time,q1,q2.")
+]
+Units = Annotated[str | None, _log_option("Unit of angles: radians, degrees or normalised.")]
+Degrees = Annotated[bool, _log_option("Angles are in degrees.", "--degrees")]
+Topic = Annotated[list[str] | None, _log_option("Read this topic of a bag; repeatable.")]
+Episode = Annotated[list[str] | None, _log_option("Read this episode of a data set; repeatable.")]
+Desired = Annotated[
+    Path | None, _log_option("Another log, with the desired motion on its own clock.")
+]
+Offset = Annotated[
+    float | None,
+    _log_option("Add to the timestamps of --desired, in seconds; else estimated."),
+]
+
+
+def log_options(
+    robot: Robot = None,
+    package_root: PackageRoot = None,
+    max_unpacked: MaxUnpacked = None,
+    limit: Limits = None,
+    rate: Rate = None,
+    force: Force = False,
+    map_: Map = None,
+    mapping: Mapping_ = None,
+    joints: Joints = None,
+    columns: Columns = None,
+    units: Units = None,
+    degrees: Degrees = False,
+    topic: Topic = None,
+    episode: Episode = None,
+    desired: Desired = None,
+    offset: Offset = None,
+) -> Any:
+    """Options on reading logs, the same in all commands that read logs, as a ``read.Reading``.
+
+    They are in the help of `import` only; the others take them as well (`inspector.cli`).
+    """
+    from inspector.logs.mapping import read_options
+    from inspector.logs.read import Reading
+
+    del package_root, max_unpacked, limit  # have been set
+    options = read_options(
+        map_ or (),
+        saved=mapping,
+        robot=None if robot == "none" else robot,
+        rate=rate,
+        units="degrees" if degrees else units,
+        joints=joints.split(",") if joints else None,
+        columns=columns.split(",") if columns else None,
+        topics=topic,
+        offset=offset,
+        force=force or None,
+    )
+    return Reading(options, desired, tuple(episode or ()), without_robot=robot == "none")
+
+
+def opened(path: Path, reading: "Reading", *, said: bool = True) -> "Opened":
+    """Open a run or a log for a command, and say on standard error what was assumed."""
+    from inspector.logs.read import open_run
+
+    found = open_run(path, reading)
+    if said:
+        say_assumed({str(path): found.assumed})
+    return found
+
+
+def one_at_a_time(reading: "Reading", runs: int) -> None:
+    """Refuse a log with the desired motion, which belongs to one run, for several."""
+    if reading.desired and runs > 1:
+        raise typer.BadParameter(f"belongs to one log, {runs} are given", param_hint="'--desired'")
+
+
+def say_warnings(run: "Run") -> None:
+    """Print what hints at another robot than the run names on standard error."""
+    from inspector.logs.plausibility import check_joints, limit_warnings
+
+    check_joints(run.joint_names, run.robot)
+    for warning in limit_warnings(run):
+        typer.echo(f"  {warning}", err=True)
+
+
+def say_assumed(lines: dict[str, str], *, verbose: bool = True) -> None:
+    """Print what was assumed of logs on standard error, once for those with one line."""
+    together: dict[str, list[str]] = {}
+    for name, line in lines.items():
+        if line:
+            together.setdefault(line, []).append(name)
+    for line, names in together.items():
+        told = line
+        if len(line) > ASSUMED and not verbose:
+            begin = line[: ASSUMED - 10]
+            told = f"{begin.rpartition('; ')[0] or begin}; ... (-v)"
+        others = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        typer.echo(f"{names[0]}{others}: {told}", err=True)
+
+
+# --- where commands work, and what they write
+
+
+def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
+    """Where to work: the number of processes, or the address of a Dask scheduler."""
+    if dask and jobs > 1:
+        raise typer.BadParameter("--jobs and --dask exclude each other")
+    return dask or jobs
+
+
+def files_of(given: Sequence[str], known: Collection[str], *, overwrite: bool) -> dict[Path, str]:
+    """The format of each file of `--write FORMAT=FILE`; none of them exists or is read."""
+    from noisemodel.files import refuse_existing
+
+    files = {}
+    for each in given:
+        name, equals, path = each.partition("=")
+        problem = ""
+        if name not in known or not equals or path in ("", "-"):
+            problem = f"{each!r}: expected FORMAT=FILE, with one of {', '.join(known)}"
+        else:
+            refuse_existing(path, overwrite=overwrite)
+            if Path(path) in files:
+                problem = f"{path}: is named twice"
+        if problem:
+            raise typer.BadParameter(problem, param_hint="'--write'")
+        files[Path(path)] = name
+    return files
+
+
+def written(
+    result: Result,
+    formats: Mapping[str, Callable[[Result], str]],
+    printed: str,
+    files: Mapping[Path, str],
+    *,
+    overwrite: bool,
+) -> list[str]:
+    """Print a result in one format, and write it to files in others; what is lost, a line each."""
+    from noisemodel.files import write_whole
+
+    def show() -> None:
+        typer.echo(formats[printed](result))
+        sys.stdout.flush()
+
+    def write(path: Path, name: str) -> None:
+        write_whole(path, f"{formats[name](result)}\n", overwrite=overwrite)
+
+    lost = tried(show, "standard output")
+    for path, name in files.items():
+        lost += tried(partial(write, path, name), path)
+    return lost
+
+
+def tried(output: Callable[[], object], name: str | Path) -> list[str]:
+    """Write an output; a sentence if it is lost."""
+    from noisemodel import OutputError
+
+    try:
+        output()
+    except OutputError as error:
+        return [str(error)]
+    except OSError as error:
+        return [f"{name}: cannot be written ({error.strerror or error})"]
+    return []
+
+
+def end(status: int, lost: Sequence[str]) -> NoReturn:
+    """End with the exit status of a result, or of outputs that were lost, each of them named."""
+    for line in lost:
+        typer.echo(f"inspector: output lost: {line}", err=True)
+    raise typer.Exit(worst([status, OUTPUT_LOST]) if lost else status)
