@@ -20,8 +20,11 @@ from noiseclassifier.signals import MOTION
 from noisemodel import Run, decimated
 
 LIBRARY = load_library(model_files())
-FIXED = {"slow": fixed(), "fast": fixed(rate=10_000.0)}
 FAILURES = ("impact", "highaccelerations", "oscillations")
+
+
+def of_one_rate():
+    return {"slow": fixed(), "fast": fixed(rate=10_000.0)}
 
 
 def noisy_run(rate, seconds=6.0, **signals):
@@ -43,10 +46,10 @@ def test_a_log_of_10_khz_shows_all_classes():
 
 @pytest.mark.parametrize("rate", [1000.0, 1250.0, 2000.0, 5000.0])
 def test_what_lies_outside_of_the_models_bands_is_not_observable(rate):
-    found = classes_of(noisy_run(rate), FIXED)
+    found = classes_of(noisy_run(rate), of_one_rate())
     assert found["impact"].observability is Observability.OBSERVABLE
     oscillations = found["oscillations"]
-    top = band_edges(FIXED["slow"].profile)[-1]
+    top = band_edges(of_one_rate()["slow"].profile)[-1]
     assert (oscillations.observability, oscillations.high) == (Observability.PARTLY, top)
     assert oscillations.needed == 10_000.0
     assert oscillations.reason == "the model of 1000 Hz ends there"
@@ -55,12 +58,12 @@ def test_what_lies_outside_of_the_models_bands_is_not_observable(rate):
 @pytest.mark.parametrize(
     ("rate", "library", "lowest"),
     [
-        *((rate, FIXED, 1000.0) for rate in (30.0, 100.0, 500.0, 970.0)),
-        *((rate, LIBRARY, 80.0) for rate in (30.0, 79.0)),
+        *((rate, of_one_rate, 1000.0) for rate in (30.0, 100.0, 500.0, 970.0)),
+        *((rate, lambda: LIBRARY, 80.0) for rate in (30.0, 79.0)),
     ],
 )
 def test_below_every_model_nothing_is_observable(rate, library, lowest):
-    found = audit(noisy_run(rate), library)
+    found = audit(noisy_run(rate), library())
     assert not found.observable
     for each in found.classes:
         assert (each.observability, each.needed) == (Observability.CANNOT_TELL, lowest)
@@ -79,7 +82,7 @@ def test_a_run_that_lacks_the_signals_of_all_models_shows_nothing_and_the_reason
 
 
 def test_without_the_faster_model_twice_the_frequency_is_required():
-    slow = {"slow": FIXED["slow"]}
+    slow = {"slow": of_one_rate()["slow"]}
     assert classes_of(noisy_run(1000.0), slow)["oscillations"].needed == 2 * OSCILLATIONS[1]
     assert audit(noisy_run(1000.0), {}).classes == ()
 
@@ -88,7 +91,7 @@ def test_the_bands_are_those_of_the_profile():
     edges = band_edges(Profile.paper())
     assert edges[0] == pytest.approx(9.8, abs=0.1)  # the paper's f_min, Sec. III-A
     assert edges[-1] == pytest.approx(5000, abs=20)
-    profile = FIXED["fast"].profile
+    profile = of_one_rate()["fast"].profile
     assert tuple(band_edges(profile)) == profile.edges
 
 
@@ -118,7 +121,7 @@ def test_a_zero_order_hold_limits_observability_to_the_rate_of_its_values():
     noisy = velocity + noise(velocity.shape)
     for length, degree in ((4, Observability.PARTLY), (33, Observability.CANNOT_TELL)):
         held = run_of(np.repeat(noisy[::length], length, axis=0)[: len(noisy)], 1000.0)
-        oscillations = classes_of(held, FIXED)["oscillations"]
+        oscillations = classes_of(held, of_one_rate())["oscillations"]
         assert oscillations.observability is degree
         assert f"hold of {length} samples" in oscillations.reason
 
@@ -161,7 +164,7 @@ def test_a_run_without_findings_in_which_nothing_is_observable_is_not_ok(tmp_pat
 def test_one_class_that_is_partly_observable_is_a_remark(tmp_path):
     zeros = np.zeros((6000, 2))
     run_of(zeros, 1000.0).save(tmp_path / "still.npz")
-    verdict = classify_file(tmp_path / "still.npz", FIXED)
+    verdict = classify_file(tmp_path / "still.npz", of_one_rate())
     assert verdict.status is Status.OK
     assert verdict.message == (
         "Nothing stands out, within the run or for any robot."

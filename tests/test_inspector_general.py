@@ -19,8 +19,14 @@ from inspector.logs.clocks import without_hold
 from inspector.report.findings import report
 from inspector.training.train import classified
 
-LIBRARY = {"general": trained()}
-FIXED = {"fixed": fixed()}
+
+def library():
+    """A model of any rate."""
+    return {"general": trained()}
+
+
+def of_one_rate():
+    return {"fixed": fixed()}
 
 
 def held(run, count, lead=0):
@@ -44,7 +50,7 @@ def held(run, count, lead=0):
     ("rate", "edge"), [(80.0, 35), (125.0, 55), (250.0, 110), (1000.0, 440), (2000.0, 880)]
 )
 def test_a_verdict_says_which_oscillations_cannot_be_seen(rate, edge):
-    found = analyse(run_at(rate), LIBRARY)
+    found = analyse(run_at(rate), library())
     sentence = f"At {rate:g} Hz, oscillations above {edge} Hz cannot be seen."
     assert found.model == "general"
     assert found.message.count(sentence) == 1
@@ -55,7 +61,7 @@ def test_a_verdict_says_which_oscillations_cannot_be_seen(rate, edge):
 
 
 def test_at_5_khz_every_class_can_be_seen():
-    found = analyse(run_at(5000.0, seconds=2.0), LIBRARY)
+    found = analyse(run_at(5000.0, seconds=2.0), library())
     assert "cannot be seen" not in found.message
     assert "The log can show impact and oscillations." in found.remarks
     assert {each.needed for each in found.audit.classes} == {None}
@@ -63,20 +69,20 @@ def test_at_5_khz_every_class_can_be_seen():
 
 @pytest.mark.parametrize("rate", [80.0, 1000.0])
 def test_the_rate_that_is_needed_shows_all_oscillations(rate):
-    oscillations = audit(run_at(rate), LIBRARY).classes[-1]
+    oscillations = audit(run_at(rate), library()).classes[-1]
     assert (oscillations.observability, oscillations.reason) == (
         Observability.PARTLY,
         f"half the rate of {rate:g} Hz",
     )
-    enough = audit(run_at(oscillations.needed, seconds=2.0), LIBRARY).classes[-1]
+    enough = audit(run_at(oscillations.needed, seconds=2.0), library()).classes[-1]
     assert enough.observability is Observability.OBSERVABLE
-    fewer = audit(run_at(oscillations.needed - 2.0, seconds=2.0), LIBRARY).classes[-1]
+    fewer = audit(run_at(oscillations.needed - 2.0, seconds=2.0), library()).classes[-1]
     assert fewer.observability is Observability.PARTLY
 
 
 @pytest.mark.parametrize("rate", [20.0, 50.0, 79.0])
 def test_below_80_hz_there_is_no_verdict_and_the_rate_that_is_needed_is_told_once(rate):
-    found = analyse(run_at(rate, seconds=8.0), LIBRARY)
+    found = analyse(run_at(rate, seconds=8.0), library())
     assert found.status is Status.CANNOT_TELL
     assert f"logged at {rate:g} Hz" in found.message
     assert "the model needs 80 Hz or more" in found.message
@@ -89,8 +95,8 @@ def test_a_filter_ends_what_can_be_seen_earlier():
     sections = butter(4, 100, fs=1000, output="sos")
     noise = np.random.default_rng(0).normal(0, 0.01, run.velocity.shape)
     slow = replace(run, velocity=run.velocity_desired + sosfilt(sections, noise, axis=0))
-    (line,) = (each for each in analyse(slow, LIBRARY).remarks if "cannot be seen" in each)
-    high = audit(slow, LIBRARY).classes[0].high
+    (line,) = (each for each in analyse(slow, library()).remarks if "cannot be seen" in each)
+    high = audit(slow, library()).classes[0].high
     assert line == (
         f"Impact and oscillations above {high:.4g} Hz cannot be seen (the log looks filtered)."
     )
@@ -102,7 +108,7 @@ def test_differentiated_velocities_end_what_can_be_seen_earlier():
     position = np.cumsum(run.velocity, axis=0) / 1000.0
     central = np.gradient(position, 1e-3, axis=0)
     log = replace(run, velocity=central, position=position, velocity_desired=None)
-    (line,) = (each for each in analyse(log, LIBRARY).remarks if "cannot be seen" in each)
+    (line,) = (each for each in analyse(log, library()).remarks if "cannot be seen" in each)
     assert "(velocities were differentiated)" in line
 
 
@@ -127,11 +133,11 @@ def test_text_and_json_have_the_sentence(tmp_path):
 def test_a_held_log_has_the_labels_of_the_log_that_was_not_held(rate, count, lead):
     plain = run_at(rate, "oscillations")
     log = held(plain, count, lead)
-    ours, theirs = label_run(log, LIBRARY), label_run(plain, LIBRARY)
+    ours, theirs = label_run(log, library()), label_run(plain, library())
     # Samples of a hold before the first whole one have no time of their own.
     skip = 1 if lead else 0
     if lead:
-        theirs = label_run(plain.cut(plain.time[1] - 1e-6, np.inf), LIBRARY)
+        theirs = label_run(plain.cut(plain.time[1] - 1e-6, np.inf), library())
     assert ours.remark.split(".")[0] == f"Labelled at {rate:g} Hz, the rate of its values"
     np.testing.assert_array_equal(ours.labels.label, theirs.labels.label)
     np.testing.assert_array_equal(ours.labels.scores, theirs.labels.scores)
@@ -141,10 +147,10 @@ def test_a_held_log_has_the_labels_of_the_log_that_was_not_held(rate, count, lea
 
 def test_a_held_log_says_what_the_log_that_was_not_held_says():
     plain = run_at(125.0)
-    found = analyse(held(plain, 8), LIBRARY)
+    found = analyse(held(plain, 8), library())
     evidence = "Nothing stands out, within the run or for any robot."
     limit = "At 125 Hz, oscillations above 55 Hz cannot be seen."
-    assert analyse(plain, LIBRARY).message == f"{evidence} {limit}"
+    assert analyse(plain, library()).message == f"{evidence} {limit}"
     assert found.message == (
         f"{evidence} Labelled at 125 Hz, the rate of its values. {limit} Warnings: measured values"
         " have a zero-order hold of 8 samples: they come at 125 Hz."
@@ -152,7 +158,7 @@ def test_a_held_log_says_what_the_log_that_was_not_held_says():
 
 
 def test_values_held_at_less_than_80_hz_have_no_verdict():
-    found = analyse(held(run_at(40.0, seconds=20.0), 25), LIBRARY)
+    found = analyse(held(run_at(40.0, seconds=20.0), 25), library())
     assert found.status is Status.CANNOT_TELL
     assert found.message == (
         "measured values are held: logged at 40 Hz, the model needs 80 Hz or more"
@@ -161,17 +167,17 @@ def test_values_held_at_less_than_80_hz_have_no_verdict():
 
 def test_a_model_of_one_rate_labels_a_held_log_at_that_rate():
     log = held(run_at(250.0), 4)
-    labelled = label_run(log, FIXED)
+    labelled = label_run(log, of_one_rate())
     whole = fixed().classify(signals_of(log), 1000.0)
     np.testing.assert_array_equal(labelled.labels.scores, whole.scores)
     assert "Labelled" not in labelled.remark
     with pytest.raises(CannotTellError, match="measured values are held: logged at 500 Hz"):
-        label_run(held(run_at(100.0), 5), FIXED)
+        label_run(held(run_at(100.0), 5), of_one_rate())
 
 
 def test_a_log_held_from_1_khz_is_labelled_at_1_khz_by_a_model_of_one_rate():
     plain = run_at(1000.0)
-    ours, theirs = label_run(held(plain, 4), FIXED), label_run(plain, FIXED)
+    ours, theirs = label_run(held(plain, 4), of_one_rate()), label_run(plain, of_one_rate())
     np.testing.assert_array_equal(ours.labels.scores, theirs.labels.scores)
 
 
@@ -205,7 +211,7 @@ def test_gaps_stay_gaps_without_the_hold():
     valid = np.ones(len(plain.time), dtype=bool)
     valid[300:400] = False
     gaps = replace(plain, velocity=plain.velocity * valid[:, None], valid=valid)
-    ours, theirs = label_run(held(gaps, 4), LIBRARY), label_run(gaps, LIBRARY)
+    ours, theirs = label_run(held(gaps, 4), library()), label_run(gaps, library())
     np.testing.assert_array_equal(ours.labels.start, theirs.labels.start)
     np.testing.assert_array_equal(ours.labels.scores, theirs.labels.scores)
 

@@ -18,8 +18,11 @@ from noiseclassifier.signals import JOINTS, MOTION
 from noisemodel import Run
 
 LIBRARY = load_library(model_files())
-FIXED = {"noise": fixed(), "norms": fixed(MOTION), "joints": fixed((*MOTION, *JOINTS))}
-"""Models of 1 kHz that know a Panda."""
+
+
+def of_panda():
+    """Models of 1 kHz that know a Panda."""
+    return {"noise": fixed(), "norms": fixed(MOTION), "joints": fixed((*MOTION, *JOINTS))}
 
 
 def run_of(velocity, rate):
@@ -55,13 +58,13 @@ def test_a_rattle_on_a_smooth_motion_is_found_when_it_happens(rate):
 
 
 def test_a_faster_run_is_decimated_and_a_slower_one_is_not_classified():
-    labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), FIXED)
+    labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), of_panda())
     assert (
         labelled.remark
         == "Labelled at 1000 Hz, the rate of model noise: nothing above 500 Hz is left."
     )
     with pytest.raises(CannotTellError, match="500 Hz"):
-        label_run(run_of(np.zeros((2000, 1)), 500.0), FIXED)
+        label_run(run_of(np.zeros((2000, 1)), 500.0), of_panda())
     labelled = label_run(run_of(np.zeros((20_000, 1)), 20_000.0), LIBRARY)
     assert labelled.remark == (
         "Labelled at 10000 Hz, the rate of model general: nothing above 5000 Hz is left."
@@ -73,7 +76,7 @@ def test_a_faster_run_is_decimated_and_a_slower_one_is_not_classified():
 def test_a_scalar_noise_cannot_be_decimated():
     time = np.arange(20_000) / 5000.0
     with pytest.raises(CannotTellError, match="5000 Hz cannot be decimated to the 1000 Hz of"):
-        label_noise(time, np.ones(20_000), FIXED)
+        label_noise(time, np.ones(20_000), of_panda())
     with pytest.raises(CannotTellError, match="20000 Hz cannot be decimated to the 10000 Hz of"):
         label_noise(time / 4.0, np.ones(20_000), LIBRARY)
 
@@ -81,16 +84,16 @@ def test_a_scalar_noise_cannot_be_decimated():
 def test_the_model_with_most_of_the_signals_of_a_run_is_taken():
     generator = np.random.default_rng(0)
     noisy = 0.1 + 1e-3 * generator.normal(size=(3000, 3))
-    assert label_run(run_of(noisy, 1000.0), FIXED).model == "noise"  # desired is measured
+    assert label_run(run_of(noisy, 1000.0), of_panda()).model == "noise"  # desired is measured
     time, names = np.arange(3000) / 1000.0, ("a", "b", "c")
     followed = Run(time=time, velocity=noisy, velocity_desired=0 * noisy + 0.1, joint_names=names)
-    assert label_run(followed, FIXED).model == "norms"
+    assert label_run(followed, of_panda()).model == "norms"
     known = replace(followed, robot="panda")
-    assert label_run(known, FIXED).model == "joints"
+    assert label_run(known, of_panda()).model == "joints"
     apart = replace(followed, desired_joint_names=("tool", "wrist", "base"))
-    assert label_run(apart, FIXED).model == "noise"  # no joint that is both
+    assert label_run(apart, of_panda()).model == "noise"  # no joint that is both
     measured = Run(time=time, velocity=noisy, joint_names=names)
-    assert label_run(measured, FIXED).model == "noise"
+    assert label_run(measured, of_panda()).model == "noise"
 
 
 def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
@@ -113,24 +116,24 @@ def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
 
 
 def test_a_run_without_the_signals_of_a_model_is_not_classified_and_the_error_has_the_reason():
-    alone = {"norms": FIXED["norms"]}
+    alone = {"norms": of_panda()["norms"]}
     run = Run(time=np.arange(3000) / 1000.0, velocity=np.ones((3000, 1)), joint_names=("a",))
     with pytest.raises(CannotTellError, match="no signal desired, error; there is noise, measured"):
         label_run(run, alone)
 
 
 def test_joints_are_classified_of_robots_in_the_training_set_and_norms_of_all_others():
-    both = {name: FIXED[name] for name in ("norms", "joints")}
+    both = {name: of_panda()[name] for name in ("norms", "joints")}
     assert for_robot(both, "panda") == both
     for robot in (None, "xarm7", "my.urdf"):
         assert list(for_robot(both, robot)) == ["norms"]
-    alone = {"joints": FIXED["joints"]}
+    alone = {"joints": of_panda()["joints"]}
     assert for_robot(alone, "xarm7") == alone  # who names one model means it
 
 
 def test_a_model_whose_runs_name_no_robot_classifies_the_joints_of_any():
-    own = replace(FIXED["joints"], runs={"monday": "", "tuesday": ""})
-    library = {"norms": FIXED["norms"], "own": own}
+    own = replace(of_panda()["joints"], runs={"monday": "", "tuesday": ""})
+    library = {"norms": of_panda()["norms"], "own": own}
     assert for_robot(library, "xarm7") == library
 
 

@@ -7,12 +7,14 @@ from generalmodel import run_at, trained
 from inspector.library import label_run
 from inspector.live.labels import Labeller
 
-LIBRARY = {"general": trained()}
+
+def library():
+    return {"general": trained()}
 
 
 def live(run):
     """Labels of a run that comes in chunks, and what the labeller remarks."""
-    labeller = Labeller(LIBRARY, run.rate, {"velocity": 3, "velocity_desired": 3})
+    labeller = Labeller(library(), run.rate, {"velocity": 3, "velocity_desired": 3})
     motion = np.hstack((run.velocity, run.velocity_desired))
     ones = np.ones(len(motion), dtype=bool)
     parts = [labeller.push(motion[i : i + 37], ones[i : i + 37]) for i in range(0, len(motion), 37)]
@@ -27,7 +29,7 @@ def test_live_motion_of_any_rate_is_labelled_as_it_comes(rate):
     run = run_at(rate, "oscillations")
     labeller, found = live(run)
     assert (labeller.model, labeller.remark) == ("general", "")
-    whole = label_run(run, LIBRARY).labels
+    whole = label_run(run, library()).labels
     count = len(found["start"])
     assert len(whole) - count in (0, 1)  # the last frame comes with the end of the run
     for name, each in found.items():
@@ -48,5 +50,5 @@ def test_live_motion_above_10_khz_is_decimated(rate, lower):
 
 
 def test_live_motion_below_80_hz_has_no_labels():
-    labeller = Labeller(LIBRARY, 50.0, {"velocity": 3})
+    labeller = Labeller(library(), 50.0, {"velocity": 3})
     assert labeller.remark == ("No labels: logged at 50 Hz, the model needs 80 Hz or more.")
