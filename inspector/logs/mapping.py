@@ -46,7 +46,6 @@ CONVENTIONS = {
 are the world's for the linear part and the body's for the angular one. The first is the run's."""
 WIDTHS: Mapping[str, int] = {"base_pose": 7, "base_velocity": 6}
 
-
 NO_MOTION = (
     "no position or velocity of a joint; name columns JOINT.velocity or JOINT.position, or map"
     " them with --map velocity.JOINT=COLUMN or --map velocity=ARRAY"
@@ -107,17 +106,15 @@ class ReadOptions:
 
     def for_columns(self, path: Path, names: Sequence[str]) -> "ReadOptions":
         """Options whose patterns are replaced by the columns that they fit."""
-        patterns = [entry for entry in self.entries if entry.is_pattern]
-        if not patterns:
-            return self
         single = [entry for entry in self.entries if not entry.is_pattern]
-        taken = {entry.source: entry for entry in single}
+        patterns = [entry for entry in self.entries if entry.is_pattern]
+        taken = {entry.source for entry in single}
         targets = {entry.target: entry for entry in single}
         # `{joint}_cmd` is more specific than `{joint}`, which fits all that is left.
         for entry in sorted(patterns, key=lambda each: -len(each.source)):
             before, _, after = entry.source.partition(JOINT)
-            form = re.compile(f"{re.escape(before)}(?P<joint>.+){re.escape(after)}")
-            found = [(name, match["joint"]) for name in names if (match := form.fullmatch(name))]
+            form = re.compile(f"{re.escape(before)}(.+){re.escape(after)}")
+            found = [(name, match[1]) for name in names if (match := form.fullmatch(name))]
             free = [(name, joint) for name, joint in found if name not in taken]
             if not found or (not free and entry.source != JOINT):
                 raise LogError(
@@ -134,8 +131,9 @@ class ReadOptions:
                         f"{targets[new.target].source!r} and {name!r} are both mapped to"
                         f" {new.target}; map one of them",
                     )
-                taken[name] = targets[new.target] = new
-        return replace(self, entries=tuple(targets.values()))
+                targets[new.target] = new
+                taken.add(name)
+        return replace(self, entries=tuple(targets.values())) if patterns else self
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -263,7 +261,7 @@ class _Choice(NamedTuple):
     columns: slice
     signal: str
     joint: str  # or the convention of a base
-    explicit: bool = False
+    explicit: bool = False  # by the options
 
     @property
     def label(self) -> str:
@@ -274,14 +272,9 @@ class _Choice(NamedTuple):
         return self.field.name if alone else f"{self.field.name}[{self.columns.start}]"
 
     @property
-    def target(self) -> tuple[str, str]:
-        """The signal and joint, for which one column is used."""
-        return self.signal, "" if self.signal in BASE_SIGNALS else self.joint
-
-    @property
-    def precedence(self) -> tuple[bool, int]:
-        """Of several columns for one target that with the lowest value is used."""
-        return not self.explicit, self.field.rank
+    def values(self) -> Real:
+        """Shape (samples, columns)."""
+        return self.field.values[:, self.columns]
 
 
 def tracks_of(
@@ -351,40 +344,40 @@ def _is_column(field: Field) -> bool:
     return field.values.shape[1] == 1 and not field.signal
 
 
-def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice], tuple[str, ...]]:
+def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice], list[str]]:
     """Columns of joints of the robot, and the names of the others."""
     if robot is None:
-        return choices, ()
-    unknown = [
-        choice
-        for choice in choices
-        if choice.signal in JOINT_SIGNALS and choice.joint not in robot.joint_names
-    ]
-    others = [choice for choice in choices if not any(choice is each for each in unknown)]
-    wrong = [choice for choice in unknown if choice.explicit]
-    if unknown and not any(choice.signal in JOINT_SIGNALS for choice in others):
+        return choices, []
+    known, unknown = list[_Choice](), list[_Choice]()
+    for each in choices:
+        foreign = each.signal in JOINT_SIGNALS and each.joint not in robot.joint_names
+        (unknown if foreign else known).append(each)
+    wrong = [each for each in unknown if each.explicit]
+    if not any(each.signal in JOINT_SIGNALS for each in known):
         wrong = unknown
     if wrong:
         raise WrongRobotError(wrong[0].joint, robot.name, robot.joint_names)
-    return others, tuple(dict.fromkeys(choice.joint for choice in unknown))
+    return known, list(dict.fromkeys(each.joint for each in unknown))
 
 
 def _unique(log: Log, choices: Sequence[_Choice]) -> list[_Choice]:
-    """One column for each signal of each joint, by precedence."""
+    """One column for each signal of each joint: by the options, else of the lowest rank."""
     found: dict[tuple[str, str], _Choice] = {}
     for choice in choices:
-        other = found.setdefault(choice.target, choice)
-        if choice.precedence < other.precedence:
-            found[choice.target] = choice
-        elif other is not choice and choice.precedence == other.precedence:
-            raise _both(log, other, choice)
-    return [choice for choice in choices if found[choice.target] is choice]
+        target = choice.signal, "" if choice.signal in BASE_SIGNALS else choice.joint
+        other = found.setdefault(target, choice)
+        rank, before = ((not each.explicit, each.field.rank) for each in (choice, other))
+        if rank < before:
+            found[target] = choice
+        elif rank == before and other is not choice:
+            raise _both(log, target[1], other, choice)
+    kept = {id(choice) for choice in found.values()}
+    return [choice for choice in choices if id(choice) in kept]
 
 
-def _both(log: Log, before: _Choice, after: _Choice) -> LogError:
+def _both(log: Log, joint: str, before: _Choice, after: _Choice) -> LogError:
     """Error of two columns that hold the same signal."""
     old, new = before.field, after.field
-    joint = after.target[1]
     what = f"{after.signal} of " + (f"joint {joint!r}" if joint else "the base")
     if new.source != old.source:
         return LogError(
@@ -409,30 +402,26 @@ def _joint_tracks(choices: Sequence[_Choice]) -> Iterator[Track]:
         if choice.signal in JOINT_SIGNALS:
             together.setdefault((choice.signal, id(choice.field.stamps)), []).append(choice)
     for (signal, _), members in together.items():
+        values = members[0].field.values
+        columns = [each.columns.start for each in members]
+        if any(each.field.values is not values for each in members):
+            values = np.hstack([each.values for each in members])
+        elif columns != list(range(values.shape[1])):  # else no copy: a long log is large
+            values = values[:, columns]
         yield Track(
             signal,
-            tuple(choice.joint for choice in members),
-            tuple(choice.label for choice in members),
+            tuple(each.joint for each in members),
+            tuple(each.label for each in members),
             members[0].field.stamps,
-            _side_by_side(members),
+            values,
         )
-
-
-def _side_by_side(choices: Sequence[_Choice]) -> Real:
-    first = choices[0].field.values
-    if all(choice.field.values is first for choice in choices):
-        columns = [choice.columns.start for choice in choices]
-        if columns == list(range(first.shape[1])):
-            return first  # no copy: a long log has hundreds of megabytes
-        return first[:, columns]
-    return np.hstack([choice.field.values[:, choice.columns] for choice in choices])
 
 
 def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
     by_signal = {choice.signal: choice for choice in choices if choice.signal in BASE_SIGNALS}
     pose = None
     if choice := by_signal.get("base_pose"):
-        pose = pose_of(choice.field.values[:, choice.columns], choice.joint)
+        pose = pose_of(choice.values, choice.joint)
         track = Track("base_pose", (), (choice.field.name,) * 7, choice.field.stamps, pose)
         if (wrong := not_normalised(pose)).any():
             raise track.fault(
@@ -443,7 +432,7 @@ def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
             )
         yield track
     if choice := by_signal.get("base_velocity"):
-        stamps, values = choice.field.stamps, choice.field.values[:, choice.columns]
+        stamps, values = choice.field.stamps, choice.values
         if choice.joint in ("world", "mujoco"):
             if pose is None or by_signal["base_pose"].field.stamps is not stamps:
                 raise LogError(
@@ -501,31 +490,35 @@ def _choices(
 ) -> Iterator[_Choice]:
     """Columns and their signals: by the options, then by the format, then by their names."""
     joints = options.joints or joints
+    by_name = {field.name: field for field in log.fields}
     signals = {entry.signal for entry in options.entries if not entry.joint}
     sources = {entry.part()[0] for entry in options.entries}
-    suggested = (
+    suggested = [
         entry
         for entry in log.suggested
         if entry.signal not in signals and entry.part()[0] not in sources
-    )
+    ]
     mapped = set()
     for entry in (*options.entries, *suggested):
-        found = _part_of(log, entry)
-        if found is None:
+        name, part = (entry.source, slice(None)) if entry.source in by_name else entry.part()
+        if name not in by_name:
             continue
-        mapped.add(id(found[0]))
-        width = found[1].stop - found[1].start
-        if entry.joint and entry.signal in JOINT_SIGNALS and width != 1:
+        field = by_name[name]
+        width = field.values.shape[1]
+        start, stop, _ = part.indices(width)
+        if name != entry.source and (start >= stop or (part.stop or 0) > width):
+            raise LogError(log.path, f"{entry.source!r}: {name!r} has {width} columns")
+        mapped.add(id(field))
+        if entry.joint and entry.signal in JOINT_SIGNALS and stop - start != 1:
             raise LogError(
                 log.path,
-                f"{entry.source!r} has {width} columns, {entry.target} is one; name it as"
-                f" {found[0].name}[0]",
+                f"{entry.source!r} has {stop - start} columns, {entry.target} is one; name it as"
+                f" {name}[0]",
             )
         if entry.signal != "time":
-            explicit = entry in options.entries
-            yield from _columns(
-                log, *found, entry.signal, entry.joint, options, joints, explicit=explicit
-            )
+            part = slice(start, stop)
+            for choice in _columns(log, field, part, entry.signal, entry.joint, options, joints):
+                yield choice._replace(explicit=entry in options.entries)
     known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
     named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
     numbered = {number_of(joint): joint for joint in reversed(named)}
@@ -535,21 +528,6 @@ def _choices(
             if signal:
                 whole = slice(0, each.values.shape[1])
                 yield from _columns(log, each, whole, signal, joint, options, joints)
-
-
-def _part_of(log: Log, entry: Entry) -> tuple[Field, slice] | None:
-    """The field and the columns that an entry names; None if the log has no such field."""
-    by_name = {field.name: field for field in log.fields}
-    if field := by_name.get(entry.source):
-        return field, slice(0, field.values.shape[1])
-    name, part = entry.part()
-    if name not in by_name:
-        return None
-    width = by_name[name].values.shape[1]
-    start, stop, _ = part.indices(width)
-    if start >= stop or (part.stop or 0) > width:
-        raise LogError(log.path, f"{entry.source!r}: {name!r} has {width} columns")
-    return by_name[name], slice(start, stop)
 
 
 def _meaning(
@@ -590,8 +568,6 @@ def _columns(
     joint: str,
     options: ReadOptions,
     joints: Sequence[str],
-    *,
-    explicit: bool = False,
 ) -> Iterator[_Choice]:
     """Columns of a field: of one joint, of the base with its convention, or one for each joint."""
     width = part.stop - part.start
@@ -600,7 +576,7 @@ def _columns(
             log.path, f"{field.name!r} has {width} columns, a {signal} has {WIDTHS[signal]}"
         )
     if signal in BASE_SIGNALS or joint:
-        yield _Choice(field, part, signal, joint, explicit)
+        yield _Choice(field, part, signal, joint)
         return
     names: Sequence[str] = field.joints[part]
     if not names or len(options.joints) == width:
@@ -615,4 +591,4 @@ def _columns(
             )
     names = names or [f"joint_{number}" for number in range(width)]
     for column, name in zip(range(part.start, part.stop), names[:width], strict=True):
-        yield _Choice(field, slice(column, column + 1), signal, name, explicit)
+        yield _Choice(field, slice(column, column + 1), signal, name)

@@ -47,6 +47,9 @@ MAGIC = {
 NEEDS = {"bags": (("rosbags", "mcap"), "ros"), "hdf5": (("h5py",), "hdf5")}
 """The libraries that a reader needs, and the extra that installs them."""
 
+INFO, BAG = Path("meta") / "info.json", "metadata.yaml"
+"""By these files, a folder is a LeRobot data set, or a bag of ROS 2."""
+
 SUFFIXES = frozenset(
     (".npz", ".csv", ".tsv", ".log", ".parquet", ".h5", ".hdf5", ".mat", ".mcap", ".bag", ".db3")
 )
@@ -55,7 +58,7 @@ SUFFIXES = frozenset(
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of a log, chosen by its first bytes, or by the files in a folder."""
-    module = _of_folder(path) if _is_folder(path) else _of_file(path)
+    module = _module_of(path)
     libraries, extra = NEEDS.get(module, ((), ""))
     for library in libraries:
         if find_spec(library) is None:
@@ -73,7 +76,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 def is_one_log(folder: Path) -> bool:
     """Whether a folder is one log: a LeRobot data set, or a bag; not a folder of logs."""
     try:
-        if (folder / "meta" / "info.json").is_file() or (folder / "metadata.yaml").is_file():
+        if (folder / INFO).is_file() or (folder / BAG).is_file():
             return True
         files = [each for each in folder.iterdir() if not each.name.startswith(".")]
     except OSError as error:
@@ -88,7 +91,18 @@ def _is_folder(path: Path) -> bool:
         raise LogError(path, f"cannot be read ({error.strerror})") from error
 
 
-def _of_file(path: Path) -> str:
+def _module_of(path: Path) -> str:
+    """The module that reads a log."""
+    if _is_folder(path):
+        if (path / INFO).is_file():
+            return "parquet"
+        if any(map(Path.is_file, (path / BAG, *path.glob("*.mcap"), *path.glob("*.db3")))):
+            return "bags"
+        raise LogError(
+            path,
+            "a folder that is neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
+            " (meta/info.json); name its files one by one",
+        )
     try:
         runfile.check_regular(path)
         with path.open("rb") as stream:
@@ -98,19 +112,6 @@ def _of_file(path: Path) -> str:
     except runfile.ArchiveError as error:
         raise LogError(path, str(error)) from error
     return next((module for magic, module in MAGIC.items() if head.startswith(magic)), "csv")
-
-
-def _of_folder(path: Path) -> str:
-    if (path / "meta" / "info.json").is_file():
-        return "parquet"
-    bags = (path / "metadata.yaml", *path.glob("*.mcap"), *path.glob("*.db3"))
-    if any(each.is_file() for each in bags):
-        return "bags"
-    raise LogError(
-        path,
-        "a folder that is neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
-        " (meta/info.json); name its files one by one",
-    )
 
 
 # Runs of logs
@@ -148,10 +149,10 @@ def read_log(
         >>> read_log("bag/", robot="panda").run.rate  # doctest: +SKIP
         1000.0
     """
-    path, chosen = Path(path), read_options(mapping, **options)
+    path = Path(path)
     readers = readers_of(
         path,
-        chosen,
+        read_options(mapping, **options),
         desired=Path(desired) if desired else None,
         episodes=None if episode is None else [episode],
     )
@@ -256,9 +257,9 @@ def _read_episode(
         remark = f"a run file, its robot is now {options.robot}"
         return Imported(replace(run, robot=options.robot), (remark,), name)
     log = opened.read(episode, progress)
-    remarks: tuple[str, ...] = ()
+    problem = ""
     if robot is None and log.urdf:
-        robot, remarks = _robot_of(log.urdf)
+        robot, problem = _robot_of(log.urdf)
     logs = [prepared(log, options, robot)]
     del log  # its tracks remain, and are freed one by one as they are resampled
     if desired:
@@ -267,19 +268,19 @@ def _read_episode(
             options = replace(options, units="degrees")
         logs.append(prepared(desired.read(same_episode, progress), options, robot))
     imported = run_of(logs, options, robot, name)
-    return replace(imported, remarks=(*imported.remarks, *remarks))
+    unchecked = [f"{problem}; joints are not checked"] if problem else []
+    return replace(imported, remarks=(*imported.remarks, *unchecked))
 
 
-def _robot_of(urdf: str) -> tuple[Robot | None, tuple[str, ...]]:
-    """Robot of the URDF in a log, or None and a remark if it cannot be read."""
+def _robot_of(urdf: str) -> tuple[Robot | None, str]:
+    """Robot of the URDF in a log, or None and why it cannot be read."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "robot_description.urdf"
         path.write_text(urdf, encoding="utf-8")
         try:
-            return Robot.load(path), ()
+            return Robot.load(path), ""
         except RobotError as error:
-            problem = str(error).replace(str(path), "the log's robot description")
-            return None, (f"{problem}; joints are not checked",)
+            return None, str(error).replace(str(path), "the log's robot description")
 
 
 # Run files and logs alike
@@ -287,32 +288,20 @@ def _robot_of(urdf: str) -> tuple[Robot | None, tuple[str, ...]]:
 
 @dataclass(frozen=True)
 class Reading:
-    """How logs are opened.
+    """How logs are opened."""
 
-    Attributes:
-        options: How to read what is no run file; its robot is taken for run files too.
-        desired: Another log, with the desired motion; for a single log.
-        episodes: The episodes to take of a data set, all unless given.
-        without_robot: Whether a run is taken without the robot that it names.
-    """
-
-    options: ReadOptions = field(default_factory=ReadOptions)
-    desired: Path | None = None
-    episodes: tuple[str, ...] = ()
-    without_robot: bool = False
+    options: ReadOptions = field(default_factory=ReadOptions)  # their robot is for run files too
+    desired: Path | None = None  # another log with the desired motion, for a single log
+    episodes: tuple[str, ...] = ()  # to be taken of a data set, all unless given
+    without_robot: bool = False  # a run is taken without the robot that it names
 
 
 @dataclass(frozen=True)
 class Source:
-    """A run that is not read yet: a file, or an episode of a data set.
-
-    Attributes:
-        path: The file, or the folder of a bag or data set.
-        episode: The episode, empty for a log without episodes.
-    """
+    """A run that is not read yet: a file, the folder of a bag, or an episode of a data set."""
 
     path: Path
-    episode: str = ""
+    episode: str = ""  # empty for a log without episodes
 
     @property
     def shown(self) -> Path:
@@ -322,17 +311,10 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """A run, and what was assumed when its log was read.
-
-    Attributes:
-        run: The run.
-        assumed: Joints, units, rate and robot, and all that was decided, in one line; empty for a
-            run file that names its joints.
-        source: Where it is from.
-    """
+    """A run, and what was assumed when its log was read: joints, units, rate, robot and more."""
 
     run: Run
-    assumed: str
+    assumed: str  # in one line, empty for a run file that names its joints
     source: Source
 
     @property
@@ -373,14 +355,13 @@ def open_source(
         raise LogError(source.shown, "its name has control characters; rename it")
     run = _run_file(source.path, reading)
     if run is None:
-        (read,) = readers_of(
+        (imported,) = read_logs(
             source.path,
             reading.options,
             desired=reading.desired,
             episodes=[source.episode] if source.episode else None,
             progress=progress,
-        ).values()
-        imported = read()
+        )
         return Opened(imported.run, assumed(imported, source.path), source)
     robot = reading.options.robot
     if robot:
@@ -410,7 +391,7 @@ def sources(
         new = [log for log in logs if os.path.realpath(log) not in seen]  # may link to itself
         seen.update(map(os.path.realpath, new))
         also_reading(new)
-        found += (each for log in new for each in _episodes(log, reading))
+        found += (Source(log, each) for log in new for each in _episodes(log, reading))
     if reading.desired and len(found) > 1:
         raise InspectorError(
             f"{reading.desired}: belongs to one log, {len(found)} are given (--desired)"
@@ -491,25 +472,24 @@ def _listed(run: Run) -> str:
     return ", ".join(names) if len(names) <= 3 else f"{names[0]} to {names[-1]}"
 
 
-def _episodes(path: Path, reading: Reading) -> Iterator[Source]:
-    """The runs of a log; the log itself if they cannot be listed, or it is a run file."""
-    if _is_folder(path) or not _is_npz(path):
-        try:
-            found = readers_of(path, reading.options, episodes=reading.episodes or None)
-            yield from (Source(path, episode) for episode in found)
-        except (InspectorError, NoiseModelError):
-            yield from (Source(path, each) for each in reading.episodes or ("",))
-        return
-    yield Source(path)
+def _episodes(path: Path, reading: Reading) -> tuple[str, ...]:
+    """The episodes of a log; none of one that cannot be listed, or of a run file."""
+    if not _is_folder(path) and _is_npz(path):
+        return ("",)
+    try:
+        return tuple(readers_of(path, reading.options, episodes=reading.episodes or None))
+    except (InspectorError, NoiseModelError):
+        return reading.episodes or ("",)
 
 
 def _run_file(path: Path, reading: Reading) -> Run | None:
     """The run of a run file; None of another log, or if it has to be read as one."""
-    options = reading.options
-    as_log = bool(reading.desired or options.entries or options.units or options.joints)
-    if _is_folder(path) or not _is_npz(path) or (_is_archive(path) and as_log):
+    if _is_folder(path) or not _is_npz(path):
         return None
     if _is_archive(path):
+        options = reading.options
+        if reading.desired or options.entries or options.units or options.joints:
+            return None
         try:
             names = set(runfile.names_in(path))
         except (OSError, runfile.ArchiveError):
@@ -542,25 +522,15 @@ READ = (*SUFFIXES, ".json", ".yaml")
 
 @dataclass(frozen=True)
 class Written:
-    """Result of importing one log, or one of its episodes.
+    """Result of importing one log, or one of its episodes."""
 
-    Attributes:
-        path: The run file; if the log could not be read, the log.
-        duration: Of the run, in [s].
-        rate: Of the run, in [Hz].
-        remarks: What was decided during the import, a sentence each.
-        problem: Why there is no run file; empty if there is one.
-        lost: Whether the log could be read and the run file not be written.
-        kept: Whether the run file is there already, from a call that was interrupted.
-    """
-
-    path: Path
+    path: Path  # the run file; if the log could not be read, the log
     duration: float = 0.0
     rate: float = 0.0
-    remarks: tuple[str, ...] = ()
-    problem: str = ""
-    lost: bool = False
-    kept: bool = False
+    remarks: tuple[str, ...] = ()  # what was decided during the import, a sentence each
+    problem: str = ""  # why there is no run file; empty if there is one
+    lost: bool = False  # the log could be read, and the run file not be written
+    kept: bool = False  # the run file is there already, from a call that was interrupted
 
 
 def import_logs(
@@ -595,10 +565,11 @@ def import_logs(
             if not several:
                 raise
             failed.append(Written(log, problem=str(error)))
-    digest = cache(lambda log: _digest(options, log, desired))
     targets = _targets([name for _, name, _ in jobs], output, several=several)
+    in_folder = targets != (output,)
+    digest = cache(lambda log: _digest(options, log, desired) if in_folder else "")
     for (log, _, _), target in zip(jobs, targets, strict=True):
-        if not (target.exists() and targets != (output,) and _digest_in(target) == digest(log)):
+        if not (in_folder and target.exists() and _digest_in(target) == digest(log)):
             refuse_existing(target, overwrite=overwrite)
     there = {target for target in targets if target.exists() and not overwrite}
     yield from failed
@@ -607,8 +578,7 @@ def import_logs(
             yield Written(target, kept=True)
             continue
         try:
-            made_of = digest(log) if targets != (output,) else ""
-            yield _written(read(), target, made_of, overwrite=overwrite)
+            yield _written(read(), target, digest(log), overwrite=overwrite)
         except (InspectorError, NoiseModelError) as error:
             if len(targets) == 1 and not several:
                 raise
