@@ -27,7 +27,7 @@ from inspector.library import (
     label_run,
     load_library,
 )
-from inspector.localisation.extent import extent
+from inspector.localisation.localise import extent
 from inspector.logs.clocks import without_hold
 from inspector.logs.read import Opened, open_run
 from noiseclassifier import Event

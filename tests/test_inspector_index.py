@@ -8,7 +8,8 @@ import browser
 import pytest
 from test_inspector_formats import ALL, BLOW, BROKEN, LACKING, LOUD, QUIET, RATTLE, SLOW
 
-from inspector.report.index import WIDTH, page
+from inspector.report.html import WIDTH
+from inspector.report.html import index_page as page
 from inspector.verdict import Ruled, Ruling
 
 LONG = [replace(each, duration=10.0, begin=0.0) for each in (LOUD, LACKING, QUIET)]

@@ -97,7 +97,7 @@ def test_the_band_of_repetitions_holds_each_of_them_and_a_chatter_is_above_it(pr
 
 
 def test_pictures_beside_a_reference_show_what_it_finds(own, simulate, monkeypatch):
-    index = pytest.importorskip("inspector.report.index")
+    index = pytest.importorskip("inspector.report.html")
     drawn = {}
     monkeypatch.setattr(
         "inspector.report.picture.picture",

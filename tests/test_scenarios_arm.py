@@ -6,8 +6,7 @@ from itertools import cycle
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.arm import plan
-from noiseclassifier.scenarios.arm_reaching import KINDS, ReachPlan, Tool
+from noiseclassifier.scenarios.arm import KINDS, ReachPlan, Tool, plan
 from noiseclassifier.scenarios.domains import arm_motion
 from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import SLOW, Defect, Faults, no_defect

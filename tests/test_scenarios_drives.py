@@ -6,8 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from noiseclassifier.scenarios.arm import PickPlan, ToolControl
-from noiseclassifier.scenarios.arm_reaching import Tool
+from noiseclassifier.scenarios.arm import PickPlan, Tool, ToolControl
 from noiseclassifier.scenarios.domains import Domain
 from noiseclassifier.scenarios.drives import DomainDrives, Drives
 from noiseclassifier.scenarios.faults import NO_DRIVE_FAULT, DriveFault, Imperfections

@@ -204,12 +204,12 @@ def _page_writer(
     """What writes the page on all runs, and draws each, if a folder is named; it is made."""
     if folder is None:
         return len, None
-    from inspector.report import index
+    from inspector.report import html
     from inspector.report.picture import require
 
     require("a report")
-    index.prepare(folder, overwrite=overwrite)
-    return partial(index.write, folder=folder), partial(index.draw, folder=folder)
+    html.prepare(folder, overwrite=overwrite)
+    return partial(html.write_index, folder=folder), partial(html.draw, folder=folder)
 
 
 def _name_failed(verdicts: "Iterable[Verdict]") -> None:
@@ -508,7 +508,7 @@ def merge(
 
     The exit status is the one that `classify` has for all of their runs.
     """
-    from inspector.report import index
+    from inspector.report import html
     from inspector.report.formats import FORMATS
     from inspector.verdict import Verdict, exit_status, read_results
 
@@ -522,11 +522,11 @@ def merge(
             found[verdict.path] = verdict, path
     merged = [verdict for verdict, _ in found.values()]
     if report is not None:
-        index.prepare(report, overwrite=overwrite)
-        merged = [index.with_picture(each, report) for each in merged]
+        html.prepare(report, overwrite=overwrite)
+        merged = [html.with_picture(each, report) for each in merged]
     lost = written(merged, FORMATS, format, files, overwrite=overwrite)
     if report is not None:
-        lost += tried(lambda: index.write(merged, report), report)
+        lost += tried(lambda: html.write_index(merged, report), report)
     _name_failed(merged)
     end(exit_status(merged), lost)
 

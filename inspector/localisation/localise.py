@@ -1,4 +1,31 @@
-"""Localisation of failures: stage of the control flow, joints, frequency band, links."""
+"""Localisation of failures: stage of the control flow, joints, frequency band, links.
+
+Onset and end of a finding: change points of its power in its first and its last frame.
+
+A classifier labels frames (0.4 s, every 0.1 s). A finding begins with its first frame, most of
+which the failure has not reached yet. The onset is the time t in the first frame that splits the
+power into two levels best. For n samples of mean power p, of which n1 before t have p1 and n2
+after it p2, the log likelihood of two levels exceeds the one of a single level by
+
+    (n log p - n1 log p1 - n2 log p2) / 2
+
+if samples are independent and normal. This is the criterion by which seismologists pick the onset
+of waves (Maeda 1985), and of a change of variance in general (Inclan & Tiao 1994). Only a rise
+counts. Samples of a vibration are not independent: a time of `INDEPENDENT` counts as one sample.
+The mean of the log likelihoods of two powers is taken: of the tracking error (of the motion,
+if no velocity is desired) above 10 Hz, and of the sudden changes of the motion, as
+`inspector.localisation.stage` has them. Both filters are causal, so that nothing rises before
+it happens.
+
+The frame before the first was not labelled, so that the failure sets in during the first frame's
+last hop. This is the prior: a normal distribution with `ONSET` and `DEVIATION`. Its mean is the
+result where nothing stands out. Where no frame fits in before the first one, because the run
+begins or a gap ends there, the mean is the frame's start, and the deviation a frame's.
+
+The end is the onset of the same stretch reversed in time, with the prior `END`.
+
+Neither likelihood nor prior depends on scale. A scalar noise is a run of one joint.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,11 +38,146 @@ from inspector.localisation.stage import (
     first_stage,
     quiet_statistics,
     quiet_stretches,
+    sudden,
 )
 from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.noise import FAST, LinkNoise
-from noisemodel.types import Array, Real
+from noisemodel.types import Array, Indices, Mask, Real
+
+BIN = 0.001
+"""Time over which power is taken, in [s], or one sample if that is longer."""
+PAST = 0.05
+"""Time of the past mean that is subtracted, twice, in [s]: what is slower than 10 Hz is motion."""
+WARM = 0.02
+"""Time after the start of the run or the end of a gap whose power is not used, in [s]."""
+SHORTEST_LEVEL = 0.005
+"""Shortest time that has a level, in [s]."""
+BEYOND = 0.05
+"""Time after the first frame that counts towards the level after an onset, in [s]."""
+INDEPENDENT = 0.02
+"""Time that counts as one independent sample, in [s]."""
+ONSET, END = 0.9, 2.0
+"""Means of the priors: from the onset to the stop of the first frame, and from the end to the stop
+of the last frame, in hops."""
+DEVIATION = 0.35
+"""Standard deviation of both, in hops."""
+LEAST = 1e-6
+"""Share of the whole energy that is added to each side, so that silence has a logarithm."""
+
+
+def extent(
+    run: Run, start: float, stop: float, *, frame: float = 0.4, hop: float = 0.1
+) -> tuple[float, float]:
+    """Estimate when a finding sets in and when it ends.
+
+    Args:
+        run: The run, or a scalar noise as a run of one joint; desired velocities are optional.
+        start: Start of the finding's first frame, in [s].
+        stop: Stop of its last frame, in [s].
+        frame: Duration of a frame, in [s].
+        hop: Time from the start of a frame to the start of the next, in [s].
+
+    Returns:
+        Onset, from ``start`` to the stop of the first frame, and end, after the onset and up to
+        ``stop``, in [s].
+    """
+    begin, sample = float(run.time[0]), 1.0 / run.rate
+    start = min(max(start, begin), begin + run.duration - sample)
+    stop = max(min(stop, begin + run.duration), start + sample)
+    room = max(0.0, min(frame, stop - start - sample))  # not -1e-17 by rounding
+    prior = frame - ONSET * hop, DEVIATION * hop
+    onset = start + _rise(run, start, room, prior, frame=frame, hop=hop)
+    room = max(0.0, min(frame, stop - onset - sample))
+    prior = END * hop, DEVIATION * hop
+    return onset, stop - _rise(run, stop, room, prior, frame=frame, hop=hop, backwards=True)
+
+
+def _rise(
+    run: Run,
+    edge: float,
+    room: float,
+    prior: tuple[float, float],
+    *,
+    frame: float,
+    hop: float,
+    backwards: bool = False,
+) -> float:
+    """Time from an outer edge of a finding to the rise of its power, up to ``room``, in [s]."""
+    samples, size = len(run.time), max(1, round(BIN * run.rate))
+    step = size / run.rate
+    at = round((edge - float(run.time[0])) * run.rate)
+    at = samples - at if backwards else at
+    past = min(round(2.0 * PAST / step), at // size)
+    ahead = min(round((frame + BEYOND) / step), (samples - at) // size)
+    power, known = _powers(run, at - past * size, past + ahead, size, backwards=backwards)
+    mask = run.mask[::-1] if backwards else run.mask
+    outside = at - round(hop * run.rate)
+    mean, deviation = prior if outside >= 0 and mask[outside:at].all() else (0.0, frame)
+    gain = _gain(power[past:], known[past:], max(1, round(SHORTEST_LEVEL / step)))
+    if not gain.any():
+        return max(0.0, min(mean, room))
+    offset = np.arange(len(gain)) * step
+    offset, gain = offset[offset <= room], gain[offset <= room]
+    score = gain * step / (2.0 * INDEPENDENT) - np.square((offset - mean) / deviation) / 2.0
+    return float(offset[np.argmax(score)])
+
+
+def _powers(run: Run, first: int, bins: int, size: int, *, backwards: bool) -> tuple[Array, Mask]:
+    """Power of error and sudden changes, shape (bins, 2), and where they can be used."""
+    part = slice(first, first + bins * size)
+    if backwards:
+        part = slice(len(run.time) - part.stop, len(run.time) - first)
+    order = slice(None, None, -1) if backwards else slice(None)
+    motion, error = (signal[order].reshape(bins, size, -1) for signal in _signals(run, part))
+    valid = np.asarray(run.mask[part][order].reshape(bins, size).all(axis=1), dtype=np.bool_)
+    rate = run.rate / size
+    last = np.arange(1, bins + 1)
+    begin = np.maximum.accumulate(np.where(valid, 0, last))  # of the stretch without a gap
+    middle = error.mean(axis=1, dtype=np.float64)
+    # What is left of a steady acceleration is constant: the second time removes that.
+    fast = _high_passed(_high_passed(middle, begin, rate), begin, rate)
+    within = error.var(axis=1, dtype=np.float64) if size > 1 else np.zeros_like(middle)
+    changes = sudden(motion.mean(axis=1, dtype=np.float64), valid, rate)
+    known = valid & (last - begin > round(WARM * rate))
+    power = ((np.square(fast) + within).sum(axis=1), np.square(changes).sum(axis=1))
+    return np.stack(power, axis=1), known
+
+
+def _high_passed(signal: Array, begin: Indices, rate: float) -> Array:
+    """Signal of shape (bins, joints), less its mean over the past, which ``begin`` limits."""
+    last = np.arange(1, len(signal) + 1)
+    first = np.maximum(begin, last - round(PAST * rate))
+    sums = np.concatenate((np.zeros((1, signal.shape[1])), np.cumsum(signal, axis=0)))
+    return np.asarray(signal - (sums[last] - sums[first]) / np.maximum(last - first, 1)[:, None])
+
+
+def _signals(run: Run, part: slice) -> tuple[Real, Real]:
+    """All measured velocities of a part of a run, and the tracking error, else the same."""
+    motion = run.velocity[part]
+    if run.base_velocity is not None:
+        motion = np.hstack((run.base_velocity[part], motion))
+    both = [name for name in run.joint_names if name in run.desired_joint_names]
+    if run.velocity_desired is None or not both:
+        return motion, motion
+    measured = [run.joint_names.index(name) for name in both]
+    desired = [run.desired_joint_names.index(name) for name in both]
+    return motion, run.velocity_desired[part][:, desired] - run.velocity[part][:, measured]
+
+
+def _gain(power: Array, known: Mask, shortest: int) -> Array:
+    """Twice the gain in log likelihood of a rise before each bin, shape (bins + 1,)."""
+    count = np.concatenate(([0], np.cumsum(known)))[:, None]
+    energy = np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(power * known[:, None], 0)))
+    before, after = count, count[-1] - count
+    enough = (before >= shortest) & (after >= shortest) & (energy[-1] > 0.0)
+    n, total = count[-1], energy[-1] * (1.0 + 2.0 * LEAST)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low = (energy + LEAST * energy[-1]) / before
+        high = (energy[-1] - energy + LEAST * energy[-1]) / after
+        gain = n * np.log(total / n) - before * np.log(low) - after * np.log(high)
+    return np.asarray(np.where(enough & (high > low), gain, 0.0).mean(axis=1))
+
 
 ANNOTATED = 0.1
 """How long after the start of an annotation its failure may set in, in [s]."""

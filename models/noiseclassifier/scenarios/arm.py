@@ -1,18 +1,14 @@
-"""An arm that picks from a table: plan, controller, and the scene of any arm."""
+"""Arms that reach in joint space, or pick from a table: plans, controllers, and their scene."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
 
-from noiseclassifier.scenarios.arm_reaching import (
-    HIGHEST_ACCELERATION,
-    JointControl,
-    ReachPlan,
-    Tool,
-    reach,
-)
 from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Faults, Imperfections
 from noiseclassifier.scenarios.loop import Control, Reference, Scene, force
@@ -20,15 +16,372 @@ from noiseclassifier.scenarios.motions import (
     TICK,
     Box,
     Contact,
+    Payload,
     Picks,
     Plan,
     Reach,
+    Tip,
+    Units,
     bump,
     minimum_jerk,
+    times,
 )
 from noiseclassifier.scenarios.robots import Arm
-from noiseclassifier.scenarios.world import box_changes, real_world
+from noiseclassifier.scenarios.world import box_changes, configuration, real_world, reduced_model
+from noisemodel import Robot
 from noisemodel.types import Array
+
+HIGHEST_ACCELERATION = 30.0
+"""Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²]."""
+MARGIN = 0.1  # distance from the joints' limits, in [rad]
+OVER = 0.08  # how far splines and waves may reach into that margin, in [rad]
+SHORTEST = 0.2  # shortest movement, in [s]
+TURN = np.pi  # furthest position of a joint without nearer limits, in [rad]
+SHARE = 0.7  # share of the drives' torque that a plan may need, and of the URDF's speed
+SLOWER = 1.25  # factor on the duration of a movement that needs too much torque
+LONG_PAUSES = 0.15  # share of the pauses that are long
+LONG = (1.0, 3.0)  # A long pause, in [s]
+BRAKING = (0.05, 0.2)  # time in which an emergency stop brakes, in [s]
+HALTED = (0.3, 1.0)  # time between an emergency stop and going on, in [s]
+RESUMING = 0.4  # time in which the motion gets back to its speed, in [s]
+CARRYING = (0.5, 2.5)  # time between picking up and putting down, and until the next time, in [s]
+GRASPING = (0.06, 0.15)  # time in which the tool takes over a weight, in [s]
+SINES = (0.05, 1.5)  # frequencies of sines, in [Hz]
+HAND = (0.4, 1.5)  # bandwidth of the hand that teleoperates, in [Hz]
+SENDING = (20.0, 60.0)  # rate at which a teleoperation device sends positions, in [Hz]
+
+
+class Tool:
+    """The tip of an arm's tool: kinematics, and torques of the arm."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.model = reduced_model(arm)
+        self._data = self.model.createData()
+        self._frame, self._point = self.model.getFrameId(arm.tool.frame), np.array(arm.tool.point)
+
+    def pose(self, joints: Array) -> Any:
+        """Placement of the tool's frame."""
+        pin.framesForwardKinematics(self.model, self._data, configuration(self.model, joints))
+        return self._data.oMf[self._frame]
+
+    def place(self, joints: Array) -> Array:
+        """Position of the tip, shape (3,), in [m]."""
+        return np.asarray(self.pose(joints).act(self._point))
+
+    def jacobian(self, joints: Array) -> tuple[Array, Array, Array, Array]:
+        """Frame's position, way from there to the tip, rotation, and Jacobian of the tip."""
+        model, data = self.model, self._data
+        pin.computeJointJacobians(model, data, configuration(model, joints))
+        placement = pin.updateFramePlacement(model, data, self._frame)
+        lever = placement.rotation @ self._point
+        jacobian = pin.getFrameJacobian(model, data, self._frame, pin.LOCAL_WORLD_ALIGNED)
+        jacobian[:3] -= pin.skew(lever) @ jacobian[3:]  # of the tip, not of the frame
+        return placement.translation, lever, placement.rotation, jacobian
+
+    def torque(self, joints: Array, velocity: Array, acceleration: Array) -> Array:
+        """Torques of a motion, without the inertia of drives, shape (joints,), in [N m]."""
+        q = configuration(self.model, joints)
+        return np.asarray(pin.rnea(self.model, self._data, q, velocity, acceleration))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReachPlan(Plan):
+    """Plan of the motion of an arm's joints."""
+
+    joints: Array  # positions, shape (ticks, joints), in [rad]
+    stops: tuple[float, ...] = ()  # times of emergency stops, in [s]
+    foreseen: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Ability:
+    """What an arm can do, by its URDF and its drives."""
+
+    tool: Tool
+    rest: Array  # joint positions around which it moves, shape (joints,), in [rad]
+    low: Array  # lowest positions, shape (joints,), in [rad]
+    high: Array  # highest positions, shape (joints,), in [rad]
+    speed: Array  # largest speeds, shape (joints,), in [rad/s]
+    torque: Array  # largest torques, shape (joints,), in [N m]
+    armature: Array  # inertia of the drives, shape (joints,), in [kg m²]
+
+    @classmethod
+    def of(cls, arm: Arm) -> "Ability":
+        """What an arm can do."""
+        model, rest = Robot.load(arm.name, floating_base=False).model, np.array(arm.rest)
+        joints = [model.joints[model.getJointId(name)] for name in arm.drives.joints]
+        low, high = rest - TURN, rest + TURN
+        for index, joint in enumerate(joints):
+            if joint.nq == 1:  # a continuous joint has no limits
+                low[index] = max(low[index], model.lowerPositionLimit[joint.idx_q] + MARGIN)
+                high[index] = min(high[index], model.upperPositionLimit[joint.idx_q] - MARGIN)
+        speed = np.array([model.velocityLimit[joint.idx_v] for joint in joints])
+        return cls(
+            Tool(arm),
+            rest,
+            low=np.minimum(low, rest),
+            high=np.maximum(high, rest),
+            speed=SHARE * np.where(speed > 0, speed, np.inf),
+            torque=SHARE * np.array(arm.drives.torque),
+            armature=np.array(arm.drives.armature),
+        )
+
+    def feasible(self, positions: Array, fastest: float, ticks: int) -> bool:
+        """Whether drives can follow positions of each tick, accelerating in [rad/s²] at most."""
+        coarse = positions[::ticks]
+        if len(coarse) < 3:
+            return True
+        velocity = np.gradient(coarse, ticks * TICK, axis=0)
+        acceleration = np.gradient(velocity, ticks * TICK, axis=0)
+        if np.abs(acceleration).max() > fastest or (np.abs(velocity) > self.speed).any():
+            return False
+        return all(
+            (np.abs(self.tool.torque(q, v, a) + self.armature * a) <= self.torque).all()
+            for q, v, a in zip(coarse, velocity, acceleration, strict=True)
+        )
+
+
+Movement: TypeAlias = Callable[[float], Array]
+"""From a duration, in [s], to positions at its ticks, shape (ticks, joints), in [rad]."""
+
+
+def reach(arm: Arm, motion: Reach, rng: np.random.Generator, duration: float) -> ReachPlan:
+    """Plan of movements, one after the other."""
+    if motion.kind not in KINDS:
+        raise ScenarioError(
+            f"motion of kind {motion.kind!r} is unknown; there are {', '.join(KINDS)}"
+        )
+    ability = Ability.of(arm)
+    moving, stopping, loading = rng.spawn(3)
+    parts = [np.tile(ability.rest, (round(motion.stand / TICK), 1))]
+    ticks = round(duration / TICK)
+    while sum(map(len, parts)) < ticks:
+        parts += [_movement(motion, moving, ability, parts[-1][-1])]
+        pause = moving.uniform(*(LONG if moving.uniform() < LONG_PAUSES else motion.pause))
+        parts += [np.tile(parts[-1][-1], (round(pause / TICK), 1))]
+    joints, stops = _stopped(motion, stopping, np.concatenate(parts), ticks)
+    return ReachPlan(
+        joints=joints,
+        places=np.array([[ability.tool.place(position)] for position in joints]),
+        effectors=arm.effectors,
+        torques=arm.drives.torque,
+        payloads=_payloads(motion, loading, arm.tool, arm.units, duration),
+        units=arm.units,
+        stops=stops,
+        foreseen=motion.kind != "teleoperation",
+    )
+
+
+def _movement(motion: Reach, rng: np.random.Generator, ability: Ability, start: Array) -> Array:
+    """A movement at the drawn speed, or as fast as the drives can follow."""
+    speed = float(np.exp(rng.uniform(np.log(motion.speed[0]), np.log(motion.speed[1]))))
+    movement, extent = KINDS[motion.kind](motion, rng, ability, start)
+    duration = max(extent / speed, SHORTEST)
+    average = 60 if motion.kind == "teleoperation" else 20  # longer than what is sent is apart
+    for _ in range(40):
+        positions = movement(duration)
+        velocity = np.abs(np.diff(positions, axis=0)).max(initial=0.0) / TICK
+        if velocity <= 1.05 * speed and ability.feasible(positions, motion.acceleration, average):
+            return positions
+        duration *= max(SLOWER if velocity <= 1.05 * speed else velocity / speed, 1.05)
+    raise ScenarioError("no drive is strong enough for the motion, however slow it is")
+
+
+def _goal(motion: Reach, rng: np.random.Generator, ability: Ability) -> Array:
+    """Positions around those at rest, within limits; some joints stay there."""
+    count = len(ability.rest)
+    away = rng.uniform(-motion.spread, motion.spread, count) * (rng.uniform(size=count) < 0.8)
+    return np.asarray(np.clip(ability.rest + away, ability.low, ability.high))
+
+
+def _straight(
+    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
+) -> tuple[Movement, float]:
+    goal = _goal(motion, rng, ability)
+
+    def movement(duration: float) -> Array:
+        share = minimum_jerk(_shares(duration))
+        return start + share[:, None] * (goal - start)
+
+    return movement, 1.875 * float(np.abs(goal - start).max())
+
+
+def _trapezoid(
+    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
+) -> tuple[Movement, float]:
+    """Constant acceleration, speed, and deceleration: jerk is not finite."""
+    goal, ramp = _goal(motion, rng, ability), float(rng.uniform(0.1, 0.4))
+
+    def movement(duration: float) -> Array:
+        share, top = _shares(duration), 1 / (1 - ramp)
+        up = top * share**2 / (2 * ramp)
+        down = 1 - top * (1 - share) ** 2 / (2 * ramp)
+        middle = top * (share - ramp / 2)
+        path = np.where(share < ramp, up, np.where(share > 1 - ramp, down, middle))
+        return start + path[:, None] * (goal - start)
+
+    return movement, float(np.abs(goal - start).max()) / (1 - ramp)
+
+
+def _spline(
+    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
+) -> tuple[Movement, float]:
+    """Through way points without a stop."""
+    points = np.array([start, *(_goal(motion, rng, ability) for _ in range(rng.integers(3, 6)))])
+    lengths = np.abs(np.diff(points, axis=0)).max(axis=1) + 0.05
+    knots = np.concatenate(([0.0], np.cumsum(lengths))) / lengths.sum()
+    for shrink in (1.0, 0.7, 0.4, 0.1):  # splines overshoot; into the margin they may
+        path = CubicSpline(knots, start + shrink * (points - start), bc_type="clamped")
+        fine = path(np.linspace(0, 1, 500))
+        if (fine >= ability.low - OVER).all() and (fine <= ability.high + OVER).all():
+            break
+
+    def movement(duration: float) -> Array:
+        return np.asarray(path(_shares(duration)))
+
+    return movement, float(np.abs(path(np.linspace(0, 1, 500), 1)).max())
+
+
+def _sines(
+    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
+) -> tuple[Movement, float]:
+    """Sums of sines, faded in and out; slower ones are larger."""
+    count = len(start)
+    rates = 2 * np.pi * np.exp(rng.uniform(np.log(SINES[0]), np.log(SINES[1]), (3, count)))
+    phases = rng.uniform(0, 2 * np.pi, (3, count))
+    seconds = float(rng.uniform(3.0, 6.0))
+    sizes = motion.spread / 3 * np.minimum(1, 2 / rates) * (rng.uniform(size=count) < 0.8)
+
+    def movement(duration: float) -> Array:
+        moments = seconds * _shares(duration)[:, None, None]
+        waves = (sizes * (np.sin(rates * moments + phases))).sum(axis=1)
+        envelope = minimum_jerk(np.clip(np.minimum(moments, seconds - moments)[:, 0], 0, 1))
+        return _bounded(start + envelope * waves, start, ability)
+
+    return movement, seconds * float((sizes * rates).sum(axis=0).max()) * 0.7
+
+
+def _teleoperated(
+    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
+) -> tuple[Movement, float]:
+    """A hand that wanders and hesitates, sent at a low rate and interpolated linearly."""
+    count = len(start)
+    seconds, rate = float(rng.uniform(2.0, 5.0)), float(rng.uniform(*SENDING))
+    fine = round(seconds / TICK)
+    bandwidth, mind = (1 / (2 * np.pi * f * TICK) for f in (float(rng.uniform(*HAND)), 0.5))
+    wander = _wander(rng, (fine, count), bandwidth) * (rng.uniform(size=count) < 0.8)
+    pace = np.clip(0.8 + _wander(rng, (fine, 1), mind)[:, 0], 0.02, 1.0)  # 0.02: it hesitates
+    ticks, moved = np.arange(fine), np.cumsum(pace)
+    wander = np.column_stack([np.interp(moved, ticks, way) for way in wander.T])
+    away = minimum_jerk(np.clip(np.minimum(ticks, fine - 1 - ticks) * TICK / 0.7, 0, 1))
+    wander *= away[:, None] * motion.spread / 2
+
+    def movement(duration: float) -> Array:
+        sent = np.append(np.arange(0, 1, 1 / (rate * duration)), 1.0)
+        hand = [np.interp(sent * (fine - 1), ticks, way) for way in wander.T]
+        path = np.column_stack([np.interp(_shares(duration), sent, way) for way in hand])
+        return _bounded(start + path, start, ability)
+
+    return movement, float(np.abs(np.diff(wander, axis=0)).max()) * fine
+
+
+KINDS = {
+    "minimum-jerk": _straight,
+    "trapezoid": _trapezoid,
+    "spline": _spline,
+    "sines": _sines,
+    "teleoperation": _teleoperated,
+}
+"""Movements by the kind of motion: each with the product of its highest speed and duration."""
+
+
+def _shares(duration: float) -> Array:
+    """Time from 0 to 1 at the ticks of a movement, its last tick at 1."""
+    ticks = max(round(duration / TICK), 2)
+    return np.arange(1, ticks + 1) / ticks
+
+
+def _bounded(path: Array, start: Array, ability: Ability) -> Array:
+    """Path around its start, drawn together where it would exceed a limit."""
+    away = path - start
+    room = np.where(away > 0, ability.high - start, start - ability.low) + OVER
+    excess = np.abs(away).max(axis=0) / room.min(axis=0)
+    return np.asarray(start + away / np.maximum(excess, 1.0))
+
+
+def _wander(rng: np.random.Generator, shape: tuple[int, int], deviation: float) -> Array:
+    """Low-passed white noise of about unit amplitude; deviation of the filter in ticks."""
+    smooth = gaussian_filter1d(rng.normal(size=shape), deviation, axis=0, mode="wrap")
+    return np.asarray(smooth * np.sqrt(2 * np.sqrt(np.pi) * deviation))
+
+
+def _stopped(
+    motion: Reach, rng: np.random.Generator, joints: Array, ticks: int
+) -> tuple[Array, tuple[float, ...]]:
+    """The plan with emergency stops: its pace drops to 0 and comes back."""
+    pace, stops, now = np.ones(ticks), [], 0.0
+    while motion.stops:
+        now += float(rng.exponential(1 / motion.stops)) + 0.5
+        braking, halted = float(rng.uniform(*BRAKING)), float(rng.uniform(*HALTED))
+        if now >= ticks * TICK:
+            break
+        stops.append(now)
+        time = times(ticks, TICK) - now
+        now += braking + halted + RESUMING
+        resumed = minimum_jerk(np.clip((time - braking - halted) / RESUMING, 0, 1))
+        pace *= np.where(time < braking, 1 - np.clip(time / braking, 0, 1), resumed)
+    if not stops:
+        return joints[:ticks], ()
+    moments = np.cumsum(pace) - pace[0]
+    return np.asarray(CubicSpline(np.arange(len(joints)), joints)(moments)), tuple(stops)
+
+
+def _payloads(
+    motion: Reach, rng: np.random.Generator, tool: Tip, units: Units, duration: float
+) -> tuple[Payload, ...]:
+    """What the tool carries from time to time."""
+    payloads, now = [], float(rng.uniform(*CARRYING))
+    while motion.payload[1] and now < duration:
+        mass = units.force * float(rng.uniform(*motion.payload))
+        stop, rise = now + float(rng.uniform(*CARRYING)), float(rng.uniform(*GRASPING))
+        payloads.append(Payload(frame=tool.frame, start=now, stop=stop, mass=mass, rise=rise))
+        now = stop + rise + float(rng.uniform(*CARRYING))
+    return tuple(payloads)
+
+
+DAMPING = 1e-3  # of the inverse Jacobian, in [m²]
+
+
+class JointControl:
+    """Follows planned joint positions, moved by a shift of the tip, with the model's torque."""
+
+    def __init__(self, tool: Tool, joints: Array, shift: Array, *, fastest: float) -> None:
+        self._tool = tool
+        self._planned = np.gradient(joints, TICK, axis=0)
+        joints = joints.copy()
+        for tick in np.flatnonzero(shift.any(axis=1)):
+            joints[tick] += self._inverse(joints[tick]) @ shift[tick]
+        self._position = joints
+        self._velocity = np.gradient(joints, TICK, axis=0)
+        self._acceleration = np.clip(np.gradient(self._velocity, TICK, axis=0), -fastest, fastest)
+
+    def tick(self, number: int, sensors: Array) -> Reference:
+        """Advance by one tick; the sensors have no effect."""
+        here, end = self._position[number], min(number + 1, len(self._position) - 1)
+        return Reference(
+            position=self._position[end],
+            velocity=self._velocity[end],
+            planned=self._planned[end],
+            torque=self._tool.torque(here, self._velocity[number], self._acceleration[number]),
+            lift=self._inverse(here)[None, :, 2],
+        )
+
+    def _inverse(self, joints: Array) -> Array:
+        """Damped inverse Jacobian of the tip's place, shape (joints, 3), in [rad/m]."""
+        *_, jacobian = self._tool.jacobian(joints)
+        place = jacobian[:3]
+        return np.asarray(place.T @ np.linalg.inv(place @ place.T + DAMPING * np.eye(3)))
+
 
 NEAR = 0.002  # height over the table at which force control starts, in [m]
 
