@@ -2,12 +2,16 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from inspector.commands.shared import ModelFiles, Overwrite, RunFile, argument, opened, option
 from inspector.errors import EXIT, OUTPUT_LOST, Status, worst
+
+if TYPE_CHECKING:
+    from inspector.library import Library
+    from noisemodel import Run
 
 
 def import_(
@@ -97,32 +101,18 @@ def export(
     CSV and Parquet; annotation tools and spreadsheets read label files.
     """
     from inspector.library import load_library
-    from inspector.text import counted
     from noisemodel.files import refuse_existing
 
     if labels and annotate:
         raise typer.BadParameter("name one of --labels and --annotate")
     refuse_existing(output, overwrite=overwrite)
     if annotate:
-        from inspector.export.labels import read_labels
-
-        recorded = opened(run, ctx.obj).run
-        blocks = read_labels(annotate, recorded)
-        replace(recorded, blocks=blocks).save(output, overwrite=overwrite)
-        typer.echo(f"{output}: {counted(len(blocks), 'label')}")
+        _annotate(opened(run, ctx.obj).run, annotate, output, overwrite=overwrite)
         return
     library = load_library(model)
     recorded = opened(run, ctx.obj).run
     if labels:
-        from inspector.analysis import analyse
-        from inspector.export.labels import write_labels
-
-        found = labels == "findings"
-        spans = analyse(recorded, library).findings if found else recorded.blocks
-        write_labels(spans, output, overwrite=overwrite)
-        for each in spans:
-            typer.echo(f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s")
-        typer.echo(f"{output}: {counted(len(spans), 'label')}")
+        _labels(recorded, library, labels, output, overwrite=overwrite)
         return
     from inspector.export.tables import LAYOUTS
     from inspector.export.tables import export as write
@@ -134,3 +124,26 @@ def export(
     typer.echo(f"{output}: {written}")
     if layouts:
         typer.echo(f"  layouts: {', '.join(str(output.with_suffix(each)) for each in LAYOUTS)}")
+
+
+def _annotate(run: "Run", labels: Path, output: Path, *, overwrite: bool) -> None:
+    """Write a run with the labels of a file."""
+    from inspector.export.labels import read_labels
+    from inspector.text import counted
+
+    blocks = read_labels(labels, run)
+    replace(run, blocks=blocks).save(output, overwrite=overwrite)
+    typer.echo(f"{output}: {counted(len(blocks), 'label')}")
+
+
+def _labels(run: "Run", library: "Library", kind: str, output: Path, *, overwrite: bool) -> None:
+    """Write the findings of a run, or its annotated blocks, as a label file."""
+    from inspector.analysis import analyse
+    from inspector.export.labels import write_labels
+    from inspector.text import counted
+
+    spans = analyse(run, library).findings if kind == "findings" else run.blocks
+    write_labels(spans, output, overwrite=overwrite)
+    for each in spans:
+        typer.echo(f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s")
+    typer.echo(f"{output}: {counted(len(spans), 'label')}")

@@ -47,37 +47,49 @@ def train(
     typer.echo(f"{output}: written; the measures above are of the training frames")
 
 
+# Options of tune, which has too many to be read between its name and what it does.
+Validation = Annotated[
+    list[Path] | None, option("Runs of a validation set, instead of folds; repeatable.")
+]
+Folds = Annotated[int | None, option("Folds of the cross-validation.", min=2, show_default="5")]
+ProfileName = Annotated[
+    str,
+    option(
+        "joints, norms, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
+        " paper-linear."
+    ),
+]
+Grid = Annotated[
+    list[str] | None,
+    option(
+        "paper, or a setting and its values: stride=224:1024:100, C=0.1:1000:x10,"
+        " gamma=1e-4,1e-3, bands=comb,adjacent; repeatable.",
+        show_default="paper",
+    ),
+]
+GridPicture = Annotated[
+    Path | None,
+    option(
+        "Draw the accuracy along each setting around the best point, as PNG (needs the"
+        " extra `report`)."
+    ),
+]
+
+
 def tune(
     training: Inputs,
     output: Annotated[
         Path,
         option("Results file, one line of JSON per point; resumes if it exists.", "--output", "-o"),
     ],
-    validation: Annotated[
-        list[Path] | None, option("Runs of a validation set, instead of folds; repeatable.")
-    ] = None,
-    folds: Annotated[
-        int | None, option("Folds of the cross-validation.", min=2, show_default="5")
-    ] = None,
+    validation: Validation = None,
+    folds: Folds = None,
     part: InPart = "all",
-    profile: Annotated[
-        str,
-        option(
-            "joints, norms, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
-            " paper-linear."
-        ),
-    ] = "noisytest-rbf",
+    profile: ProfileName = "noisytest-rbf",
     rate: Annotated[
         float, option("Rate of the model in [Hz]; faster runs are decimated.", min=1.0)
     ] = 10000.0,
-    grid: Annotated[
-        list[str] | None,
-        option(
-            "paper, or a setting and its values: stride=224:1024:100, C=0.1:1000:x10,"
-            " gamma=1e-4,1e-3, bands=comb,adjacent; repeatable.",
-            show_default="paper",
-        ),
-    ] = None,
+    grid: Grid = None,
     criterion: Annotated[
         Literal["balanced-accuracy", "log-loss", "subset-accuracy"],
         option("Ranks the points; the log-loss breaks ties."),
@@ -85,13 +97,7 @@ def tune(
     train: Annotated[
         Path | None, option("Train the best point on all training runs, write the model.")
     ] = None,
-    picture: Annotated[
-        Path | None,
-        option(
-            "Draw the accuracy along each setting around the best point, as PNG (needs the"
-            " extra `report`)."
-        ),
-    ] = None,
+    picture: GridPicture = None,
     rows: Annotated[int, option("Number of points to print.", min=1)] = 10,
     as_json: AsJson = False,
     jobs: NumberOfJobs = 1,

@@ -403,34 +403,14 @@ def synchronise(
     main_time = clocks[id(main.stamps)].time
     if all(np.array_equal(stamps.time, main_time) for stamps in own):
         return clocked, "", {}
-    drift, said = 0.0, ""
     if offset is not None:
-        seconds, said = offset, f"offset {offset:+g} s, as given"
+        seconds, drift, said = offset, 0.0, f"offset {offset:+g} s, as given"
     else:
-        found = _estimate(
-            {track.signal: track for track in reversed(clocked) if not track.is_desired},
-            {track.quantity: track for track in reversed(clocked) if track.stamps in own},
-        )
         overlap = own[0].time[0] <= main_time[-1] and main_time[0] <= own[0].time[-1]
-        problem = f"{no_overlap(others[0], main.stamps)}, and "
-        if found is None and not overlap:
-            raise LogError(path, f"{problem}no joint moves in both; {HOW}")
-        if found is None:
-            return clocked, "", {}
-        seconds, drift, correlation, next_best = found
-        said = (
-            f"offset {seconds:+.4f} s{f', drift {drift * 1e6:+.0f} ppm' if drift else ''}"
-            f" (correlation {correlation:.2f}, next best {next_best:.2f})"
-        )
-        if correlation < CORRELATION or next_best > NEXT_BEST * correlation:
-            unknown = f"the offset cannot be estimated ({said}; {EXPECTED})"
-            if not overlap:
-                raise LogError(path, f"{problem}{unknown}; {HOW}")
-            assumed = "its clock is assumed to be the measured one's, since"
-            return clocked, f"{assumed} {unknown}; {HOW}", {}
-        if not drift and abs(seconds) <= LAG:
-            return clocked, f"{said}: a controller's lag, the stamps are not changed", {}
-        said += ": its stamps are shifted by that"
+        apart = "" if overlap else f"{no_overlap(others[0], main.stamps)}, and "
+        seconds, drift, said = _estimated(path, clocked, own, apart)
+        if seconds == drift == 0.0:
+            return clocked, said, {}
     first = min(float(stamps.time[0]) for stamps in own)
     moved = {
         id(each): replace(each, time=each.time + seconds + drift * (each.time - first))
@@ -438,6 +418,37 @@ def synchronise(
     }
     shifted = (replace(t, stamps=moved.get(id(t.stamps), t.stamps)) for t in clocked)
     return tuple(shifted), said, {"seconds": seconds, "drift": drift}
+
+
+def _estimated(
+    path: Path, tracks: Sequence[Track], own: Sequence[Stamps], apart: str
+) -> tuple[float, float, str]:
+    """Offset and drift of the desired clock, 0 if it stays, and a remark.
+
+    Clocks that do not overlap (``apart`` says so) have to be moved.
+    """
+    found = _estimate(
+        {track.signal: track for track in reversed(tracks) if not track.is_desired},
+        {track.quantity: track for track in reversed(tracks) if track.stamps in own},
+    )
+    if found is None and apart:
+        raise LogError(path, f"{apart}no joint moves in both; {HOW}")
+    if found is None:
+        return 0.0, 0.0, ""
+    seconds, drift, correlation, next_best = found
+    said = (
+        f"offset {seconds:+.4f} s{f', drift {drift * 1e6:+.0f} ppm' if drift else ''}"
+        f" (correlation {correlation:.2f}, next best {next_best:.2f})"
+    )
+    if correlation < CORRELATION or next_best > NEXT_BEST * correlation:
+        unknown = f"the offset cannot be estimated ({said}; {EXPECTED})"
+        if apart:
+            raise LogError(path, f"{apart}{unknown}; {HOW}")
+        assumed = "its clock is assumed to be the measured one's, since"
+        return 0.0, 0.0, f"{assumed} {unknown}; {HOW}"
+    if not drift and abs(seconds) <= LAG:
+        return 0.0, 0.0, f"{said}: a controller's lag, the stamps are not changed"
+    return seconds, drift, f"{said}: its stamps are shifted by that"
 
 
 def no_overlap(desired: Stamps, measured: Stamps) -> str:
