@@ -136,13 +136,9 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
         run = nm.decimated(run, rate)
         left = f"nothing above {rate / 2:g} Hz is left"
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}: {left}."
-    start = float(run.time[0])
-    lasting = nc.Lasting(run.rate, start=start)
-    bursts = nc.Bursts(run.rate, start=start, whole=True)
-    watched = _watched(run, lasting, bursts)
-    labels = classifier.classify_pieces(watched, run.rate, start=start, whole=True)
-    lasting.finish()
-    bursts.finish()
+    lasting, bursts = _line_detectors(run)
+    pieces = _watched(run, lasting, bursts)
+    labels = classifier.classify_pieces(pieces, run.rate, start=float(run.time[0]), whole=True)
     if not (lasting.examined or len(labels.events())) and nc.lasting.MEASURED in signal_names(run):
         raise CannotTellError(
             f"no stretch of {nc.lasting.SHORTEST:g} s without a gap, as it takes to tell what lasts"
@@ -158,27 +154,28 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
 
 def lines(run: nm.Run) -> tuple[tuple[nc.Event, ...], tuple[nc.Event, ...]]:
     """What lasts in a run, and its bursts."""
-    start = float(run.time[0])
-    lasting, bursts = (
-        nc.Lasting(run.rate, start=start),
-        nc.Bursts(run.rate, start=start, whole=True),
-    )
+    lasting, bursts = _line_detectors(run)
     for _ in _watched(run, lasting, bursts):
         pass
-    lasting.finish()
-    bursts.finish()
     return lasting.events, bursts.events
+
+
+def _line_detectors(run: nm.Run) -> tuple[nc.Lasting, nc.Bursts]:
+    start = float(run.time[0])
+    return nc.Lasting(run.rate, start=start), nc.Bursts(run.rate, start=start, whole=True)
 
 
 def _watched(
     run: nm.Run, lasting: nc.Lasting, bursts: nc.Bursts
 ) -> Iterator[tuple[dict[str, Real], Mask]]:
-    """Signals of a run piece by piece, which also goes to what looks for lines."""
+    """Signals of a run piece by piece, in which lines are looked for, too, up to the end."""
     for piece in pieces_of(run):
         signals = _signals(piece)
         lasting.push(signals, piece.mask)
         bursts.push(signals, piece.mask)
         yield signals, piece.mask
+    lasting.finish()
+    bursts.finish()
 
 
 def nearest(

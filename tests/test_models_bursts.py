@@ -121,5 +121,15 @@ def test_no_burst_touches_a_gap():
     """Lost samples are no silence."""
     velocity = with_tone(motion(), 90.0, 0.1, 4.0, 4.5)
     valid = np.ones(velocity.shape[1], dtype=bool)
+    assert found(velocity, valid=valid)
     valid[1990:2260] = False
     assert found(velocity, valid=valid) == ()
+
+
+@pytest.mark.parametrize("gap", [4.0, 4.05, 4.1])
+def test_a_tone_that_a_gap_parts_in_the_middle_is_found(gap):
+    """What comes just before a gap is no rest of what comes after it."""
+    velocity = with_tone(motion(), 90.0, 0.1, 3.7, 4.5)
+    valid = np.ones(velocity.shape[1], dtype=bool)
+    valid[round(gap * RATE) : round(gap * RATE) + 20] = False
+    assert found(velocity, valid=valid)

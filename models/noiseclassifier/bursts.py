@@ -118,7 +118,7 @@ class Bursts(Windows):
         self._recent.append(power)
 
     def _end(self, rest: Array) -> None:
-        self._recent.clear()
+        """Nothing ends: windows before a gap may have the same line as those after it."""
 
     def _event(self, line: Line, least: int) -> Event | None:
         """The finding that a line is, if there is enough of the rest of the run and it has less."""

@@ -15,6 +15,7 @@ oscillations. The ripple of a drive follows the speed of its joint from window t
 has no one frequency. Files and streams have the same windows, hence the same numbers.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -74,7 +75,7 @@ class Line:
         return self.windows >= WINDOWS or self.sharp >= SHARP
 
 
-class Windows:
+class Windows(ABC):
     """Cuts signals that come in chunks of any size into windows, none of which touches a gap.
 
     Args:
@@ -128,13 +129,13 @@ class Windows:
             self._samples = self._samples[..., self._hop :]
             self._first += self._hop
 
+    @abstractmethod
     def _window(self, samples: Array) -> None:
         """Take the next window of a stretch."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _end(self, rest: Array) -> None:
         """End a stretch, of which a rest is in no window or in earlier ones."""
-        raise NotImplementedError
 
 
 class Lasting(Windows):
