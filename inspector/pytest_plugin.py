@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from inspector.library import Library
     from inspector.reference.judging import Comparison
     from inspector.reference.store import Reference
-    from inspector.verdict import Verdict
+    from inspector.verdict import Finding, Verdict
     from noiseclassifier import Event
     from noisemodel import Run
 
@@ -250,7 +250,7 @@ class Noise:
         self,
         analysis: "Analysis",
         verdict: "Verdict",
-        events: "Sequence[Event]",
+        events: "Sequence[Finding]",
         comparison: "Comparison | None",
         shown: str,
     ) -> None:

@@ -22,13 +22,15 @@ from functools import cache, partial
 from itertools import zip_longest
 from pathlib import Path
 from time import monotonic, perf_counter, sleep
-from typing import IO, TYPE_CHECKING, Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import Analysis, analyse, analyse_noise
 from inspector.errors import EXIT, FileError, InspectorError, Status, Unknown, without_path, worst
 from inspector.library import Library
+from inspector.localisation.order import Order
+from inspector.localisation.stage import Localisation
 from inspector.logs.read import Reading, Source, open_source
 from inspector.text import program_version
 from noiseclassifier import Event
@@ -36,10 +38,6 @@ from noiseclassifier.jsontext import from_json, text_of
 from noisemodel import OutputError
 from noisemodel.files import also_reading
 from noisemodel.parallel import DIED, Jobs, as_done, in_order
-
-if TYPE_CHECKING:
-    from inspector.localisation.order import Order
-    from inspector.localisation.stage import Localisation
 
 EXPECTED = (InspectorError, nc.ModelsError, nm.NoiseModelError)
 """The errors that are printed in one line; all others are bugs."""
@@ -81,26 +79,9 @@ class Ruling(StrEnum):
     FILTERED = "filtered"
     AS_REFERENCE = "as-reference"
 
-    @property
-    def fails(self) -> bool:
-        """Whether it fails its run."""
-        return self in (Ruling.FOUND, Ruling.FORBIDDEN, Ruling.EXPIRED, Ruling.OVER_BUDGET)
 
-
-@dataclass(frozen=True)
-class Ruled:
-    """What became of a finding, and why, in a few words."""
-
-    ruling: Ruling = Ruling.FOUND
-    reason: str = ""
-
-    def __str__(self) -> str:
-        if self.ruling is Ruling.FOUND:
-            return self.reason
-        words = self.ruling.value.replace("-", " ")
-        return f"{words}: {self.reason}" if self.reason else words
-
-
+FAILING = (Ruling.FOUND, Ruling.FORBIDDEN, Ruling.EXPIRED, Ruling.OVER_BUDGET)
+"""Those that fail a run."""
 LOG, END = "log of ", "end of the run"
 """What a scenario without logs, and a run that is cut, lack."""
 
@@ -191,6 +172,87 @@ def _pair(band: Any) -> tuple[float, float] | None:
     return (float(band[0]), float(band[1])) if band else None
 
 
+GENERAL = Evidence("general")
+
+
+@dataclass(frozen=True)
+class Finding(Event):
+    """An event of a run, where it comes from, what it is known by, and what became of it."""
+
+    localisation: Localisation | None = None
+    order: Order | None = None
+    evidence: Evidence = GENERAL
+    ruling: Ruling = Ruling.FOUND
+    reason: str = ""  # of the ruling, in a few words
+
+    @classmethod
+    def of(cls, event: Event, **known: Any) -> "Finding":
+        """Take an event, and add what is known of it."""
+        return cls(**vars(event) | known)
+
+    @property
+    def fails(self) -> bool:
+        """Whether it fails its run."""
+        return self.ruling in FAILING
+
+    @property
+    def became(self) -> str:
+        """What became of it, and why; empty if it was simply found."""
+        words = "" if self.ruling is Ruling.FOUND else self.ruling.value.replace("-", " ")
+        return ": ".join(filter(None, [words, self.reason]))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The finding as JSON can hold it."""
+        known, of = self.localisation, self.order
+        written: dict[str, Any] = {
+            "label": self.label,
+            "start": round(self.start, 6),
+            "stop": round(self.stop, 6),
+            "score": round(self.score, 6),
+            "novel": self.novel,
+            "order": of and {"joint": of.joint, "periods_per_turn": round(of.periods_per_turn, 1)},
+            "fails": self.fails,
+            "ruling": self.ruling.value,
+            "reason": self.reason,
+            "evidence": self.evidence.as_dict(),
+        }
+        if known is not None:
+            written["localisation"] = {
+                "stage": known.stage or None,
+                "following": known.following or None,
+                "lag": round(known.lag, 6) if known.stage else None,
+                "joints": {name: round(share, 3) for name, share in known.joints},
+                "band": known.band and [round(frequency, 3) for frequency in known.band],
+            }
+        return written
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Finding":
+        """Read what `as_dict` wrote."""
+        start, stop, score = (float(content[name]) for name in ("start", "stop", "score"))
+        order, known = content["order"], content.get("localisation")
+        return cls(
+            str(content["label"]),
+            start,
+            stop,
+            score,
+            bool(content["novel"]),
+            None
+            if known is None
+            else Localisation(
+                str(known["stage"] or ""),
+                str(known["following"] or ""),
+                float(known["lag"] or 0.0),
+                joints=tuple((str(name), float(share)) for name, share in known["joints"].items()),
+                band=_pair(known["band"]),
+            ),
+            None if order is None else Order(str(order["joint"]), float(order["periods_per_turn"])),
+            Evidence.from_dict(content["evidence"]),
+            Ruling(content["ruling"]),
+            str(content["reason"]),
+        )
+
+
 @dataclass(frozen=True)
 class Beside:
     """How a run compares with its reference, named as in JSON; see `inspector.reference`."""
@@ -223,12 +285,10 @@ class Verdict:
     path: Path
     status: Status
     model: str = ""  # that labelled
-    events: tuple[Event, ...] = ()  # findings, in order
+    events: tuple[Finding, ...] = ()  # in order
     message: str = ""
-    localisations: Mapping[Event, "Localisation"] = field(default_factory=dict)
     unknown: Unknown = Unknown.FINDING
     model_sha256: str = ""  # of its file
-    orders: Mapping[Event, "Order"] = field(default_factory=dict)
     beside: Beside | None = None
     assumed: str = ""  # when its log was read, in a line
     scenario: str = ""  # that the run names
@@ -236,7 +296,6 @@ class Verdict:
     rate: float = 0.0  # [Hz]
     joints: int = 0
     seconds: float = 0.0  # that it took to classify it
-    rulings: Mapping[Event, Ruled] = field(default_factory=dict)  # of those not simply found
     missing: tuple[Missing, ...] = ()
     expectations: str = ""  # the store that was applied
     ignored: bool = False  # in the exit status: bad input
@@ -245,26 +304,21 @@ class Verdict:
     lost: tuple[str, ...] = ()  # outputs that could not be written, a sentence each
     trace: str = ""  # of an internal error
     begin: float = 0.0  # time of the first sample, in [s]
-    evidence: Mapping[Event, Evidence] = field(default_factory=dict)  # beside a reference
 
     @property
     def of_run(self) -> bool:
         """Whether it is on a run; if not, on a file of expectations that requires missing logs."""
         return str(self.path) != self.expectations
 
-    def ruled(self, event: Event) -> Ruled:
-        """Give what became of a finding."""
-        return self.rulings.get(event, Ruled())
-
     @property
-    def failing(self) -> tuple[Event, ...]:
+    def failing(self) -> tuple[Finding, ...]:
         """Findings that fail the run."""
-        return tuple(event for event in self.events if self.ruled(event).ruling.fails)
+        return tuple(event for event in self.events if event.fails)
 
     @property
-    def excused(self) -> tuple[Event, ...]:
+    def excused(self) -> tuple[Finding, ...]:
         """Findings that do not: expected, waived, in a budget, or filtered."""
-        return tuple(event for event in self.events if not self.ruled(event).ruling.fails)
+        return tuple(event for event in self.events if not event.fails)
 
     @property
     def severity(self) -> tuple[int, int, float]:
@@ -276,18 +330,22 @@ class Verdict:
     @classmethod
     def of(cls, path: Path, analysis: Analysis) -> "Verdict":
         """Take from an analysis of a file what is printed."""
-        known = analysis.localisations if analysis.findings else {}
         run = analysis.run
         return cls(
             path,
             analysis.status,
             analysis.model,
-            analysis.findings,
+            tuple(
+                Finding.of(
+                    event,
+                    localisation=analysis.localisations.get(event),
+                    order=analysis.orders.get(event),
+                )
+                for event in analysis.findings
+            ),
             analysis.message,
-            {event: known[event] for event in analysis.findings if event in known},
             analysis.unknown,
             analysis.model_sha256,
-            analysis.orders,
             assumed=analysis.assumed,
             scenario=str(run.meta.get("scenario", "")),
             duration=run.duration,
@@ -304,7 +362,7 @@ class Verdict:
             "model_sha256": self.model_sha256,
             "status": self.status.value,
             "unknown": self.unknown.value,
-            "events": [self._event_as_dict(event) for event in self.events],
+            "events": [event.as_dict() for event in self.events],
             "missing": [
                 {
                     "label": missing.label,
@@ -328,57 +386,9 @@ class Verdict:
             "picture": None if self.picture is None else str(self.picture),
         }
 
-    def _event_as_dict(self, event: Event) -> dict[str, Any]:
-        ruled, known, of = self.ruled(event), self.localisations.get(event), self.orders.get(event)
-        order = of and {"joint": of.joint, "periods_per_turn": round(of.periods_per_turn, 1)}
-        written: dict[str, Any] = {
-            "label": event.label,
-            "start": round(event.start, 6),
-            "stop": round(event.stop, 6),
-            "score": round(event.score, 6),
-            "novel": event.novel,
-            "order": order,
-            "fails": ruled.ruling.fails,
-            "ruling": ruled.ruling.value,
-            "reason": ruled.reason,
-            "evidence": self.evidence.get(event, Evidence("general")).as_dict(),
-        }
-        if known is not None:
-            written["localisation"] = {
-                "stage": known.stage or None,
-                "following": known.following or None,
-                "lag": round(known.lag, 6) if known.stage else None,
-                "joints": {name: round(share, 3) for name, share in known.joints},
-                "band": known.band and [round(frequency, 3) for frequency in known.band],
-            }
-        return written
-
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Verdict":
         """Read what `as_dict` wrote."""
-        from inspector.localisation.order import Order
-        from inspector.localisation.stage import Localisation
-
-        events, rulings, known, orders, evidence = [], {}, {}, {}, {}
-        for row in content["events"]:
-            start, stop, score = (float(row[name]) for name in ("start", "stop", "score"))
-            event = Event(str(row["label"]), start, stop, score, bool(row["novel"]))
-            events.append(event)
-            if (ruled := Ruled(Ruling(row["ruling"]), str(row["reason"]))) != Ruled():
-                rulings[event] = ruled
-            if order := row["order"]:
-                orders[event] = Order(str(order["joint"]), float(order["periods_per_turn"]))
-            if (by := Evidence.from_dict(row["evidence"])) != Evidence("general"):
-                evidence[event] = by
-            if "localisation" in row:
-                found = row["localisation"]
-                known[event] = Localisation(
-                    str(found["stage"] or ""),
-                    str(found["following"] or ""),
-                    float(found["lag"] or 0.0),
-                    joints=tuple((str(k), float(v)) for k, v in found["joints"].items()),
-                    band=_pair(found["band"]),
-                )
         missing = tuple(
             Missing(str(each["label"]), each["start"], each["stop"], str(each["reason"]))
             for each in content["missing"]
@@ -392,13 +402,9 @@ class Verdict:
         return cls(
             Path(content["run"]),
             Status(content["status"]),
-            events=tuple(events),
-            localisations=known,
+            events=tuple(map(Finding.from_dict, content["events"])),
             unknown=Unknown(content["unknown"]),
-            orders=orders,
-            evidence=evidence,
             beside=Beside.from_dict(content["reference"]) if content.get("reference") else None,
-            rulings=rulings,
             missing=missing,
             joints=int(content["joints"]),
             ignored=not content["counted"],
@@ -563,8 +569,8 @@ def counts(verdicts: Iterable[Verdict]) -> dict[str, dict[str, int]]:
         runs[verdict.status.value] += verdict.of_run
         found["failing"] += len(verdict.failing)
         found["missing"] += len(verdict.missing)
-        found.update(verdict.ruled(event).ruling.value for event in verdict.excused)
-    excuses = [each.value for each in Ruling if not each.fails]
+        found.update(event.ruling.value for event in verdict.excused)
+    excuses = [each.value for each in Ruling if each not in FAILING]
     return {
         "runs": {status.value: runs[status.value] for status in EXIT},
         "findings": {name: found[name] for name in ("failing", "missing", *excuses)},

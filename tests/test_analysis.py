@@ -409,10 +409,11 @@ def test_a_verdict_has_localisations_where_they_are_asked_for():
     (blow, *_) = found.findings
     found.__dict__["localisations"] = {blow: "there", other: "elsewhere"}
     path = Path("run.npz")
-    assert Verdict.of(path, found).localisations == {blow: "there"}
+    first, second = Verdict.of(path, found).events
+    assert (first.localisation, second.localisation) == ("there", None)
     assert Verdict.of(path, found).begin == 0.0
     calm = analysed("....")
-    assert Verdict.of(path, calm).localisations == {}
+    assert Verdict.of(path, calm).events == ()
     assert "localisations" not in calm.__dict__  # which takes time
 
 

@@ -22,8 +22,7 @@ from inspector.localisation.stage import Localisation
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.read import Reading, Source, open_source
 from inspector.text import program_version
-from inspector.verdict import Evidence, StateError, Verdict, classify_files, digest, kept
-from noiseclassifier import Event
+from inspector.verdict import Evidence, Finding, StateError, Verdict, classify_files, digest, kept
 from noisemodel import OutputError
 
 ROOT = Path(__file__).parents[1]
@@ -222,19 +221,18 @@ def test_a_state_of_other_types_is_damaged(tmp_path, change):
 
 
 def verdict_of(name, **more):
-    blow, rattle = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
     found = Localisation("measured", "desired", 0.01, joints=(("a", 0.7), ("b", 0.3)), band=(9, 30))
-    jump = Localisation()
+    known = Evidence("repetitions", 24.0, 1.1, "a", "velocity", (16.0, 32.0), -20.0)
+    blow = Finding("impact", 1.0, 1.5, 0.9, False, Localisation(), evidence=known)
+    rattle = Finding("oscillations", 2.0, 3.0, 0.8, True, found, Order("b", 3.0))
     return Verdict(
         Path(name),
         Status.FINDINGS,
         "general",
         (blow, rattle),
         "a message",
-        {rattle: found, blow: jump},
         Unknown.IGNORE,
         "f" * 64,
-        {rattle: Order("b", 3.0)},
         assumed="assumed",
         scenario="walk",
         duration=4.5,
@@ -244,7 +242,6 @@ def verdict_of(name, **more):
         picture=Path("picture.png"),
         lost=("a sentence",),
         begin=1.5,
-        evidence={blow: Evidence("repetitions", 24.0, 1.1, "a", "velocity", (16.0, 32.0), -20.0)},
         **more,
     )
 

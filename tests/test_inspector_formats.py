@@ -9,11 +9,10 @@ import pytest
 from inspector.errors import Status, Unknown
 from inspector.localisation.stage import Localisation
 from inspector.report.formats import ANNOTATIONS, COMMENT, FORMATS, MARKER, as_json, sarif, text
-from inspector.verdict import Evidence, Missing, Ruled, Ruling, Verdict, exit_status
-from noiseclassifier import Event
+from inspector.verdict import Evidence, Finding, Missing, Ruling, Verdict, exit_status
 
 github, junit, markdown = (FORMATS[name] for name in ("github", "junit", "markdown"))
-BLOW, RATTLE = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
+BLOW, RATTLE = Finding("impact", 1.0, 1.5, 0.9), Finding("oscillations", 2.0, 3.0, 0.8, novel=True)
 QUIET = Verdict(Path("quiet.npz"), Status.OK, "general")
 LOUD = Verdict(
     Path("loud.npz"),
@@ -31,7 +30,10 @@ EXPECTED = replace(
     LOUD,
     path=Path("expected.npz"),
     status=Status.OK,
-    rulings={BLOW: Ruled(Ruling.ALLOWED, "the pick"), RATTLE: Ruled(Ruling.WAIVED, "ticket 1")},
+    events=(
+        replace(BLOW, ruling=Ruling.ALLOWED, reason="the pick"),
+        replace(RATTLE, ruling=Ruling.WAIVED, reason="ticket 1"),
+    ),
     expectations="expect.toml",
 )
 LACKING = Verdict(
@@ -70,8 +72,7 @@ def test_text_has_a_line_for_each_finding_and_says_what_to_type():
     louder = Evidence("repetitions", 24.3, 5.6, "wrist_1", "velocity", (22.0, 45.0))
     run = replace(
         LOUD,
-        localisations={BLOW: located},
-        evidence={BLOW: louder},
+        events=(replace(BLOW, localisation=located, evidence=louder), RATTLE),
         duration=20.0,
         rate=500.0,
         joints=6,
@@ -140,7 +141,7 @@ def test_findings_of_repetitions_are_apart_by_class_time_and_ruling():
     for event in two:
         pair = [one[0], replace(one[1], events=(event,))]
         assert text(pair).count("1 of 2 runs") == 2
-    ruled = replace(one[1], rulings={BLOW: Ruled(Ruling.FORBIDDEN, "never")})
+    ruled = replace(one[1], events=(replace(BLOW, ruling=Ruling.FORBIDDEN, reason="never"),))
     assert text([one[0], ruled]).count("1 of 2 runs") == 2
     twice = replace(one[0], events=(BLOW, replace(BLOW, start=1.1)))
     assert text([twice, one[1]]).count("impact") == 2
@@ -188,8 +189,9 @@ def test_json_fits_its_published_schema():
     schema = json.loads(SCHEMA.read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     joints = (("knee", 0.75), ("hip", 0.25))
-    known = {BLOW: Localisation("desired", "measured", 0.002, joints=joints, band=(85.0, 130.0))}
-    localised = replace(LOUD, localisations=known, picture=Path("report/pictures/loud.png"))
+    known = Localisation("desired", "measured", 0.002, joints=joints, band=(85.0, 130.0))
+    events = (replace(BLOW, localisation=known),)
+    localised = replace(LOUD, events=events, picture=Path("report/pictures/loud.png"))
     written = json.loads(as_json([*ALL, localised, replace(BROKEN, ignored=True)]))
     jsonschema.Draft202012Validator(schema).validate(written)
     assert set(schema["$defs"]["run"]["required"]) == set(written["runs"][0])
@@ -212,8 +214,8 @@ def test_json_has_what_became_of_each_finding_and_what_is_missing():
 def test_json_has_the_localisation_of_findings_that_were_localised():
     joints = (("knee", 0.75), ("hip", 0.25))
     blow = Localisation("desired", "measured", 0.002, joints=joints, band=(85.0, 130.0))
-    known = {LOUD.events[0]: blow, LOUD.events[1]: Localisation()}
-    localised = replace(LOUD, localisations=known)
+    events = (replace(BLOW, localisation=blow), replace(RATTLE, localisation=Localisation()))
+    localised = replace(LOUD, events=events)
     quiet, loud = json.loads(as_json([QUIET, localised]))["runs"]
     assert quiet["events"] == []
     assert loud["events"][0]["localisation"] == {

@@ -10,7 +10,7 @@ from test_inspector_formats import ALL, BLOW, BROKEN, LACKING, LOUD, QUIET, RATT
 
 from inspector.report.html import WIDTH
 from inspector.report.html import index_page as page
-from inspector.verdict import Ruled, Ruling
+from inspector.verdict import Ruling
 
 LONG = [replace(each, duration=10.0, begin=0.0) for each in (LOUD, LACKING, QUIET)]
 
@@ -65,7 +65,9 @@ def test_findings_lie_where_they_are_in_the_time_of_the_run():
 
 
 def test_what_is_missing_and_what_does_not_count_look_different():
-    excused = replace(LONG[0], rulings={BLOW: Ruled(Ruling.ALLOWED, "the pick")})
+    excused = replace(
+        LONG[0], events=(replace(BLOW, ruling=Ruling.ALLOWED, reason="the pick"), RATTLE)
+    )
     table, parts = rows(page([LONG[1], excused]))
     both = "".join(table)
     assert len(re.findall(r'<rect [^>]*class="missing"', both)) == 1

@@ -15,7 +15,7 @@ from inspector.report.findings import report, sentence
 from inspector.report.formats import FORMATS, as_json, text
 from inspector.report.html import found
 from inspector.report.picture import picture
-from inspector.verdict import Verdict
+from inspector.verdict import Finding, Verdict
 from noiseclassifier import Event
 from noisemodel import Run
 
@@ -158,8 +158,7 @@ FOUND = Verdict(
     Path("run.npz"),
     Status.FINDINGS,
     "general",
-    (FINDING, Event("impact", 2.0, 2.1, 0.8)),
-    orders={FINDING: KNEE},
+    (Finding.of(FINDING, order=KNEE), Finding("impact", 2.0, 2.1, 0.8)),
 )
 
 
@@ -191,8 +190,8 @@ def test_report_page_and_list_of_events_say_it_beside_the_band():
     (findings,) = found(analysis)
     assert PHRASE in findings.rows[0][6]
     assert PHRASE not in sentence(analysed(tone(0.05)), FINDING)
-    assert Verdict.of(Path("run.npz"), analysis).orders == analysis.orders
-    assert order(analysis.run, FINDING) == analysis.orders[FINDING]
+    (event,) = Verdict.of(Path("run.npz"), analysis).events
+    assert event.order == order(analysis.run, FINDING) == analysis.orders[FINDING]
 
 
 @pytest.mark.parametrize("vibration", [tone(0.05), ripple(0.05)], ids=["tone", "ripple"])

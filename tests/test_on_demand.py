@@ -126,9 +126,7 @@ def findings(analysis):
     verdict = Verdict.of(Path("run"), analysis)
     labels = analysis.labels
     return (
-        replace(verdict, seconds=0.0, localisations={}, orders={}),
-        {event: str(each) for event, each in verdict.localisations.items()},
-        {event: str(each) for event, each in verdict.orders.items()},
+        str(replace(verdict, seconds=0.0)),
         analysis.audit,
         analysis.remarks,
         None if labels is None else labels.to_arrow().to_pydict(),

@@ -14,10 +14,7 @@ from inspector.library import demo_run
 from inspector.localisation.stage import Localisation
 from inspector.report import history
 from inspector.report.formats import as_json
-from inspector.verdict import Beside, Verdict
-from noiseclassifier import Event
-
-BLOW = Event("impact", 1.0, 1.5, 0.9)
+from inspector.verdict import Beside, Finding, Verdict
 
 
 @pytest.fixture
@@ -159,7 +156,7 @@ def test_a_history_of_200_commits_names_two_steps_and_a_drift(tmp_path):
     pick[60:] += 6.0
     pick[150:] -= 3.0
     scan += np.linspace(0, 8, 200)
-    located = Localisation(joints=(("wrist", 1.0),))
+    blow = Finding("impact", 1.0, 1.5, 0.9, localisation=Localisation(joints=(("wrist", 1.0),)))
     for commit in range(200):
         verdicts = []
         for name, value in (("pick", pick), ("scan", scan), ("calm", calm)):
@@ -170,8 +167,7 @@ def test_a_history_of_200_commits_names_two_steps_and_a_drift(tmp_path):
             for number in range(2):
                 run = Verdict(Path(f"{name}-{number}.npz"), Status.OK, beside=beside)
                 if name == "pick" and commit >= 60:
-                    run = replace(run, status=Status.FINDINGS, events=(BLOW,))
-                    run = replace(run, localisations={BLOW: located})
+                    run = replace(run, status=Status.FINDINGS, events=(blow,))
                 verdicts.append(run)
         results(tmp_path / f"{commit}-c{commit:03d}.json", *verdicts)
     found = history.read(tmp_path)

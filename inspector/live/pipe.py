@@ -38,7 +38,7 @@ from inspector.reference.levels import Levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, judge
 from inspector.text import program_version
-from inspector.verdict import Evidence, Verdict, counts
+from inspector.verdict import Finding, Verdict, counts
 from noiseclassifier import Event
 from noiseclassifier.labels import interval
 from noisemodel.types import Array
@@ -302,17 +302,16 @@ class Gate:
         self.failed = False
         self._tell, self._as_json = tell, as_json
         self._reference = reference
-        self._found: dict[tuple[str, float], Event] = {}
-        self._told: dict[Event, Evidence] = {}
+        self._found: dict[tuple[str, float], Finding] = {}
+        self._told: list[Finding] = []
         self._begin: float | None = None  # of what was compared so far
         self._heard = 0.0
 
     def take(self, event: Event, over: bool) -> None:
         """Print a finding when it is there, and when it is over; beside a reference, keep it."""
-        self._found[event.label, event.start] = event
+        found = self._found[event.label, event.start] = Finding.of(event)
         if self._reference is None:
-            verdict = Verdict(NAME, Status.FINDINGS, events=tuple(self._found.values()))
-            self._print(verdict, event, over=over)
+            self._print(found, over=over)
 
     def compare(self, latest: Levels) -> None:
         """Print findings in the last 6 s beside the reference, each once."""
@@ -324,30 +323,23 @@ class Gate:
             if event.start > latest.time[-1] or event.stop < latest.start:
                 continue
             if event.start >= self._heard:
-                self._told[event] = verdict.evidence[event]
-                self._print(verdict, event, over=False)
+                self._told.append(event)
+                self._print(event, over=False)
             self._heard = max(self._heard, event.stop + GAP)
 
-    def _print(self, verdict: Verdict, event: Event, *, over: bool) -> None:
-        self.failed = self.failed or event in verdict.failing
-        ruled, evidence = verdict.ruled(event), verdict.evidence.get(event)
+    def _print(self, event: Finding, *, over: bool) -> None:
+        self.failed = self.failed or event.fails
         if self._as_json:
-            line: dict[str, Any] = {
-                "event": "end" if over else "begin",
-                "label": event.label,
-                "start": round(event.start, 6),
-                "stop": round(event.stop, 6) if over else None,
-                "score": round(event.score, 6),
-                "novel": event.novel,
-                "fails": ruled.ruling.fails,
-                "ruling": ruled.ruling.value,
-                "reason": ruled.reason,
-            }
-            if evidence is not None:
-                line["evidence"] = evidence.as_dict()
+            line = {"event": "end" if over else "begin", **event.as_dict()}
+            del line["order"]
+            if not over:
+                line["stop"] = None
+            if self._reference is None:
+                del line["evidence"]
             self._tell_json(line)
         elif not over:
-            became = f" ({ruled})" if str(ruled) else f": {evidence}" if evidence else ""
+            became = "" if self._reference is None else f": {event.evidence}"
+            became = f" ({event.became})" if event.became else became
             self._tell(f"{event.label} from {event.start:.2f} s{event.novelty}{became}")
 
     def _tell_json(self, line: dict[str, Any]) -> None:
@@ -379,13 +371,13 @@ class Gate:
             return EXIT[verdict.status]
         shown = summary.findings if self._reference is None else verdict.failing
         self._tell(str(replace(summary, status=verdict.status, findings=shown)))
-        counted = {event: e for event, e in verdict.evidence.items() if not e.excused}
-        for event, evidence in counted.items():
-            span = interval(event.start, event.stop)
-            self._tell(f"  {event.label} from {span}: {evidence}")
+        for event in verdict.events if self._reference is not None else ():
+            if not event.evidence.excused:
+                span = interval(event.start, event.stop)
+                self._tell(f"  {event.label} from {span}: {event.evidence}")
         for event in verdict.excused:
             span = interval(event.start, event.stop)
-            self._tell(f"  {event.label} from {span} does not count: {verdict.ruled(event)}")
+            self._tell(f"  {event.label} from {span} does not count: {event.became}")
         for missing in verdict.missing:
             self._tell(f"  {missing}")
         if verdict.beside is not None:
@@ -394,14 +386,14 @@ class Gate:
 
     def _verdict(self, summary: Summary) -> Verdict:
         """The verdict on the whole stream."""
-        duration, events = summary.samples / summary.rate, tuple(summary.findings)
+        duration = summary.samples / summary.rate
+        events = tuple(map(Finding.of, summary.findings))
         verdict = Verdict(NAME, summary.status, summary.model, events, duration=duration)
         if self._reference is None or (summary.levels is None and self._begin is None):
             return verdict
         if summary.levels is None:  # too long to be compared as a whole
             status = Status.FINDINGS if self._told else Status.OK
-            told = dict(self._told)
-            verdict = replace(verdict, status=status, events=tuple(told), evidence=told)
+            verdict = replace(verdict, status=status, events=tuple(self._told))
         else:
             verdict = replace(verdict, begin=summary.levels.start)
             verdict = self._beside(verdict, summary.levels)

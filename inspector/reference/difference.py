@@ -21,7 +21,7 @@ from inspector.reference.judging import Comparison, Kind, compare, same_motion
 from inspector.reference.levels import HOP, SIGNALS, Levels
 from inspector.reference.store import Reference, levels_of, of_runs
 from inspector.reference.verdicts import References
-from inspector.verdict import END, EXPECTED, UNREAD, Evidence, Verdict, classify_files
+from inspector.verdict import END, EXPECTED, UNREAD, Finding, Verdict, classify_files
 from noiseclassifier import Event
 from noiseclassifier.matching import match
 from noisemodel.parallel import Jobs
@@ -51,13 +51,12 @@ BROKEN = (Outcome.MISSING, Outcome.RENAMED, Outcome.FROZEN, Outcome.CUT)
 
 
 @dataclass(frozen=True)
-class Finding:
+class ChangedFinding:
     """A finding that only one side has ("new" or "resolved"), or that is "louder"."""
 
     kind: str
     run: Path
-    event: Event
-    evidence: Evidence
+    event: Finding
 
 
 @dataclass(frozen=True)
@@ -92,12 +91,12 @@ class Row:
     margin: float = 0.0  # from which it is louder than the runs before, in [dB]
     score: float | None = None  # median over the runs after of their largest score, in [dB]
     changes: tuple[Change, ...] = ()  # the largest first
-    findings: tuple[Finding, ...] = ()  # new ones first
+    findings: tuple[ChangedFinding, ...] = ()  # new ones first
     remarks: tuple[str, ...] = ()  # what is not compared, and why
     worst: Comparison | None = field(default=None, repr=False)  # of the run with the largest score
 
     @property
-    def new(self) -> tuple[Finding, ...]:
+    def new(self) -> tuple[ChangedFinding, ...]:
         """Findings that are new or louder."""
         return tuple(each for each in self.findings if each.kind != RESOLVED)
 
@@ -372,15 +371,15 @@ def _findings(
     verdicts: Mapping[Path, Verdict],
     earlier: Sequence[Event],
     kind: str,
-) -> list[Finding]:
+) -> list[ChangedFinding]:
     """Findings of runs that the other side does not have as loud."""
     found = []
     for path in _paths(runs):
-        for event in verdicts[path].events:
-            known = verdicts[path].evidence.get(event)
-            if known is None or known.excused:
+        verdict = verdicts[path]
+        for event in verdict.events if verdict.beside else ():
+            if event.evidence.excused:
                 continue
             alike = [other for other in earlier if other.label == event.label]
             there = bool(match([event], alike, collar=4 * HOP))
-            found.append(Finding(LOUDER if there else kind, path, event, known))
+            found.append(ChangedFinding(LOUDER if there else kind, path, event))
     return found

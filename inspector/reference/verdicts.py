@@ -27,7 +27,18 @@ from inspector.reference.judging import (
 )
 from inspector.reference.levels import HOP, Levels, levels
 from inspector.reference.store import NAME, Reference, find, line_of, scenario_of
-from inspector.verdict import END, LOG, UNREAD, Beside, Evidence, Missing, Ruled, Ruling, Verdict
+from inspector.verdict import (
+    END,
+    FAILING,
+    GENERAL,
+    LOG,
+    UNREAD,
+    Beside,
+    Finding,
+    Missing,
+    Ruling,
+    Verdict,
+)
 from noiseclassifier import UNKNOWN, Event, Labels
 
 LOUDER = "louder"
@@ -178,7 +189,7 @@ def beside(
     is excused. Where no reference covers the run, the general model decides. Labels of the frames
     name what no finding does.
     """
-    events, evidence = _events(verdict.events, labels, comparison)
+    events = _events(verdict.events, labels, comparison)
     margins = comparison.margins
     least = margins[Kind.REPETITIONS].db if Kind.REPETITIONS in margins else float("inf")
     quieter = comparison.quieter if comparison.quieter > least else 0.0
@@ -199,7 +210,7 @@ def beside(
     )
     covered = known.shares[Kind.GENERAL] < 1.0
     status = verdict.status
-    if any(not each.excused for each in evidence.values()):
+    if any(not each.evidence.excused for each in events):
         status = Status.FINDINGS
     elif status is Status.FINDINGS or (status is Status.CANNOT_TELL and covered):
         status = Status.OK
@@ -207,18 +218,14 @@ def beside(
         verdict,
         status=status,
         events=events,
-        evidence=evidence,
         beside=known,
-        localisations={of: each for of, each in verdict.localisations.items() if of in evidence},
         scenario=verdict.scenario or comparison.run.name,
-        orders={of: each for of, each in verdict.orders.items() if of in evidence},
     )
 
 
 def seen(analysis: Analysis, verdict: Verdict) -> Analysis:
     """The analysis with the findings that are left beside a reference, as pictures show it."""
-    left = [event for event in verdict.failing if event in verdict.evidence]
-    found = tuple(event for event in left if not verdict.evidence[event].excused)
+    found = tuple(event for event in verdict.failing if not event.evidence.excused)
     return replace(analysis, status=verdict.status, findings=found, spans=found)
 
 
@@ -239,54 +246,52 @@ def _words(comparison: Comparison, quieter: float) -> str:
 
 
 def _events(
-    findings: Sequence[Event], labels: Labels | None, comparison: Comparison
-) -> tuple[tuple[Event, ...], dict[Event, Evidence]]:
-    """Findings in order of time, and the evidence of each."""
-    left = list(findings)
-    found: list[tuple[Event, Evidence]] = []
+    findings: Sequence[Finding], labels: Labels | None, comparison: Comparison
+) -> tuple[Finding, ...]:
+    """Findings in order of time, each with its evidence."""
+    left, found = list(findings), []
     for each in comparison.exceedances:
-        start, stop, absorbed = each.start, each.stop, []
+        stop, absorbed = each.stop, []
         for event in sorted(left, key=lambda event: event.start):
-            if event.start <= stop + GAP and event.stop >= start:
+            if event.start <= stop + GAP and event.stop >= each.start:
                 absorbed.append(event)
                 stop = max(stop, min(event.stop, stop + GAP))
         left = [event for event in left if event not in absorbed]
         # The general model sets onsets by single samples, levels by frames.
-        near = [event.start for event in absorbed if abs(event.start - start) <= 4 * HOP]
-        label, score, novel = _named(labels, each, absorbed)
-        event = Event(label, min(near, default=start), stop, score, novel)
-        found.append((event, each.evidence))
+        near = [event.start for event in absorbed if abs(event.start - each.start) <= 4 * HOP]
+        start = min(near, default=each.start)
+        named = _named(labels, each, absorbed)
+        if (named.start, named.stop) != (start, stop):  # it was localised for another stretch
+            named = replace(named, start=start, stop=stop, localisation=None, order=None)
+        found.append(replace(named, evidence=each.evidence))
     references = "other motions of this robot"
     if comparison.scenarios:
         references = f"{comparison.repetitions} of {' and '.join(comparison.scenarios)}"
     for event in left:
         covered = comparison.covered(event.start, event.stop)
         excused = f"as loud as {references}" if covered else ""
-        found.append((event, Evidence(Kind.GENERAL.value, excused=excused)))
-    found.sort(key=lambda pair: (pair[0].start, pair[0].stop))
-    return tuple(event for event, _ in found), dict(found)
+        found.append(replace(event, evidence=replace(GENERAL, excused=excused)))
+    return tuple(sorted(found, key=lambda event: (event.start, event.stop)))
 
 
-def _named(
-    labels: Labels | None, each: Exceedance, absorbed: Sequence[Event]
-) -> tuple[str, float, bool]:
-    """Class, score and novelty that the general model has for a stretch."""
+def _named(labels: Labels | None, each: Exceedance, absorbed: Sequence[Finding]) -> Finding:
+    """What the general model has for a stretch: its class, score and novelty."""
     named = [event for event in absorbed if event.label != UNKNOWN]
     if named:
-        best = max(
+        return max(
             named, key=lambda event: min(event.stop, each.stop) - max(event.start, each.start)
         )
-        return best.label, best.score, best.novel
     if labels is None:
-        return LOUDER, 0.0, False
+        return Finding(LOUDER, each.start, each.stop, 0.0)
     inside = (labels.start < each.stop) & (labels.stop > each.start)
     words = Counter(str(word) for word in labels.label[inside] if word not in ("ok", UNKNOWN))
     scores = labels.scores[inside]
     if words and len(scores):
         (label, _), *_ = words.most_common(1)
-        return label, float(scores[:, labels.classes.index(label)].max()), False
+        score = float(scores[:, labels.classes.index(label)].max())
+        return Finding(label, each.start, each.stop, score)
     failing = scores[:, 1:].max() if scores.size and scores.shape[1] > 1 else 0.0
-    return LOUDER, float(failing), bool(absorbed)
+    return Finding(LOUDER, each.start, each.stop, float(failing), bool(absorbed))
 
 
 def _failures(comparison: Comparison, reference: Reference) -> Iterable[tuple[str, str]]:
@@ -338,25 +343,27 @@ def judge(
     """
     if verdict.status in UNREAD:
         return verdict
-    rulings = {
-        event: Ruled(Ruling.AS_REFERENCE, each.excused)
-        for event, each in verdict.evidence.items()
-        if each.excused
-    }
     missing: list[Missing] = []
+    scenarios: list[Scenario] = []
     if reference is not None and verdict.beside is not None:
         missing += [Missing(what, reason=why) for what, why in verdict.beside.failures]
-        for scenario in filter(None, map(reference.named, verdict.beside.scenarios)):
-            rulings = _expected(verdict, scenario, today) | rulings
-            missing += _lacking(verdict, scenario)
+        scenarios += filter(None, map(reference.named, verdict.beside.scenarios))
+    events = []
     for event in verdict.events:
-        known = rulings.get(event, Ruled())
-        reason = gate.reason(event) if gate and known.ruling.fails else ""
-        if reason:
-            rulings[event] = Ruled(Ruling.FILTERED, reason)
+        ruling, reason = _ruled(event, verdict.begin, scenarios, today)
+        if gate is not None and ruling in FAILING and (filtered := gate.reason(event)):
+            ruling, reason = Ruling.FILTERED, filtered
+        events.append(replace(event, ruling=ruling, reason=reason))
+    for scenario in scenarios:
+        spans = [_span(event, verdict.begin, scenario) for event in verdict.events]
+        missing += [
+            Missing(each.label or "a finding", each.start, each.stop, each.reason)
+            for each in scenario.wanted
+            if each.required and not any(each.covers(*span) for span in spans)
+        ]
     judged = replace(
         verdict,
-        rulings={event: ruled for event, ruled in rulings.items() if ruled != Ruled()},
+        events=tuple(events),
         missing=tuple(missing),
         expectations="" if reference is None else str(reference.path),
     )
@@ -368,37 +375,29 @@ def judge(
     return judged
 
 
-def _spans(verdict: Verdict, scenario: Scenario) -> dict[Event, tuple[str, float, float]]:
-    """Class, onset and end of each finding, as if the run began when the scenario does."""
-    begin = verdict.begin - scenario.repetitions[-1].start
-    return {each: (each.label, each.start - begin, each.stop - begin) for each in verdict.events}
+def _span(event: Event, begin: float, scenario: Scenario) -> tuple[str, float, float]:
+    """Class, onset and end of a finding, as if the run began when the scenario does."""
+    late = begin - scenario.repetitions[-1].start
+    return event.label, event.start - late, event.stop - late
 
 
-def _expected(verdict: Verdict, scenario: Scenario, today: date) -> dict[Event, Ruled]:
-    """Rulings by what a scenario wants and waives."""
-    found: dict[Event, Ruled] = {}
-    for event, span in _spans(verdict, scenario).items():
-        evidence = verdict.evidence.get(event, Evidence(Kind.GENERAL.value))
-        for each in scenario.wanted:
-            if each.covers(*span) and (not each.joints or evidence.joint in each.joints):
-                if each.loudest is None or evidence.level is None or evidence.level <= each.loudest:
-                    found[event] = Ruled(Ruling.ALLOWED, each.reason or "it is wanted")
-                else:
-                    why = f"wanted, up to {each.loudest:.1f} dB, and has {evidence.level:.1f} dB"
-                    found[event] = Ruled(reason=why)
-        for each in scenario.waived:
+def _ruled(
+    event: Finding, begin: float, scenarios: Sequence[Scenario], today: date
+) -> tuple[Ruling, str]:
+    """What becomes of a finding by what the first scenario that is about it waives or wants."""
+    if event.evidence.excused:
+        return Ruling.AS_REFERENCE, event.evidence.excused
+    joint, level = event.evidence.joint, event.evidence.level
+    for scenario in scenarios:
+        span = _span(event, begin, scenario)
+        for each in reversed(scenario.waived):
             if each.covers(*span) and each.until is not None:
-                expired = Ruled(Ruling.EXPIRED, f"{each.until}, {each.reason}")
-                valid = today <= each.until
-                found[event] = Ruled(Ruling.WAIVED, each.reason) if valid else expired
-    return found
-
-
-def _lacking(verdict: Verdict, scenario: Scenario) -> list[Missing]:
-    """Findings that a scenario requires and the run does not have."""
-    spans = _spans(verdict, scenario).values()
-    return [
-        Missing(each.label or "a finding", each.start, each.stop, each.reason)
-        for each in scenario.wanted
-        if each.required and not any(each.covers(*span) for span in spans)
-    ]
+                if today <= each.until:
+                    return Ruling.WAIVED, each.reason
+                return Ruling.EXPIRED, f"{each.until}, {each.reason}"
+        for each in reversed(scenario.wanted):
+            if each.covers(*span) and (not each.joints or joint in each.joints):
+                if each.loudest is None or level is None or level <= each.loudest:
+                    return Ruling.ALLOWED, each.reason or "it is wanted"
+                return Ruling.FOUND, f"wanted, up to {each.loudest:.1f} dB, and has {level:.1f} dB"
+    return Ruling.FOUND, ""

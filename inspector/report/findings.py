@@ -15,7 +15,7 @@ from inspector.localisation.localise import fault_links, has_stages
 from inspector.localisation.stage import Localisation
 from inspector.reference.store import REPETITION
 from inspector.text import counted
-from inspector.verdict import UNREAD, Verdict
+from inspector.verdict import UNREAD, Finding, Verdict
 from noiseclassifier import UNKNOWN, Event
 from noiseclassifier.labels import interval
 from noisemodel import Block
@@ -187,31 +187,31 @@ def note(analysis: Analysis) -> str:
 # --- of verdicts
 
 
-def row(verdict: Verdict, event: Event, runs: str = "") -> tuple[str, str, str, str, str]:
+def row(verdict: Verdict, event: Finding, runs: str = "") -> tuple[str, str, str, str, str]:
     """A finding as cells: time, class, joints, band, and the rest.
 
     Args:
         runs: In how many repetitions it is.
     """
-    known, by = verdict.localisations.get(event), verdict.evidence.get(event)
+    known, by = event.localisation, event.evidence
     _, joints, band = words(known) if known else ("", "", "")
     over = ""
-    if by is not None and not by.excused:
+    if verdict.beside is not None and not by.excused:
         over = "by the general model"
-    if by is not None and by.db is not None and not by.excused:
+    if by.db is not None and not by.excused:
         number = verdict.beside.repetitions if verdict.beside else 0
         several = number and by.kind == "repetitions"
         over = f"{by.db:+.0f} dB over {counted(number, 'repetition') if several else by.kind}"
         joints = joints or by.joint
         if by.octave and not band:
             band = f"{by.octave[0]:.0f}-{by.octave[1]:.0f} Hz"
-    ruled, order = str(verdict.ruled(event)), str(verdict.orders.get(event, ""))
+    ruled, order = event.became, "" if event.order is None else str(event.order)
     rest = (event.novelty.removeprefix(", "), order, over, runs, ruled and f"({ruled})")
     when = f"{event.start:6.2f} - {event.stop:6.2f} s"
     return when, event.label, joints, band, _listed(*rest)
 
 
-def told(verdict: Verdict, event: Event, runs: str = "", *, short: bool = False) -> str:
+def told(verdict: Verdict, event: Finding, runs: str = "", *, short: bool = False) -> str:
     """The same as a sentence, or short, for lines that are cut."""
     _, label, *rest = row(verdict, event, runs)
     when = f"from {interval(event.start, event.stop)}"
@@ -239,10 +239,8 @@ def timeline(verdict: Verdict, width: int = 60) -> str:
         return ""
     lines: dict[tuple[str, str], list[str]] = {}
     for event in verdict.failing:
-        known, where = verdict.evidence.get(event), verdict.localisations.get(event)
-        joint = known.joint if known else ""
-        if where is not None and where.joints:
-            joint = where.joints[0][0]
+        where = event.localisation
+        joint = where.joints[0][0] if where and where.joints else event.evidence.joint
         marks = lines.setdefault((event.label, joint), ["."] * width)
         times = (event.start - verdict.begin, event.stop - verdict.begin)
         first, last = (int(width * time / verdict.duration) for time in times)
@@ -266,7 +264,7 @@ class Group:
         """The verdict that stands for all."""
         return self.verdicts[0]
 
-    def found(self, *, fails: bool) -> list[tuple[Verdict, Event, str]]:
+    def found(self, *, fails: bool) -> list[tuple[Verdict, Finding, str]]:
         """Findings that fail their runs, or that do not; repetitions of one finding count once."""
         every = [
             (verdict, event)
@@ -296,15 +294,14 @@ class Group:
         return list(dict.fromkeys(each.told for one in self.verdicts for each in one.missing))
 
 
-def _alike(one: tuple[Verdict, Event], other: tuple[Verdict, Event]) -> bool:
+def _alike(one: tuple[Verdict, Finding], other: tuple[Verdict, Finding]) -> bool:
     """Whether two findings of repetitions are one."""
     (first, event), (second, same) = one, other
-    known, other_known = first.evidence.get(event), second.evidence.get(same)
-    joint = known.joint if known and other_known and known.joint == other_known.joint else ""
+    joint = event.evidence.joint
     return (
-        (event.label == same.label or bool(joint))
+        (event.label == same.label or bool(joint and joint == same.evidence.joint))
         and abs(event.start - same.start) <= TOGETHER
-        and first.ruled(event) == second.ruled(same)
+        and event.became == same.became
         and (first is not second or event is same)
     )
 

@@ -587,7 +587,7 @@ def _told(of: diff.Row) -> list[str]:
     """What is new in a scenario, a line each; without levels there, what became of it first."""
     found = [*_folded(of, NEW), *_folded(of, LOUDER)]
     worse = of.outcome is diff.Outcome.WORSE
-    if worse and any(each.evidence.db is not None for each in of.new):
+    if worse and any(each.event.evidence.db is not None for each in of.new):
         return found
     return [of.reason, *(str(each) for each in of.changes[:1] if worse), *found]
 
@@ -598,24 +598,26 @@ def _folded(of: diff.Row, kind: str) -> list[str]:
     A line has the class that most of them have, time, joint, octave, and how much louder it is.
     """
 
-    def alike(one: diff.Finding, other: diff.Finding) -> bool:
-        same = one.event.label == other.event.label or one.evidence.joint != ""
+    def alike(one: diff.ChangedFinding, other: diff.ChangedFinding) -> bool:
+        joint, same = one.event.evidence.joint, one.event.label == other.event.label
         near = abs(one.event.start - other.event.start) <= TOGETHER
-        return same and near and one.evidence.joint == other.evidence.joint and one.run != other.run
+        alike = joint == other.event.evidence.joint and (same or joint != "")
+        return alike and near and one.run != other.run
 
     runs = len(of.before if kind == RESOLVED else of.after)
     groups = folded([each for each in of.findings if each.kind == kind], alike)
     lines = []
     for group in groups[:MOST_OF_KIND]:
         (label, _), *_ = Counter(each.event.label for each in group).most_common(1)
-        exceed = [-math.inf if each.evidence.db is None else each.evidence.db for each in group]
-        worst = group[exceed.index(max(exceed))]
-        start, stop, known = worst.event.start, worst.event.stop, worst.evidence
+        known = [each.event.evidence.db for each in group]
+        exceed = [-math.inf if each is None else each for each in known]
+        worst = group[exceed.index(max(exceed))].event
+        start, stop, by = worst.start, worst.stop, worst.evidence
         when = f"{start:.2f} s" if stop - start < SHORT else f"{start:.2f}-{stop:.2f} s"
-        band = f"{known.octave[0]:.0f}-{known.octave[1]:.0f} Hz" if known.octave else ""
-        over = "" if known.db is None else f"{known.db:+.0f} dB"
+        band = f"{by.octave[0]:.0f}-{by.octave[1]:.0f} Hz" if by.octave else ""
+        over = "" if by.db is None else f"{by.db:+.0f} dB"
         several = f"{len({each.run for each in group})} of {runs} runs" if runs > 1 else ""
-        parts = [f"{label} {when}", known.joint, band, over, several]
+        parts = [f"{label} {when}", by.joint, band, over, several]
         lines.append(f"{kind}: {', '.join(filter(None, parts))}")
     left = len(groups) - MOST_OF_KIND
     return lines + ([f"and {left} more {kind} (--format json)"] if left > 0 else [])
@@ -684,15 +686,15 @@ def _row_as_dict(of: diff.Row) -> dict[str, Any]:
     }
 
 
-def _finding_as_dict(each: diff.Finding) -> dict[str, Any]:
+def _finding_as_dict(each: diff.ChangedFinding) -> dict[str, Any]:
     return {
         "kind": each.kind,
         "run": str(each.run),
         "label": each.event.label,
         "start": round(each.event.start, 6),
         "stop": round(each.event.stop, 6),
-        "level_db": each.evidence.level,
-        "change_db": each.evidence.db,
+        "level_db": each.event.evidence.level,
+        "change_db": each.event.evidence.db,
     }
 
 

@@ -139,7 +139,7 @@ def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
                 for joint, worst in (levels | dict(known.joints_db if known else {})).items():
                     over[name, joint][commit] = np.fmax(over[name, joint][commit], worst)
                 for event in verdict.failing:
-                    where = verdict.localisations.get(event)
+                    where = event.localisation
                     joint = where.joints[0][0] if where and where.joints else ""
                     for key in dict.fromkeys([(name, ""), (name, joint)]):
                         found[key][commit] += 1

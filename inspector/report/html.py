@@ -33,7 +33,7 @@ from inspector.report.findings import (
 )
 from inspector.report.formats import summary
 from inspector.report.picture import picture, require
-from inspector.verdict import Verdict
+from inspector.verdict import Finding, Verdict
 from noisemodel.files import replacing
 from noisemodel.noise import REFERENCE_POWER, decibel, vibrating_pieces
 from noisemodel.types import Array
@@ -102,7 +102,7 @@ def page(
     add_text(body, "p", spoken(analysis.headline), "verdict")
     if verdict is not None and verdict.beside is not None:
         add_text(body, "p", f"Reference: {verdict.beside.path}, {verdict.beside.words}.", "note")
-    for table in (facts(analysis), *found(analysis, verdict)):
+    for table in (facts(analysis), *found(analysis)):
         _add_table(body, table)
     if verdict is not None:
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
@@ -223,10 +223,9 @@ def facts(analysis: Analysis) -> Table:
     return Table("", ("", ""), rows)
 
 
-def found(analysis: Analysis, verdict: Verdict | None = None) -> Iterator[Table]:
+def found(analysis: Analysis) -> Iterator[Table]:
     """List findings and annotated blocks, those that there are."""
     remark = note(analysis)
-    known = {} if verdict is None else verdict.evidence
     if analysis.findings:
         findings = [
             (
@@ -235,11 +234,11 @@ def found(analysis: Analysis, verdict: Verdict | None = None) -> Iterator[Table]
                 f"{event.stop:.2f}",
                 f"{event.score:.2f}",
                 *localised(analysis, event),
-                *([str(known[event])] if event in known else []),
+                *([str(event.evidence)] if isinstance(event, Finding) else []),
             )
             for event in analysis.findings
         ]
-        evidence = ("evidence",) if known else ()
+        evidence = ("evidence",) if isinstance(analysis.findings[0], Finding) else ()
         head = ("class", "from [s]", "to [s]", "score", *LOCALISATION, *evidence)
         yield Table("Findings", head, findings, (1, 2, 3), remark)
     if analysis.run.blocks:
@@ -482,7 +481,7 @@ def _add_timeline(cell: ET.Element, verdict: Verdict) -> None:
     ET.SubElement(drawn, "title").text = told
     scale = WIDTH / verdict.duration
     spans = [
-        (event.start, event.stop, "" if event in verdict.failing else "excused", event.label)
+        (event.start, event.stop, "" if event.fails else "excused", event.label)
         for event in verdict.events
     ]
     spans += [
