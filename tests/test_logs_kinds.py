@@ -435,13 +435,13 @@ def written(tmp_path, header, *columns):
         (
             "t,a_cmd,b_cmd",
             "velocity.{joint}={joint}_meas",
-            "fits no column; columns are a_cmd",
+            "fits no column that is free; columns are a_cmd",
         ),
         ("t,q1,q2", "velocity.{joint}=q", "a pattern has {joint} once on either side"),
         (
             "t,a_x,b_x",
             "position.{joint}={joint}_x velocity.{joint}={joint}_x",
-            "column '{joint}_x' is mapped twice",
+            "'{joint}_x' is mapped twice",
         ),
         (
             "t,a_x,a_y",
@@ -633,7 +633,9 @@ def test_logsout_of_simulink_says_how_to_save_numbers(tmp_path):
 def test_dates_that_no_clock_has_are_one_line(tmp_path, day):
     path = tmp_path / "log.csv"
     path.write_text(f"time,q1\n{day} 00:00:00.0,1\n{day} 00:00:00.1,2\n")
-    with pytest.raises(InspectorError, match="is no date before 2200"):
+    with pytest.raises(
+        InspectorError, match=f"row 2: column .time. holds .{day} .*, which is no time"
+    ):
         read_log(path)
 
 

@@ -109,7 +109,7 @@ def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
         (
             {"dof_vel": VELOCITY.T, "t": TIME},
             [],
-            r"'dof_vel' has shape \(3, 400\), there are 400 stamps; .* is it transposed\?",
+            r"'dof_vel' has shape \(3, 400\); expected 400 samples, as stamps, along its first",
         ),
         (
             {"dof_vel": VELOCITY, "t": TIME},

@@ -67,7 +67,10 @@ def test_a_part_of_an_array_is_named_as_python_does(source, name, columns):
             "unknown setting 'speed'; there are columns, force, joints, off",
         ),
         ('format = "noise-mapping/1"\nrate = "fast"', "rate = 'fast' is of another type"),
-        ('format = "noise-mapping/1"\nrate = -1', "the rate is -1 Hz; expected a number above 0"),
+        (
+            'format = "noise-mapping/1"\nrate = -1',
+            "the rate is -1 Hz; expected 0.001 to 1e[+]09 Hz",
+        ),
         ('format = "noise-mapping/1"\nrate = 2027-01-31', "rate = 2027-01-31 is of another type"),
         ('format = "noise-mapping/1"\njoints = "a"', "joints = 'a' is of another type"),
         ('format = "noise-mapping/1"\nunits = "miles"', "no units 'miles'; there are radians, deg"),
@@ -90,7 +93,7 @@ def test_an_invalid_mapping_is_an_error_of_one_line(tmp_path, text, message):
     [
         (["base_pose.xyz=p"], "a base_pose is written as xyzw or wxyz"),
         (["base_velocity.local=p"], "a base_velocity is written as body or world or mujoco"),
-        (["position=a", "position=b"], "position is mapped twice"),
+        (["position=a", "position=b"], "'position' is mapped twice"),
     ],
 )
 def test_an_invalid_entry_is_named(entries, message):

@@ -128,10 +128,7 @@ def test_a_gripper_of_a_data_set_in_degrees_is_normalised(tmp_path):
     folder = write_lerobot(tmp_path / "set", [STATE[:, :2] * 30], names=names)
     imported = read_log(folder, units="degrees")
     assert imported.run.joint_names == ("shoulder",)
-    expected = (
-        "set: normalised to 0 to 100 of its range, left out since no robot is specified: gripper"
-    )
-    assert expected in imported.remarks
+    assert "set: left out, since no robot tells their range: gripper" in imported.remarks
 
 
 def test_the_pose_of_an_end_effector_is_no_joint(tmp_path):

@@ -44,7 +44,7 @@ def test_a_declared_rate_is_the_rate(tmp_path):
         LogError, match="the rate of the stamps is 100 Hz; a run of 1000 Hz cannot be made"
     ):
         read_log(log(tmp_path), rate=1000)
-    with pytest.raises(InspectorError, match="the rate is 0 Hz; expected a number above 0"):
+    with pytest.raises(InspectorError, match="the rate is 0 Hz; expected 0.001 to 1e[+]09 Hz"):
         read_log(log(tmp_path), rate=0)
 
 
@@ -58,17 +58,6 @@ def test_a_lower_rate_says_which_band_is_lost(tmp_path):
     assert lost in out
     for higher in (log(tmp_path), log(tmp_path, jittered() * 1.005)):
         assert not any("is left" in each for each in read_log(higher, rate=100).remarks)
-
-
-def test_a_faster_clock_of_desired_motion_loses_a_band_whether_decimated_or_interpolated(tmp_path):
-    measured = log(tmp_path)
-    for rate in (1000, 990):
-        time = np.arange(4 * rate) / rate
-        columns = {"time": time, "elbow.velocity": swing(time)[1]}
-        desired = write(tmp_path / "desired.csv", columns)
-        remarks = read_log(measured, desired=desired).remarks
-        said = f"velocity_desired: decimated from {rate} to 100 Hz: nothing above 50 Hz is left"
-        assert said in remarks
 
 
 def test_resampling_does_not_overshoot(tmp_path):

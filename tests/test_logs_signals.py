@@ -89,7 +89,7 @@ def test_a_mapping_of_another_form_is_refused(entry):
 
 
 def test_a_column_that_is_mapped_twice_or_not_there_is_named(tmp_path):
-    with pytest.raises(InspectorError, match="column 'x' is mapped twice"):
+    with pytest.raises(InspectorError, match="'x' is mapped twice"):
         read_log(log(tmp_path), mapping=["velocity.a=x", "velocity.b=x"])
     with pytest.raises(LogError, match="there is no column 'x' to map; it has elbow.pos"):
         read_log(log(tmp_path), mapping=["velocity.a=x"])

@@ -107,9 +107,6 @@ FOLLOWS, SLOPES = 0.9, (0.5, 2.0)
 STILL, NEARBY = 1e-3, 0.1
 """What moves less does not move; largest mean distance of its target, both in [rad] or [m]."""
 
-RELATIVE_TO = "obs/joint_pos"
-RELATIVE = "obs/joint_pos may be relative to a default pose (Isaac Lab)"
-
 Arrays = Mapping[str, NDArray[Any]]
 
 
@@ -128,7 +125,6 @@ def log_of(
     episode: str = "",
     stated: tuple[str, float | None] = ("", None),
     joints: Mapping[str, tuple[str, ...]] | None = None,
-    controller: str = "",
     not_read: Sequence[str] = (),
 ) -> Log:
     """Log of the arrays of one episode.
@@ -147,14 +143,13 @@ def log_of(
     time, arrays = _time(arrays, options)
     arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
     samples = len(arrays[motion[0]])
-    state, targets, remarks, measured = _state(arrays, roles, options, controller)
+    state, targets, remarks, measured = _state(arrays, roles, options)
     stamps = stamps_of(path, time, arrays[time], options.rate) if time else Stamps.counted(samples)
     columns = any(arrays[name].ndim == 1 for name in motion)  # whose rate is found later
     if stamps.unit == SAMPLES and (not columns or (stated[1] and not options.rate)):
         measured = (None, None) if columns else measured
         stamps = counted_stamps(path, stamps, options, *measured, stated)
-    base, still = _base_of_isaac(arrays, roles, stamps)
-    suggested = (*state, *base, *targets)
+    suggested = (*state, *_base_of_isaac(arrays, roles, stamps), *targets)
     rows = [name for name, each in arrays.items() if each.ndim == 1]
     single = {name for name in rows if column_signal(name) or array_signal(name)}
     fields = tuple(
@@ -176,7 +171,7 @@ def log_of(
         fields,
         episode,
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
-        remarks=(*_taken(fields, suggested, options), *still, *remarks),
+        remarks=(*_taken(fields, suggested, options), *remarks),
         suggested=suggested,
         time=time,
     )
@@ -224,11 +219,7 @@ def floats(values: NDArray[Any]) -> Real:
 
 
 def episodes_of(arrays: Arrays) -> dict[str, slice]:
-    """Episodes of a file that has them one after the other, of two samples or more.
-
-    Args:
-        arrays: Arrays by name; only ``EPISODE_ENDS`` are used.
-    """
+    """Episodes of a file that has them one after the other, of two samples or more."""
     ends = [each.ravel() for name, each in arrays.items() if name.lower() in EPISODE_ENDS]
     if len({len(each) for each in ends}) != 1:
         return {"": slice(None)}
@@ -350,16 +341,13 @@ def _of_one_length(
     for name in names:
         each = arrays[name]
         if len(each) != samples:
-            transposed = each.ndim == 2 and each.shape[1] == samples
-            hint = "; samples come first, is it transposed?" if transposed else ""
-            raise LogError(
-                path, f"{name!r} has shape {each.shape}, there are {samples} stamps{hint}"
-            )
+            problem = f"{name!r} has shape {each.shape}; expected {samples} samples, as stamps"
+            raise LogError(path, f"{problem}, along its first axis")
     return dict(arrays)
 
 
 def _state(
-    arrays: Arrays, roles: Mapping[str, str], options: ReadOptions, controller: str = ""
+    arrays: Arrays, roles: Mapping[str, str], options: ReadOptions
 ) -> tuple[list[Entry], list[Entry], list[str], tuple[Real | None, Real | None]]:
     """What holds the state, and what the positions follow: mappings of both, and remarks.
 
@@ -389,13 +377,10 @@ def _state(
             targets.append(Entry("position_desired", "", part))
             break
     if commands and position is not None and not targets:
-        to = f", they are the input of a controller of type {controller}" if controller else ""
         remarks.append(
-            f"{listed(commands)} not taken as desired positions: {place} does not follow{to};"
+            f"{listed(commands)} not taken as desired positions: {place} does not follow;"
             f" --map position_desired={commands[0]} takes it"
         )
-    if RELATIVE_TO in roles and not any(STATES.fullmatch(name) for name in roles):
-        remarks.append(RELATIVE)
     return state, targets, remarks, (position, velocity)
 
 
@@ -445,20 +430,18 @@ def _floating(qpos: Real, count: int) -> list[int]:
     return places
 
 
-def _base_of_isaac(
-    arrays: Arrays, roles: Mapping[str, str], stamps: Stamps
-) -> tuple[list[Entry], list[str]]:
-    """Mapping of a root that moves; that of a robot on a table is left out, with a remark."""
+def _base_of_isaac(arrays: Arrays, roles: Mapping[str, str], stamps: Stamps) -> Iterator[Entry]:
+    """Mapping of a root that moves; that of a robot on a table is left out."""
     found = {match["what"]: name for name in roles if (match := STATES.fullmatch(name))}
     pose = arrays.get(found.get("root_pose", ""))
     if pose is None or pose.shape != (len(stamps.time), 7):
-        return [], []
-    velocity = arrays.get(found.get("root_velocity", ""))
-    turning = velocity is not None and bool(np.abs(velocity).max() > STILL)
-    if np.ptp(pose, axis=0).max() < STILL and not turning:
-        return [], [f"{found['root_pose']} stands still: the base is taken as fixed"]
-    if velocity is None or velocity.shape != (len(pose), 6):
-        return [Entry("base_pose", "wxyz", found["root_pose"])], []
+        return
+    velocity = arrays.get(found.get("root_velocity", ""), np.empty(0))
+    if max(np.ptp(pose, axis=0).max(), np.abs(velocity).max(initial=0)) < STILL:
+        return
+    if velocity.shape != (len(pose), 6):
+        yield Entry("base_pose", "wxyz", found["root_pose"])
+        return
 
     def error(order: str) -> float:
         """Distance of the logged angular velocities from the turns of the pose, in world axes."""
@@ -470,10 +453,8 @@ def _base_of_isaac(
         return float(np.linalg.norm(2 * omega - velocity[:, 3:]))
 
     order = min(("wxyz", "xyzw"), key=error)  # Isaac Lab 3.0 changed it
-    return [
-        Entry("base_velocity", "world", found["root_velocity"]),
-        Entry("base_pose", order, found["root_pose"]),
-    ], []
+    yield Entry("base_velocity", "world", found["root_velocity"])
+    yield Entry("base_pose", order, found["root_pose"])
 
 
 def _joints(
@@ -518,19 +499,18 @@ def _taken(
 
 def _nothing(episode: str, arrays: Arrays) -> str:
     """Problem of a file that is not known to hold motion: what it holds, and what to type."""
-    where = episode or "the file"
     wide = [(n, each) for n, each in arrays.items() if each.ndim == 2 and meaning(n) != COMMAND]
     name, values = max(wide, key=lambda each: len(each[1]), default=("qpos", np.zeros((2, 7))))
     half = values.shape[1] // 2
     example = f"--map position={name}"
-    if re.fullmatch(r"(.*/)?obs(ervations?)?", name) and half:
-        example = f"--map position={name}[0:{half}] --map velocity={name}[{half}:{2 * half}]"
+    if "obs" in name and half:
+        example += f"[0:{half}] --map velocity={name}[{half}:{2 * half}]"
     if name == "states":  # of robosuite, before robomimic has extracted observations
         example = "--map position=states[1:8] (MuJoCo's flattened states are time, qpos, qvel)"
     shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])
     return (
-        f"{where} holds no known joint positions or velocities; name them, such as {example};"
-        f" it has {shapes}"
+        f"{episode or 'the file'} holds no known joint positions or velocities; name them, such as"
+        f" {example}; it has {shapes}"
     )
 
 

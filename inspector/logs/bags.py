@@ -39,14 +39,10 @@ from inspector.logs.names import listed
 from inspector.text import counted
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 
-LATEST = 2**62
-"""Stamps lie before, in [ns]; differences of later ones are no 64-bit integers."""
-METADATA = 4 * 2**20
-"""Most bytes of a metadata.yaml: it has some hundred for each topic."""
-MCAP_MAGIC = b"\x89MCAP0\r\n"
-"""The bytes with which an MCAP file begins and ends."""
-MESSAGE, CHUNK, CONNECTION = b"\x02", b"\x05", b"\x07"
-"""Kinds of records of ROS 1."""
+LATEST = 2**62  # stamps lie before, in [ns]; differences of later ones are no 64-bit integers
+METADATA = 4 * 2**20  # most bytes of a metadata.yaml: it has some hundred for each topic
+MCAP_MAGIC = b"\x89MCAP0\r\n"  # the bytes with which an MCAP file begins and ends
+MESSAGE, CHUNK, CONNECTION = b"\x02", b"\x05", b"\x07"  # kinds of records of ROS 1
 
 Bytes = bytes | bytearray | memoryview
 Message: TypeAlias = tuple[str, int, bytes]

@@ -28,12 +28,9 @@ from noisemodel.types import Array, Indices, Mask, Real
 
 UNITS = {"seconds": "1", "milliseconds": "1e-3", "microseconds": "1e-6", "nanoseconds": "1e-9"}
 """The units that stamps may have, in [s]."""
-SLOWEST_SECONDS = 0.5
-"""Median step up to which stamps are in seconds, in [s]."""
-RATES = (20.0, 20e3)
-"""Rates of logs, from which the unit of larger steps follows, in [Hz]."""
-NEARLY = 4.0
-"""Two units are ambiguous if a rate is within this factor of the ends of ``RATES``."""
+SLOWEST_SECONDS = 0.5  # median step up to which stamps are in seconds, in [s]
+RATES = (20.0, 20e3)  # rates of logs, from which the unit of larger steps follows, in [Hz]
+NEARLY = 4.0  # two units are ambiguous if a rate is within this factor of the ends of ``RATES``
 EPOCH = (9e8, 5e9)
 """Time since 1970, from 1998 to 2128, by which absolute stamps tell their unit, in [s]."""
 
@@ -43,8 +40,7 @@ COMMON_RATES = (
 )
 NEAR_RATE = 0.02
 """A rate found from the values is one of these, in [Hz], if it differs by no more than that."""
-LARGEST_STEP = 1.0
-"""Larger steps of a position are a turn or a reset, in [rad] or [m]."""
+LARGEST_STEP = 1.0  # larger steps of a position are a turn or a reset, in [rad] or [m]
 FITS = 0.98
 """Least correlation of velocities with the steps of positions from which the rate is found."""
 DISAGREE = 0.25
@@ -52,8 +48,7 @@ DISAGREE = 0.25
 
 MOST_UNORDERED = 0.1
 """Share of samples out of order above which a log is refused: it is several, or has no stamps."""
-BLOCK = 500_000
-"""Values that are interpolated at once, which takes about ten times their memory."""
+BLOCK = 500_000  # values that are interpolated at once, which takes about ten times their memory
 
 
 def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | None) -> str:
@@ -83,9 +78,9 @@ def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | No
         return found[0]
     raise LogError(
         path,
-        f"the stamps' median step is {step:g}; expected seconds or a unit that gives"
-        f" {RATES[0]:g} Hz to {RATES[1]:g} Hz, but that is {' or '.join(found) or 'none'}; with"
-        f" the log's rate it is recognised: --rate {next(iter(possible.values()), '100')}",
+        f"the unit of stamps with a median step of {step:g} is"
+        f" {' or '.join(found) or 'none that is known'}; with the log's rate it is recognised:"
+        f" --rate {next(iter(possible.values()), '100')}",
     )
 
 
@@ -156,13 +151,10 @@ def counted_stamps(
     if position is not None and velocity is not None and position.shape == velocity.shape:
         holes = np.concatenate(([False], np.diff(stamps.time) != 1))
         found = rate_of(np.where(holes[:, None], np.nan, position), velocity)
-    count = len(stamps.time)
     what = f"{stamps.name!r} counts samples" if stamps.name else "there are no stamps"
     name, number = stated
     if options.rate:
-        rate = options.rate
-        given = f"no stamps: {count} samples at" if not stamps.name else f"{what}:"
-        remark = f"{given} {rate:g} Hz, as --rate says"
+        rate, by = options.rate, "as --rate says"
         if found and abs(found / rate - 1) > DISAGREE and not options.force:
             raise LogError(
                 path,
@@ -170,24 +162,21 @@ def counted_stamps(
                 f" --rate {found:g}, or --force to take {rate:g} Hz all the same",
             )
     elif number and (found is None or abs(found / number - 1) <= DISAGREE):
-        rate, remark = number, f"{what}: {number:g} Hz, by {name}"
+        rate, by = number, f"by {name}"
     elif found:
         but = f" ({name} says {number:g} Hz)" if number else ""
-        rate = found
-        remark = (
-            f"{what}: {found:g} Hz, at which positions and velocities fit{but}; --rate sets another"
-        )
+        rate, by = found, f"at which positions and velocities fit{but}; --rate sets another"
     else:
         how = "" if time_column([stamps.name]) else ", or name their column: --map time=COLUMN"
         raise LogError(path, f"{what}; give the log's rate, in samples per second: --rate HZ{how}")
+    remark = f"{what}: {rate:g} Hz, {by}"
     return replace(stamps, time=stamps.time / rate, unit="seconds", remark=remark)
 
 
 def rate_of(position: Real, velocity: Real) -> float | None:
-    """Sample rate at which velocities are the steps of positions, in [Hz].
+    """Sample rate at which velocities are the steps of positions, in [Hz]; None if they do not fit.
 
-    Returns:
-        The common rate nearby, or else the rate to three digits; None if they do not fit.
+    It is the common rate nearby, or else the rate to three digits.
     """
     position, velocity = position.astype(np.float64), velocity.astype(np.float64)
     if len(position) < 3:
@@ -217,10 +206,7 @@ def _slope(steps: Real, speed: Real) -> tuple[float, float]:
 
 
 def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], dict[str, int], str]:
-    """Tracks without the samples whose stamps are not later than all before.
-
-    Tracks that share stamps still do afterwards.
-    """
+    """Tracks without samples that are not later than all before, counts of these, a remark."""
     kept: dict[int, tuple[Stamps, Mask]] = {}
     counts = {"duplicates": 0, "backward": 0}
     first: float | None = None
@@ -262,12 +248,7 @@ def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], dic
 
 
 def common_time(tracks: Sequence[Track], main: Track) -> tuple[Array, Mask]:
-    """Uniform time base of a run, over the time that all tracks cover.
-
-    Returns:
-        Time, shape (instants,), in [s], and whether each instant is outside of all gaps; no
-        instants if the tracks do not overlap.
-    """
+    """Uniform time that all tracks cover, in [s], and whether it is outside of all gaps."""
     clock, known = main.stamps.clock, main.stamps.time
     slack = UNIFORM / clock.rate  # tolerance for rounding at the last sample
     time = known
@@ -293,14 +274,11 @@ def common_time(tracks: Sequence[Track], main: Track) -> tuple[Array, Mask]:
 
 
 def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
-    """Values of a track at the instants of a time base.
+    """Values of a track at the instants of a time base, 0 in gaps, shape (instants, columns).
 
     Samples at an instant are taken as they are. Others, and all of a track whose samples are not
     uniform, are interpolated monotonically (PCHIP), without overshoot; quaternions take the shorter
     way and have norm 1.
-
-    Returns:
-        Values, 0 in gaps, shape (instants, columns).
     """
     places = _places(instants, track.stamps, slack)
     if places is not None:
@@ -349,27 +327,18 @@ def _between(instants: Array, stamps: Stamps, values: Real, slack: float) -> Arr
 
 # Two clocks
 
-CORRELATION = 0.6
-"""Least normalised correlation of an accepted offset."""
-NEXT_BEST = 0.95
-"""Largest correlation of the next best offset, as a share of the best."""
-SHARE = 0.5
-"""Least share of the shorter log that overlaps the longer one."""
+CORRELATION = 0.6  # least normalised correlation of an accepted offset
+NEXT_BEST = 0.95  # largest correlation of the next best offset, as a share of the best
+SHARE = 0.5  # least share of the shorter log that overlaps the longer one
 LAG = 0.1
 """Largest delay of measured behind desired motion that is attributed to a controller, in [s]."""
-HIGHEST_RATE = 1000.0
-"""Highest rate at which motions are compared, in [Hz]."""
-COARSE_RATE = 50.0
-"""Rate of the first search, in [Hz]."""
+HIGHEST_RATE = 1000.0  # highest rate at which motions are compared, in [Hz]
+COARSE_RATE = 50.0  # rate of the first search, in [Hz]
 SEGMENTS, SHORTEST = 12, 2.0
 """Largest number of segments that the drift is fitted to, and their least length, in [s]."""
-SIGNIFICANT = 5.0
-"""Least ratio of a drift to its standard error."""
-LEAST_DRIFT = 20e-6
-"""Least drift that is distinguished from none, as of quartz clocks, in [s/s]."""
+SIGNIFICANT = 5.0  # least ratio of a drift to its standard error
+LEAST_DRIFT = 20e-6  # least drift that is distinguished from none, as of quartz clocks, in [s/s]
 
-EXPECTED = f"expected {CORRELATION:g} or more, the next best at most {NEXT_BEST:.0%} of it"
-"""Condition on the correlation for an estimated offset to be used."""
 HOW = "specify --offset SECONDS, which is added to the desired stamps"
 
 
@@ -441,7 +410,7 @@ def _estimated(
         f" (correlation {correlation:.2f}, next best {next_best:.2f})"
     )
     if correlation < CORRELATION or next_best > NEXT_BEST * correlation:
-        unknown = f"the offset cannot be estimated ({said}; {EXPECTED})"
+        unknown = f"the offset cannot be estimated ({said})"
         if apart:
             raise LogError(path, f"{apart}{unknown}; {HOW}")
         assumed = "its clock is assumed to be the measured one's, since"
@@ -622,16 +591,11 @@ def _fitted(residuals: Array, seconds: float, drift: float) -> tuple[float, floa
 
 # A hold: slow signals that were sampled faster
 
-FEWEST = 10
-"""Fewest jumps that show a hold."""
-REGULAR = 0.8
-"""Least share of the jumps that come at the median distance."""
-ALIGNED = 0.99
-"""Least share of the jumps that come a multiple of the hold after each other."""
-EXAMINED = 100_000
-"""Jumps whose size is examined, evenly spread, or a few more."""
-LARGER = 1.5
-"""Least ratio of median to smallest jump: jumps of one size are quantisation."""
+FEWEST = 10  # fewest jumps that show a hold
+REGULAR = 0.8  # least share of the jumps that come at the median distance
+ALIGNED = 0.99  # least share of the jumps that come a multiple of the hold after each other
+EXAMINED = 100_000  # jumps whose size is examined, evenly spread, or a few more
+LARGER = 1.5  # least ratio of median to smallest jump: jumps of one size are quantisation
 
 
 def hold_length(signal: Real, valid: Mask | None = None) -> float:

@@ -6,7 +6,9 @@ from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
+from functools import partial
 from io import StringIO
 from itertools import islice
 from operator import itemgetter
@@ -50,15 +52,14 @@ SPARSE = 0.5  # share of rows without a number from which a column has another c
 LONGEST_LINE = 4 * 2**20  # characters of a line: far more than all columns that are read can have
 DIGITS = 30  # stamps have at most so many digits before or after the point
 PIECE = 2**20  # characters that are read at once
-LATEST_YEAR = 2200  # dates lie before: in nanoseconds, they fit into 64 bits
 
 SECONDS = re.compile(r"(?P<record>.*?)secs?(?:onds)?", re.IGNORECASE)
 NANOSECONDS = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
 """Endings of the two columns of a stamp in whole seconds, and nanoseconds since."""
 NAME = "field.name"
 """Beginning of rostopic's columns with the joints' names, which end with a number."""
-ZONE = re.compile(r"(?<=[\d:])\s*(?:Z|(?P<sign>[+-])(?P<hours>\d\d):?(?P<minutes>\d\d))$")
-"""End of a date that tells its time zone."""
+YEARS = range(1900, 2100)  # of dates; stamps that are larger are in another unit than seconds
+DAY = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 class Layout(NamedTuple):
@@ -72,16 +73,10 @@ class Layout(NamedTuple):
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
-    """Reader of a CSV log, with a row per sample and, unless the options name them, a header.
-
-    The delimiter is a comma, semicolon, tab or blanks; the decimal separator a point, or a comma
-    where that is not the delimiter.
-    """
+    """Reader of a CSV log."""
+    read = partial(_read, path, options)
     return LogReader(
-        "CSV",
-        ("",),
-        lambda _, progress: _read(path, options, progress),
-        lambda: _listing(path, options),
+        "CSV", ("",), lambda _, progress: read(progress), partial(_listing, path, options)
     )
 
 
@@ -182,13 +177,19 @@ def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
     if not any(line.strip() for line in lines):
         raise LogError(path, "the log is empty; expected a header, then a row per sample")
     try:
-        return _layout_of(path, lines, options)
+        delimiter, first = _first_data(lines)
+        if first is None and not options.columns:  # the first line names, rows tell what is wrong
+            rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+            return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
+        return _layout_of(path, lines, delimiter, first, options)
     except csv.Error as error:
         raise LogError(path, f"not a CSV log ({error})") from error
 
 
-def _layout_of(path: Path, lines: Sequence[str], options: ReadOptions) -> Layout:
-    delimiter, first = _first_data(lines)
+def _layout_of(
+    path: Path, lines: Sequence[str], delimiter: str, first: int | None, options: ReadOptions
+) -> Layout:
+    """Layout of a file by the lines before its first row of numbers."""
     before = {
         number: _split(line, delimiter)
         for number, line in enumerate(lines[:first], start=1)
@@ -196,29 +197,19 @@ def _layout_of(path: Path, lines: Sequence[str], options: ReadOptions) -> Layout
     }
 
     def layout(names: Sequence[str], row: int, skip: int, *used: int) -> Layout:
-        others = [number for number in before if number not in used]
-        skipped = f"{counted(len(others), 'line')} before the rows not read"
+        others = len(before) - len(used)
+        skipped = f"{counted(others, 'line')} before the rows not read"
         return Layout(delimiter, tuple(names), row, skip, (skipped,) if others else ())
 
-    if options.columns:
+    if options.columns or first is None:
         skip = max(before, default=0) if first is not None else 0
         return layout([name.strip() for name in options.columns], 0, skip)
-    if first is None:  # no numbers: the first line is the header, and rows tell what is wrong
-        rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
-        return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
     width = len(_split(lines[first], delimiter))
+    names = {number: _clean(cells) for number, cells in before.items()}
     fitting = [number for number, cells in before.items() if abs(len(cells) - width) <= 1]
     plain = [number for number in fitting if not before[number][0].startswith(COMMENTS)]
-    names = {number: _clean(cells) for number, cells in before.items()}
-    candidates = (
-        plain
-        or fitting
-        or [
-            number
-            for number, row in names.items()
-            if time_column(row) or any(map(column_signal, row))
-        ]
-    )
+    known = [n for n, row in names.items() if time_column(row) or any(map(column_signal, row))]
+    candidates = plain or fitting or known
     if not candidates:
         raise _no_header(path, delimiter, first, max(before, default=0) + 1)
     row = candidates[-1]
@@ -226,8 +217,8 @@ def _layout_of(path: Path, lines: Sequence[str], options: ReadOptions) -> Layout
     rows = csv.reader(lines[row - 1 :], delimiter=delimiter, skipinitialspace=True)
     header = _clean(next(rows))
     units = [name.strip("[]() ") for name in header]
-    known = all(not unit or unit.lower() in {*SIGNAL_UNITS, *TIME_UNITS} for unit in units)
-    if len(candidates) > 1 and any(units) and known:
+    are_units = all(not unit or unit.lower() in {*SIGNAL_UNITS, *TIME_UNITS} for unit in units)
+    if len(candidates) > 1 and any(units) and are_units:
         above = zip(names[candidates[-2]], units, strict=False)
         header = tuple(f"{name} [{unit}]" if unit else name for name, unit in above)
         return layout(header, row, first, row, candidates[-2])
@@ -239,7 +230,7 @@ def _first_data(lines: Sequence[str]) -> tuple[str, int | None]:
 
     def share_of_numbers(line: str, mark: str) -> float:
         cells = _split(line, mark)
-        if len(cells) < 2 or not (_is_number(cells[0]) or _is_date(cells[0])):
+        if len(cells) < 2 or not (_is_number(cells[0]) or _date(cells[0]) is not None):
             return 0.0
         return sum(_is_number(each) or _is_missing(each) for each in cells) / len(cells)
 
@@ -469,11 +460,9 @@ def numbers_in(
 ) -> tuple[Array, list[str]] | None:
     """Plain numbers of whole lines, in a tenth of the time that a row at a time takes.
 
-    Cells are converted as one array: beginning a hundred small columns costs as much again.
-
-    Returns:
-        Numbers, shape (lines, wanted), and the text of each line; None if a line is too short or
-        too long, or a cell is empty, quoted, padded or no number.
+    Cells are converted as one array: beginning a hundred small columns costs as much again. The
+    result is the numbers, shape (lines, wanted), and the text of each line; None if a line is too
+    short or too long, or a cell is empty, quoted, padded or no number.
     """
     import pyarrow as pa
 
@@ -516,7 +505,7 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
                     continue
                 if len(cells) == width - 1 and not layout.header[-1]:
                     cells = [*cells, ""]  # the header ends with a separator
-                elif not any(cell.strip() for cell in cells[width:]):
+                elif not any(map(str.strip, cells[width:])):
                     cells = cells[:width]  # the row does
                 if len(cells) != width:
                     names = "the header names" if layout.row else "--columns names"
@@ -545,15 +534,14 @@ def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -
 def _check_sparse(path: Path, names: Sequence[str], table: Array, rows: Sequence[int]) -> None:
     """Refuse columns that have numbers in some rows only, since they have another clock."""
     lacking = np.isnan(table)
-    counts = lacking.sum(axis=0)
-    sparse = (counts >= SPARSE * len(table)) & (counts < len(table))
-    if sparse.any():
-        place = int(np.argmax(sparse))
+    share = lacking.mean(axis=0)
+    sparse = np.flatnonzero((share >= SPARSE) & (share < 1))
+    if len(sparse):
         raise LogError(
             path,
-            f"column {names[place]!r} is empty; {counts[place]} of {len(table)} rows have no"
-            " number there, and columns with another clock must be in a separate log (--desired)",
-            rows[int(np.argmax(lacking[:, place]))],
+            f"column {names[sparse[0]]!r} is empty in {share[sparse[0]]:.0%} of the rows; columns"
+            " with another clock must be in a separate log (--desired)",
+            rows[int(np.argmax(lacking[:, sparse[0]]))],
         )
 
 
@@ -576,53 +564,35 @@ def _decimals(
     path: Path, name: str, cells: Sequence[str], rows: Sequence[int]
 ) -> Sequence[Decimal]:
     """Stamps, of dates in [s] since 1970."""
-    if _is_date(cells[0]):
-        return [_date(path, name, cell, row) for cell, row in zip(cells, rows, strict=True)]
+    dated = _date(cells[0]) is not None
     found = []
     for row, cell in zip(rows, cells, strict=True):
-        try:
-            stamp = Decimal(cell.strip().replace(",", "."))
-        except InvalidOperation:
-            empty = not cell.strip()
-            what = "is empty" if empty else f"holds {cell[:40]!r}, which is not a number"
-            raise LogError(path, f"column {name!r} {what}", row) from None
-        if not stamp.is_finite():
-            raise LogError(path, f"column {name!r} holds {cell.strip()[:40]}", row)
+        stamp = _date(cell) if dated else _decimal(cell)
+        if stamp is None or not stamp.is_finite():
+            what = f"holds {cell.strip()[:40]!r}, which is no time"
+            raise LogError(path, f"column {name!r} {what if cell.strip() else 'is empty'}", row)
         if stamp and not -DIGITS < stamp.adjusted() < DIGITS:
             raise LogError(path, f"the stamp {cell.strip()[:40]!r} is no time", row)
         found.append(stamp)
     return found
 
 
-def _date(path: Path, name: str, cell: str, row: int) -> Decimal:
-    """A date in [s] since 1970, at UTC if it tells its time zone."""
-    text, zone = _without_zone(cell)
+def _decimal(cell: str) -> Decimal | None:
     try:
-        date = np.datetime64(text, "ns")
-        years = int(date.astype("datetime64[Y]").astype(int)) + 1970
-        written = int(np.datetime64(text[:4], "Y").astype(int)) + 1970
-    except ValueError as error:
-        raise LogError(path, f"column {name!r} holds dates and others ({error})", row) from error
-    if abs(years - written) > 1 or written > LATEST_YEAR:
-        what = f"the stamp {cell.strip()[:40]!r} is no date before {LATEST_YEAR}"
-        raise LogError(path, what, row)
-    seconds = Decimal(int(date.astype(np.int64))).scaleb(-9)
-    if zone and zone["sign"]:
-        east = 3600 * int(zone["hours"]) + 60 * int(zone["minutes"])
-        seconds -= east if zone["sign"] == "+" else -east
-    return seconds
+        return Decimal(cell.strip().replace(",", "."))
+    except InvalidOperation:
+        return None
 
 
-def _is_date(cell: str) -> bool:
-    """Whether a cell holds a date, with or without a time zone."""
+def _date(cell: str) -> Decimal | None:
+    """A date in [s] since 1970, at UTC unless it tells its time zone; None of another cell."""
+    if "-" not in cell.strip()[1:]:
+        return None
     try:
-        return "-" in cell.strip()[1:] and not np.isnat(np.datetime64(_without_zone(cell)[0], "us"))
+        date = datetime.fromisoformat(cell.strip())
     except ValueError:
-        return False
-
-
-def _without_zone(cell: str) -> tuple[str, re.Match[str] | None]:
-    """A date without its time zone, and that."""
-    text = cell.strip()
-    zone = ZONE.search(text) if ":" in text else None
-    return text[: zone.start()] if zone else text, zone
+        return None
+    if date.year not in YEARS:
+        return None
+    since = (date if date.tzinfo else date.replace(tzinfo=UTC)) - DAY
+    return Decimal(since // timedelta(microseconds=1)).scaleb(-6)

@@ -62,8 +62,6 @@ sys.stdout.buffer.write(text)
 TIMEOUT = 10.0
 """Time in [s] to read a text of any length: in a damaged heap libhdf5 searches it for ever."""
 
-CONTROLLER = re.compile(r'"type": "((?:OSC|IK|JOINT)_\w+)"')
-"""Type of the controller of an arm in robosuite's arguments."""
 MATLAB = b"MATLAB 7.3"  # the first bytes of a file that MATLAB wrote
 OBJECT = "MATLAB_object_decode"
 """An attribute of MATLAB's objects, of which a file holds numbers and references alone."""
@@ -131,14 +129,13 @@ def _read(
         log = log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
         return replace(log, not_read=(*log.not_read, *objects))
     arrays = arrays if home else part_of(arrays, episode)
-    controller, rate = CONTROLLER.search(about), _rate(about)
+    rate = _rate(about)
     return log_of(
         path,
         {name: each for name, each in arrays.items() if each.dtype.kind in "iuf"},
         options,
         episode=episode,
         stated=(ARGUMENTS, rate) if rate else stated_rate({**attributes, **arrays}),
-        controller=controller[1] if controller else "",
         not_read=left_out,
     )
 

@@ -35,8 +35,8 @@ from noisemodel.types import Array, Mask, Real
 
 FORMAT = "noise-mapping/1"
 UNITS = ("radians", "degrees", "normalised")
-RATES = (1e-3, 1e9)
-"""Rates that a log may be said to have, in [Hz]."""
+"""Units of angles; normalised is -100 to 100 of each joint's range, 0 to 100 of a gripper's."""
+RATES = (1e-3, 1e9)  # rates that a log may be said to have, in [Hz]
 
 CONVENTIONS = {
     "base_pose": ("xyzw", "wxyz"),
@@ -54,37 +54,20 @@ NO_MOTION = (
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """Options of reading a log; what is not specified is taken from the log.
+    """Options of reading a log; what is not specified is taken from the log."""
 
-    Attributes:
-        robot: Name, URDF or MJCF of the robot; joints are checked against it, and numbered
-            columns get its joints in order.
-        rate: The log's rate, if known, in [Hz].
-        units: "radians", "degrees" or "normalised" (-100 to 100 of each joint's range, 0 to 100
-            of a gripper's); empty for the log's own.
-        joints: Names of the columns of arrays, in order.
-        topics: The topics to read, all unless given.
-        offset: Offset added to the desired motion's stamps, in [s]; estimated unless given.
-        columns: Names of the columns of a CSV log, in order, in place of its header; "" for one
-            that is not read.
-        force: Whether a rate is taken that positions and velocities contradict.
-        entries: The mapping of columns and arrays.
-    """
-
-    robot: str = ""
-    rate: float | None = None
-    units: str = ""
-    joints: tuple[str, ...] = ()
-    topics: tuple[str, ...] = ()
-    offset: float | None = None
-    columns: tuple[str, ...] = ()
-    force: bool = False
-    entries: tuple[Entry, ...] = ()
+    robot: str = ""  # name, URDF or MJCF: joints are checked against it, numbered ones get its own
+    rate: float | None = None  # the log's rate, if known, in [Hz]
+    units: str = ""  # of angles: one of `UNITS`; empty for the log's own
+    joints: tuple[str, ...] = ()  # names of the columns of arrays, in order
+    topics: tuple[str, ...] = ()  # the topics to read, all unless given
+    offset: float | None = None  # added to the desired motion's stamps, in [s]; else estimated
+    columns: tuple[str, ...] = ()  # names in place of a CSV's header; "" for one that is not read
+    force: bool = False  # whether a rate is taken that positions and velocities contradict
+    entries: tuple[Entry, ...] = ()  # the mapping of columns and arrays
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.rate is not None and not self.rate > 0:
-            raise OptionError(f"the rate is {self.rate:g} Hz; expected a number above 0")
         if self.rate is not None and not RATES[0] <= self.rate <= RATES[1]:
             raise OptionError(
                 f"the rate is {self.rate:g} Hz; expected {RATES[0]:g} to {RATES[1]:g} Hz"
@@ -116,12 +99,11 @@ class ReadOptions:
             form = re.compile(f"{re.escape(before)}(.+){re.escape(after)}")
             found = [(name, match[1]) for name in names if (match := form.fullmatch(name))]
             free = [(name, joint) for name, joint in found if name not in taken]
-            if not found or (not free and entry.source != JOINT):
+            if not free and (not found or entry.source != JOINT):
                 raise LogError(
                     path,
-                    f"the pattern {entry.target}={entry.source} fits"
-                    f" {'columns that others map' if found else 'no column'}; columns are"
-                    f" {listed(names)}",
+                    f"the pattern {entry.target}={entry.source} fits no column that is free;"
+                    f" columns are {listed(names)}",
                 )
             for name, joint in free:
                 new = Entry(entry.signal, entry.joint.replace(JOINT, joint), name)
@@ -140,27 +122,23 @@ class ReadOptions:
         """Options from a saved mapping."""
         try:
             saved = from_toml(text_of(path))
+            if saved.pop("format", None) != FORMAT:
+                raise OptionError(f'not a mapping; expected format = "{FORMAT}"')
+            entries = saved.pop("map", {})
+            known = {field.name for field in fields(cls)} - {"entries"}
+            if unknown := sorted(set(saved) - known):
+                names = ", ".join(sorted(known))
+                raise OptionError(f"unknown setting {unknown[0]!r}; there are {names}, map")
+            sources = {target: _setting(target, source) for target, source in entries.items()}
+            parsed = parse_mapping(f"{target}={source}" for target, source in sources.items())
+            settings = {name: _setting(name, value) for name, value in saved.items()}
+            return cls(**settings, entries=parsed)
         except OSError as error:
             raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
-        except ValueError as error:
-            raise InspectorError(f"{path}: not a mapping in TOML ({error})") from error
-        if saved.pop("format", None) != FORMAT:
-            raise InspectorError(f'{path}: not a mapping; expected format = "{FORMAT}"')
-        entries = saved.pop("map", {})
-        known = {field.name for field in fields(cls)} - {"entries"}
-        if unknown := sorted(set(saved) - known):
-            raise InspectorError(
-                f"{path}: unknown setting {unknown[0]!r}; there are {', '.join(sorted(known))}, map"
-            )
-        try:
-            for target, source in entries.items():
-                _setting(target, source)
-            parsed = parse_mapping(f"{target}={source}" for target, source in entries.items())
-            return cls(
-                **{name: _setting(name, value) for name, value in saved.items()}, entries=parsed
-            )
         except (InspectorError, AttributeError, TypeError) as error:
             raise InspectorError(f"{path}: {error}") from error
+        except ValueError as error:
+            raise InspectorError(f"{path}: not a mapping in TOML ({error})") from error
 
     def save(self, path: Path, *, overwrite: bool = False) -> None:
         """Write the options as TOML, to be loaded again."""
@@ -179,12 +157,10 @@ class ReadOptions:
 def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
     """Mapping of columns and arrays, parsed.
 
-    Args:
-        entries: ``SIGNAL.JOINT=COLUMN``, ``SIGNAL=ARRAY`` or ``time=COLUMN`` each. The column may
-            hold any character, the joint any but "="; of an array ``[3]``, ``[7:]`` or ``[:7]``
-            names a part. ``velocity.{joint}={joint}_actual`` maps all columns of that form.
-            Signals of the base may name a convention of ``CONVENTIONS``:
-            ``base_pose.wxyz=root_pose``.
+    Each is ``SIGNAL.JOINT=COLUMN``, ``SIGNAL=ARRAY`` or ``time=COLUMN``. The column may hold any
+    character, the joint any but "="; of an array ``[3]``, ``[7:]`` or ``[:7]`` names a part.
+    ``velocity.{joint}={joint}_actual`` maps all columns of that form. Signals of the base may name
+    one of ``CONVENTIONS``: ``base_pose.wxyz=root_pose``.
     """
     parsed: list[Entry] = []
     for text in entries:
@@ -201,17 +177,16 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
             raise OptionError(
                 f"mapping {text!r}: a {signal} is written as {' or '.join(CONVENTIONS[signal])}"
             )
-        if (JOINT in joint or JOINT in source) and not joint.count(JOINT) == source.count(
-            JOINT
-        ) == 1:
+        patterns = joint.count(JOINT), source.count(JOINT)
+        if any(patterns) and patterns != (1, 1):
             raise OptionError(
                 f"mapping {text!r}: a pattern has {JOINT} once on either side, such as"
                 f" 'velocity.{JOINT}={JOINT}_actual'"
             )
-        if any(entry.source == source for entry in parsed):
-            raise OptionError(f"mapping {text!r}: column {source!r} is mapped twice")
-        if any(entry.target == target and not entry.is_pattern for entry in parsed):
-            raise OptionError(f"mapping {text!r}: {target} is mapped twice")
+        for entry in parsed:
+            if entry.source == source or (entry.target == target and not entry.is_pattern):
+                twice = source if entry.source == source else target
+                raise OptionError(f"mapping {text!r}: {twice!r} is mapped twice")
         parsed.append(Entry(signal, joint, source))
     return tuple(parsed)
 
@@ -291,7 +266,11 @@ def tracks_of(
         raise no_motion(log.path, [*names, *log.not_read])
     read = {id(choice.field) for choice in kept}
     not_read = tuple(field.name for field in log.fields if id(field) not in read)
-    remarks = [*_naming_remarks(kept, naming, options, robot)]
+    remarks = list[str]()
+    if naming.qd_is_desired:
+        remarks.append("qd is the desired position, since dq is the velocity (else --map)")
+    if naming.remark and any(not c.explicit and c.field.name in naming.bare for c in kept):
+        remarks.append(naming.remark)
     if unknown and robot:
         remarks.append(f"left out, not joints of {robot.name!r}: {listed(unknown)}")
     return (*_base_tracks(log, kept), *_joint_tracks(kept)), (*log.not_read, *not_read), (*remarks,)
@@ -317,26 +296,6 @@ def check_unit(path: Path, name: str, meaning: Meaning | None, row: int | None =
         f" '{unit}.{joint}={name}' or --map '{signal}.{joint}={name}'",
         row=row,
     )
-
-
-def _naming_remarks(
-    kept: Sequence[_Choice], naming: Naming, options: ReadOptions, robot: Robot | None
-) -> Iterator[str]:
-    """What was decided about names that leave it open, a sentence each."""
-    found = {
-        number_of(known[1]): each.joint
-        for each in kept
-        if _is_column(each.field)
-        and (known := column_signal(each.field.name, naming))
-        and known[1] != each.joint
-    }
-    lowest = min((number for number in found if number is not None), default=0)
-    if lowest and (options.joints or robot):
-        yield f"columns count joints from {naming.first}: {lowest} is {found[lowest]}"
-    if naming.qd_is_desired:
-        yield "qd is the desired position, since dq is the velocity (else --map)"
-    if naming.remark and any(not c.explicit and c.field.name in naming.bare for c in kept):
-        yield naming.remark
 
 
 def _is_column(field: Field) -> bool:
@@ -379,20 +338,15 @@ def _both(log: Log, joint: str, before: _Choice, after: _Choice) -> LogError:
     """Error of two columns that hold the same signal."""
     old, new = before.field, after.field
     what = f"{after.signal} of " + (f"joint {joint!r}" if joint else "the base")
-    if new.source != old.source:
-        return LogError(
-            log.path, f"{old.source} and {new.source} both hold {what}; choose with --topic"
-        )
-    if new.joints != old.joints:
-        since = float(new.stamps.start - old.stamps.start)
-        return LogError(
-            log.path,
-            f"{new.source}: the set of joints changes {since:.6g} s into the log, from"
-            f" {listed(old.joints)} to {listed(new.joints)}; split the log there",
-        )
-    row = 1 if new.stamps.rows is not None else None
     how = "" if JOINT in joint else f"; choose with --map '{after.signal}.{joint}={after.label}'"
-    return LogError(log.path, f"{before.label!r} and {after.label!r} both hold {what}{how}", row)
+    names = f"{before.label!r} and {after.label!r}"
+    if new.source != old.source:
+        names, how = f"{old.source} and {new.source}", "; choose with --topic"
+    elif new.joints != old.joints:
+        problem = f"{new.source}: the set of joints changes within the log; split it there"
+        return LogError(log.path, problem)
+    row = 1 if new.stamps.rows is not None else None
+    return LogError(log.path, f"{names} both hold {what}{how}", row)
 
 
 def _joint_tracks(choices: Sequence[_Choice]) -> Iterator[Track]:
@@ -445,12 +399,7 @@ def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
 
 
 def pose_of(values: Real, convention: str) -> Array:
-    """Pose of a base in the run's order: x, y, z and the quaternion x, y, z, w.
-
-    Args:
-        values: x, y, z and a quaternion, shape (samples, 7), in [m].
-        convention: "wxyz" or "xyzw", the order of the quaternion.
-    """
+    """Pose of a base as the run has it, x, y, z and the quaternion x, y, z, w, in `CONVENTIONS`."""
     order = [0, 1, 2, 4, 5, 6, 3] if convention == "wxyz" else slice(None)
     return np.asarray(values, dtype=np.float64)[:, order]
 
@@ -461,13 +410,9 @@ def not_normalised(pose: Array) -> Mask:
 
 
 def velocity_of(values: Real, convention: str, pose: Array) -> Array:
-    """Velocity of the base in body axes, linear, then angular, as Pinocchio has it.
+    """Velocity of a base in body axes, linear, then angular, of one in `CONVENTIONS`.
 
-    Args:
-        values: Linear, then angular velocity, shape (samples, 6).
-        convention: "world" for world axes, "mujoco" for a linear velocity in world axes and an
-            angular one in body axes (``qvel`` of a free joint), "body" for body axes.
-        pose: The base's pose at the same samples, as the run has it, shape (samples, 7).
+    ``pose`` is that of the same samples, as the run has it, shape (samples, 7).
     """
     linear, angular = np.hsplit(np.asarray(values, dtype=np.float64), 2)
     if convention in ("world", "mujoco"):

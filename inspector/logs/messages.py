@@ -28,8 +28,7 @@ DAMAGE = (
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
-DESCRIPTION = "robot_description"
-"""The last part of the name of the topic with a robot's URDF."""
+DESCRIPTION = "robot_description"  # the last part of the name of the topic with a robot's URDF
 
 COMMANDED = ("command", "desired", "target", "reference", "setpoint")
 """A JointState topic with one of these in its name holds desired motion."""
@@ -153,11 +152,9 @@ def _nanoseconds(time: Any) -> int:
     return int(time.sec) * 10**9 + int(time.nanosec)
 
 
-LITTLE = b"\x00\x01"
-"""CDR, little-endian; other encodings are deserialised by rosbags."""
+LITTLE = b"\x00\x01"  # CDR, little-endian; other encodings are deserialised by rosbags
 STAMP, COUNT = struct.Struct("<iI"), struct.Struct("<I")
-BODY = 12
-"""Offset of the bytes after the stamp."""
+BODY = 12  # offset of the bytes after the stamp
 
 
 @dataclass(frozen=True)

@@ -32,30 +32,19 @@ from noisemodel import Robot, Run
 from noisemodel.run import METHOD, base_velocity, joint_velocity
 from noisemodel.types import Array, Indices, Mask, Real
 
-LARGEST_RATE_RATIO = 1.5
-"""Largest ratio of the specified rate to the stamps' rate, or the inverse."""
-SAME_RATE = 1.01
-"""Ratio of two rates up to which no band is lost from one to the other."""
-MOST_SAMPLES_PER_STAMP = 20
-"""Largest number of the run's samples per logged sample; above it most of the run is gaps."""
-NO_RANGE = "normalised to 0 to 100 of its range, left out since no robot is specified"
+LARGEST_RATE_RATIO = 1.5  # of the specified rate to the stamps' rate, or the inverse
+SAME_RATE = 1.01  # ratio of two rates up to which no band is lost from one to the other
+MOST_SAMPLES_PER_STAMP = 20  # of the run, above which most of it is gaps
 
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """A run that was read from a log.
-
-    Attributes:
-        run: The run.
-        remarks: What was decided during the import, a sentence each.
-        name: Name of the log and of the episode.
-        urdf: Text of the URDF in the log, if no robot was specified.
-    """
+    """A run that was read from a log."""
 
     run: Run
-    remarks: tuple[str, ...]
-    name: str = ""
-    urdf: str = ""
+    remarks: tuple[str, ...]  # what was decided during the import, a sentence each
+    name: str = ""  # of the log and of the episode
+    urdf: str = ""  # text of the URDF in the log, if no robot was specified
 
 
 def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
@@ -129,10 +118,8 @@ def _with_two_samples(path: Path, tracks: Sequence[Track], remarks: list[str]) -
 
 # Values that are none
 
-ABSURD = 1e6
-"""Value of an angle or speed that no unit explains."""
-FEW = 0.1
-"""Largest share of samples that may hold such values; a desired motion may run away to the end."""
+ABSURD = 1e6  # value of an angle or speed that no unit explains
+FEW = 0.1  # share of samples that may hold such; a desired motion may run away to the end
 
 
 def _finite(path: Path, track: Track, remarks: list[str]) -> Track | None:
@@ -205,12 +192,9 @@ def _columns(track: Track, kept: Sequence[int]) -> Track:
     )
 
 
-FROZEN = 0.2
-"""Least time for which a frozen log repeats a row, in [s]."""
-FROZEN_HOLDS = 5.0
-"""The same as a multiple of the time for which it holds values anyway."""
-FROZEN_WAY = 0.05
-"""Least way that joints should have gone in that time, in [rad] or [m]."""
+FROZEN = 0.2  # least time for which a frozen log repeats a row, in [s]
+FROZEN_HOLDS = 5.0  # the same as a multiple of the time for which it holds values anyway
+FROZEN_WAY = 0.05  # least way that joints should have gone in that time, in [rad] or [m]
 
 
 def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
@@ -268,20 +252,14 @@ def _repeats(time: Array, same: Mask, tracks: Sequence[Track]) -> Iterator[tuple
 
 LARGEST = {"position": 4 * np.pi, "velocity": 100.0}
 """Values above which an angle is taken for degrees, in [rad] and [rad/s]."""
-TURN = 2 * np.pi
-"""Positions beyond a turn, of half of the joints that move, are in degrees, in [rad]."""
-FARTHEST = 720.0
-"""Largest position of an arm's joint, in [deg]; wheels turn farther."""
-NORMALISED = 100.0
-"""Largest position that may be normalised as well."""
-STRAIGHT = 0.9
-"""Largest share of a joint's way that it is away from its start: wheels go on in one direction."""
+TURN = 2 * np.pi  # positions beyond, of half of the joints that move, are in degrees, in [rad]
+FARTHEST = 720.0  # largest position of an arm's joint, in [deg]; wheels turn farther
+NORMALISED = 100.0  # largest position that may be normalised as well
+STRAIGHT = 0.9  # share of its way that a joint is away from its start: wheels go on and on
 MATCHES = {1.0: ("position", "velocity"), np.pi / 180: ("position",), 180 / np.pi: ("velocity",)}
 """What is in degrees, by the ratio of logged velocities to the slope of positions."""
-CLOSE = 0.1
-"""Largest relative deviation from such a ratio."""
-STRETCHES = 50
-"""Stretches of a log whose ways are compared."""
+CLOSE = 0.1  # largest relative deviation from such a ratio
+STRETCHES = 50  # of a log, whose ways are compared
 TURNING = ("revolute", "continuous")
 
 HINT = (
@@ -295,16 +273,14 @@ def _in_si(
 ) -> tuple[list[Track], tuple[str, ...]]:
     """Tracks in radians that know which columns are angles, and what was found to be in degrees."""
     kinds = {joint.name: joint.kind for joint in robot.joints} if robot else {}
-    grippers = bool(log.units)  # normalised, whatever the unit of the others is
     in_degrees: tuple[str, ...] = ()
     found = list(tracks)
-    if units:
-        if grippers and units == "degrees" and not robot:
-            left_out = dict.fromkeys(j for t in tracks for j in t.joints if _is_gripper(j))
-            remarks += [f"{NO_RANGE}: {listed(list(left_out))}"] if left_out else []
-        every = (_converted(log.path, t, robot, kinds, units, grippers=grippers) for t in tracks)
+    if units == "degrees":
+        found = [_to_radians(t, _angular(t, kinds) & ~_shares(log, t, units)) for t in tracks]
+    if units in ("degrees", "normalised"):
+        every = (_of_range(log, track, robot, units, remarks) for track in found)
         found = [track for track in every if track is not None]
-    else:
+    elif not units:
         in_degrees = _in_degrees(tracks, kinds)
         for place, track in enumerate(found):
             if track.quantity in in_degrees:
@@ -391,40 +367,33 @@ def _to_radians(track: Track, angular: Mask) -> Track:
     return replace(track, values=np.where(angular, np.deg2rad(track.values), track.values))
 
 
-def _converted(
-    path: Path,
-    track: Track,
-    robot: Robot | None,
-    kinds: Mapping[str, str],
-    units: str,
-    *,
-    grippers: bool,
-) -> Track | None:
-    """Track in radians of one in units that are given; None if no column is left.
+def _shares(log: Log, track: Track, units: str) -> Mask:
+    """Whether each column is a share of its joint's range: grippers are whatever others are."""
+    grippers = bool(log.units)
+    every = (units == "normalised" or (grippers and _is_gripper(j)) for j in track.joints)
+    return np.array([*every], dtype=bool)
 
-    Args:
-        grippers: Whether grippers are normalised whatever the others are.
-    """
-    if units == "radians":
+
+def _of_range(
+    log: Log, track: Track, robot: Robot | None, units: str, remarks: list[str]
+) -> Track | None:
+    """Track in radians of one with shares of ranges; None if no column is left."""
+    shares = _shares(log, track, units)
+    if not shares.any():
         return track
-    of_range = [units == "normalised" or (grippers and _is_gripper(j)) for j in track.joints]
-    shares = np.array(of_range, dtype=bool)
-    if units == "degrees" and robot is None and shares.any():  # their range is not known
-        if shares.all():
-            return None
-        track = _columns(track, np.flatnonzero(~shares).tolist())
-        shares = shares[~shares]
-    if units == "degrees":
-        track = _to_radians(track, _angular(track, kinds) & ~shares)
-    if not shares.any() or not track.signal.startswith(("position", "velocity")):
+    if robot is None and units == "degrees":
+        names = listed(_chosen(track.joints, shares))
+        remark = f"left out, since no robot tells their range: {names}"
+        remarks += [] if remark in remarks else [remark]
+        return None if shares.all() else _columns(track, np.flatnonzero(~shares).tolist())
+    if not track.signal.startswith(("position", "velocity")):
         return track
     if robot is None:
-        raise LogError(
-            path, "normalised units are shares of the joints' ranges; name the robot (--robot)"
-        )
+        problem = "normalised units are shares of the joints' ranges; name the robot (--robot)"
+        raise LogError(log.path, problem)
     scales, zeros = np.ones(len(shares)), np.zeros(len(shares))
     for place in np.flatnonzero(shares).tolist():
-        scales[place], zeros[place] = _share_of_range(path, track.joints[place], robot)
+        scales[place], zeros[place] = _share_of_range(log.path, track.joints[place], robot)
     moved = zeros if track.signal.startswith("position") else 0.0
     return replace(track, values=track.values * scales + moved)
 
@@ -462,8 +431,7 @@ def _refuse_degrees(path: Path, track: Track, kinds: Mapping[str, str]) -> None:
 
 # Targets that are held
 
-SLOWER = 1.5
-"""Least ratio of the targets' hold to the measured values'."""
+SLOWER = 1.5  # least ratio of the targets' hold to the measured values'
 
 
 def _without_held_targets(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
@@ -531,10 +499,8 @@ def _evenly(places: Indices) -> Array:
 def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str) -> Imported:
     """Run of one log, or of one with the measured and one with the desired motion.
 
-    The run's time starts at 0; its ``meta`` has the first stamp. Samples whose stamps are not
-    uniform are resampled to the specified rate, or to the nearest round one; ``valid`` is False
-    in gaps. The run is cut to the time that all signals cover. Missing velocities are
-    differentiated from positions.
+    Samples whose stamps are not uniform are resampled to the specified rate, or to the nearest
+    round one. The run is cut to the time that all signals cover.
     """
     _check_mapping(logs, options)
     if len(logs) > 1:
@@ -548,7 +514,6 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
     remarks = [*_remarks(logs, tracks)]
     remarks += [f"{logs[-1].path.name}: {said}"] if said else []
     own = next(t.stamps for t in tracks if t.signal == main.signal and t.joints == main.joints)
-    remarks += _decimated(tracks, own)
     kept = _without_held_targets(tracks, remarks)
     time, valid = common_time(kept, next(track for track in kept if track.stamps is own))
     if len(time) < 2 or not valid.any():
@@ -673,19 +638,6 @@ def _of_clock(stamps: Stamps) -> Iterator[str]:
             f"{counted(len(clock.gaps), 'gap')}, {total:.3g} s in all, the first at"
             f" {clock.gaps[0][0]:.6g} s, marked as not valid"
         )
-
-
-def _decimated(tracks: Sequence[Track], own: Stamps) -> Iterator[str]:
-    """What the run's rate takes from signals that were sampled faster, a sentence each clock."""
-    faster: dict[int, list[Track]] = {}
-    for track in tracks:
-        if track.stamps is not own:
-            faster.setdefault(id(track.stamps), []).append(track)
-    for group in faster.values():
-        before = group[0].stamps.clock.nominal
-        if lost := _lost(before, own.clock.rate):
-            names = ", ".join(dict.fromkeys(track.signal for track in group))
-            yield f"{names}: decimated from {before:g} to {own.clock.rate:g} Hz{lost}"
 
 
 def _lost(before: float, after: float) -> str:

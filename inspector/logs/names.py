@@ -40,8 +40,8 @@ UNITS = {
     **dict.fromkeys(("deg", "degree", "degrees", "°"), ("position", pi / 180)),
     "mrad": ("position", 1e-3),
     **dict.fromkeys(("rev", "turns"), ("position", 2 * pi)),
-    **dict.fromkeys(("m",), ("position", 1.0)),
-    **dict.fromkeys(("mm",), ("position", 1e-3)),
+    "m": ("position", 1.0),
+    "mm": ("position", 1e-3),
     **dict.fromkeys(("rad/s", "rad/sec", "rad_s", "rads", "radps"), ("velocity", 1.0)),
     **dict.fromkeys(
         ("deg/s", "deg/sec", "deg_s", "degs", "degps", "dps", "°/s"), ("velocity", pi / 180)
@@ -49,8 +49,8 @@ UNITS = {
     "mrad/s": ("velocity", 1e-3),
     **dict.fromkeys(("rpm", "rev/min"), ("velocity", pi / 30)),
     **dict.fromkeys(("rev/s", "turns/s"), ("velocity", 2 * pi)),
-    **dict.fromkeys(("m/s",), ("velocity", 1.0)),
-    **dict.fromkeys(("mm/s",), ("velocity", 1e-3)),
+    "m/s": ("velocity", 1.0),
+    "mm/s": ("velocity", 1e-3),
     **dict.fromkeys(("nm", "n m", "n*m", "n.m", "n·m", "n", "a"), ("effort", 1.0)),
 }
 """Quantity and size, in [rad], [rad/s], [m] or [m/s], of units, as names of columns have them."""
@@ -94,42 +94,25 @@ ALONE = (
     r"|q|qd|dq|q_?dot)"
 )
 
-PATTERNS = {
-    name: re.compile(pattern, flags)
-    for name, pattern, flags in (
-        (
-            "a joint, then the signal of a run file",
-            r"(?:.*/)?(?P<joint>[^/]+)[./](?P<quantity>position|velocity|effort)"
-            r"(?P<after>(?<!effort)_desired)?",
-            re.NOFLAG,
-        ),
-        (
-            "a quantity and the joint's number",
-            RECORD + WORD + BEFORE + WORD + QUANTITY + AFTER + GAP + "?" + NUMBER + LAST,
-            re.IGNORECASE,
-        ),
-        (
-            "a quantity of all joints, or of the only one",
-            RECORD + BEFORE + WHOSE + ALONE + AFTER,
-            re.IGNORECASE,
-        ),
-        (
-            "a limb, a quantity and the joint's number",
-            RECORD + LIMB + GAP + WORD + BEFORE + QUANTITY + AFTER + GAP + "?" + NUMBER + LAST,
-            re.IGNORECASE,
-        ),
-        (
-            "a joint, then a quantity",
-            RECORD + BEFORE + r"(?P<joint>[^/]+?)" + GAP + WITHIN + QUANTITY + AFTER,
-            re.IGNORECASE,
-        ),
-    )
-}
-"""Names of columns and arrays; the first that matches counts."""
-FIRST, WHOLE = (
-    PATTERNS["a joint, then the signal of a run file"],
-    PATTERNS["a quantity of all joints, or of the only one"],
+# A joint, then the signal of a run file, as it is written there
+FIRST = re.compile(
+    r"(?:.*/)?(?P<joint>[^/]+)[./](?P<quantity>position|velocity|effort)"
+    r"(?P<after>(?<!effort)_desired)?"
 )
+# A quantity of all joints, or of the only one
+WHOLE = re.compile(RECORD + BEFORE + WHOSE + ALONE + AFTER, re.IGNORECASE)
+
+NUMBERED = QUANTITY + AFTER + GAP + "?" + NUMBER + LAST
+PATTERNS = (
+    FIRST,
+    re.compile(RECORD + WORD + BEFORE + WORD + NUMBERED, re.IGNORECASE),  # q_d[0], joint_pos_1
+    WHOLE,
+    re.compile(RECORD + LIMB + GAP + WORD + BEFORE + NUMBERED, re.IGNORECASE),  # left_q_1
+    re.compile(  # a joint, then a quantity: elbow_target_vel
+        RECORD + BEFORE + r"(?P<joint>[^/]+?)" + GAP + WITHIN + QUANTITY + AFTER, re.IGNORECASE
+    ),
+)
+"""Names of columns and arrays; the first that matches counts."""
 
 NOT_JOINTS = re.compile(
     rf"(?:.*{GAP})?(?:tcp|eef?|end_?effector|cartesian|cart|linear|angular|lin|ang|com|imu|odom|gps"
@@ -178,34 +161,22 @@ UNLIKELY = re.compile(
 )
 """Names that an example of what to type leaves out."""
 
-LONGEST = 300
-"""Characters of a name from which on it names no signal: patterns take their square."""
+LONGEST = 300  # characters of a name from which on it names no signal: patterns take their square
 
-SIDES = ("before", "within", "after", "last")
-"""Parts of a name that tell whether it is desired."""
+SIDES = ("before", "within", "after", "last")  # parts of a name that tell whether it is desired
 
-ROBOSUITE = re.compile(r"robot\d+_(?=joint_(pos|vel)$)")
-"""Prefix of robosuite's arrays."""
+ROBOSUITE = re.compile(r"robot\d+_(?=joint_(pos|vel)$)")  # prefix of robosuite's arrays
 
 
 @dataclass(frozen=True)
 class Naming:
-    """How the columns of one log are named, where single names leave it open.
+    """How the columns of one log are named, where single names leave it open."""
 
-    Attributes:
-        first: Number of the first joint.
-        qd_is_desired: Whether ``qd`` is the desired position, since ``dq`` is the velocity.
-        bare: Meaning of columns that name a joint and no quantity.
-        remark: What was decided about these, a sentence; empty if nothing.
-        only: The joint of columns that name none: "" unless a single joint has a name, None
-            where several do.
-    """
-
-    first: int = 0
-    qd_is_desired: bool = False
-    bare: dict[str, Meaning] = field(default_factory=dict)
-    remark: str = ""
-    only: str | int | None = ""
+    first: int = 0  # number of the first joint
+    qd_is_desired: bool = False  # whether `qd` is the desired position, since `dq` is the velocity
+    bare: dict[str, Meaning] = field(default_factory=dict)  # of columns that name a joint alone
+    remark: str = ""  # what was decided about these, a sentence; empty if nothing
+    only: str | int | None = ""  # joint of columns that name none; None where several are named
 
     @classmethod
     def of(cls, columns: Iterable[str], joints: Collection[str] = ()) -> "Naming":
@@ -411,7 +382,7 @@ def pattern_for(names: Sequence[str]) -> str:
 def _match(name: str) -> re.Match[str] | None:
     if len(name) > LONGEST or NOT_MOTION.fullmatch(name):
         return None
-    found = next((match for each in PATTERNS.values() if (match := each.fullmatch(name))), None)
+    found = next((match for each in PATTERNS if (match := each.fullmatch(name))), None)
     if found is None or found.re is FIRST:
         return found
     joint = found.groupdict().get("joint")

@@ -38,10 +38,8 @@ def known_limits(robot: str | None) -> tuple[Mapping[str, Limits], str]:
 def check_joints(joints: Sequence[str], robot: str | None) -> tuple[str, ...]:
     """Joints of a robot that a run lacks, which are assumed stationary.
 
-    Nothing is checked if the robot cannot be read.
-
     Raises:
-        WrongRobotError: If the run names a joint that the robot lacks.
+        WrongRobotError: If the run names a joint that the robot lacks; not if it cannot be read.
     """
     known, _ = known_limits(robot)
     names = _named(joints, known)
@@ -71,10 +69,8 @@ def _named(joints: Sequence[str], known: Mapping[str, Limits]) -> tuple[str, ...
 # Limits of a robot: a moment beyond them is what a fault looks like; another robot, or another
 # unit, exceeds them all along.
 
-FAR_POSITION = 0.25
-"""Share of a joint's range by which positions may be beyond its ends."""
-FAR_VELOCITY = 1.5
-"""Multiple of a joint's velocity limit that velocities may reach."""
+FAR_POSITION = 0.25  # share of a joint's range by which positions may be beyond its ends
+FAR_VELOCITY = 1.5  # multiple of a joint's velocity limit that velocities may reach
 LONG = 1.0
 """Time for which limits have to be exceeded, in [s]; of short runs, a tenth of their duration."""
 
@@ -94,11 +90,7 @@ def limit_warnings(run: Run) -> Iterator[str]:
 
 
 class LimitWatch:
-    """Counts, joint by joint, samples of a motion that are far beyond the limits of a robot.
-
-    Args:
-        joints: Names of the columns; those that the robot lacks have no limits.
-    """
+    """Counts samples beyond the limits of a robot by far, for each joint that it knows."""
 
     def __init__(self, joints: Sequence[str], robot: str) -> None:
         known, _ = known_limits(robot)
@@ -162,16 +154,14 @@ FACTORS: Mapping[float, str] = {
 """Warnings by the ratio of velocities to the slope of positions."""
 NEAR_FACTOR = 0.02
 """Largest relative deviation from a factor, less than half the distance of two of them."""
-STRETCH = 0.2
-"""Time over which velocities are integrated and compared with positions, in [s]."""
+STRETCH = 0.2  # time over which velocities are integrated and compared with positions, in [s]
 AGREE = 0.2
 """Largest relative deviation of a velocity from the slope of its position: filters attenuate."""
 RELATED, UNRELATED = 0.9, 0.3
 """Correlation of the two from which a factor is one, and below which they have no relation."""
 WAY = 0.02
 """Root mean square of the way in a stretch from which a joint is compared, in [rad] or [m]."""
-ENOUGH = 5
-"""Fewest stretches."""
+ENOUGH = 5  # fewest stretches
 
 
 def contradictions(run: Run) -> Iterator[str]:

@@ -514,8 +514,7 @@ def _is_archive(path: Path) -> bool:
 
 # Import as run files
 
-DIGEST = "import_sha256"
-"""Key of ``meta`` with the digest of what a run file was made of."""
+DIGEST = "import_sha256"  # key of ``meta`` with the digest of what a run file was made of
 READ = (*SUFFIXES, ".json", ".yaml")
 """Suffixes of the files of a folder that are read if it is a log."""
 
