@@ -1,15 +1,12 @@
 """The command that measures a model."""
 
 import json
-import struct
 
 import numpy as np
 import pytest
 from commandline import call
-from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
 
 from inspector.training import train
-from noiseclassifier.assessment import measure
 from noiseclassifier.recording import group_of
 
 
@@ -49,7 +46,7 @@ def test_the_measures_of_a_model_are_printed(folder):
     assert "6 runs in 6 groups" in out
     assert "Faults found, of all injected         100.0%" in out
     assert "False alarms per hour of ok time      0 [0, " in out
-    assert "As the paper measures, in shares of ALL frames" in out
+    assert "As the paper measures\nFalse negative errors" in out
 
 
 def test_json_is_printed_or_written_with_the_models_name(folder, tmp_path):
@@ -57,7 +54,7 @@ def test_json_is_printed_or_written_with_the_models_name(folder, tmp_path):
     assert status == 0
     report = json.loads(out)
     assert (report["model"], report["runs"]) == ("model.npz", 6)
-    assert np.array(report["confusion"]).sum() == 6 * 2 * 7
+    assert np.array(report["frames"]["confusion"]).sum() == 6 * 2 * 7
     path = tmp_path / "report.json"
     status, out, _ = call("evaluate", folder / "model.npz", folder / "test", "-o", path)
     assert status == 0
@@ -132,7 +129,7 @@ def test_runs_below_the_rate_of_the_model_are_listed_as_not_answered(folder, tmp
     slow = simulated(tmp_path / "slow.npz", 40, robot="a1", rate=200)
     status, out, err = call("evaluate", folder / "model.npz", folder / "test", slow)
     assert (status, err) == (0, "")
-    assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of a1" in out
+    assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of 1 robot (a1)" in out
     status, out, _ = call("evaluate", folder / "model.npz", folder / "test", slow, "--json")
     (listed,) = json.loads(out)["protocol"]["unanswered"]
     assert (listed["run"], listed["robot"]) == ("slow", "a1")
@@ -176,48 +173,3 @@ def test_a_model_that_ships_is_taken_by_its_name(tmp_path):
     status, _, err = call("evaluate", "General", tmp_path)
     assert (status, err.count("\n")) == (3, 1)
     assert "General: no such model; name a file, or one that ships: general" in err
-
-
-def test_a_picture_is_drawn(folder, tmp_path):
-    pytest.importorskip("matplotlib")
-    path = tmp_path / "report.png"
-    status, _, err = call("evaluate", folder / "model.npz", folder / "test", "--picture", path)
-    assert (status, err) == (0, "")
-    png = path.read_bytes()
-    assert png.startswith(b"\x89PNG")
-    assert struct.unpack(">II", png[16:24]) == (1400, 500)
-
-
-def probable_recording(name, blocks, random):
-    """A recording with predicted probabilities."""
-    scores = np.array([np.eye(4)[CLASSES.index(label)] for label in perfect(blocks)])
-    scores = np.exp(4 * scores + random.normal(size=scores.shape))
-    scores /= scores.sum(axis=1, keepdims=True)
-    labels = [CLASSES[best] for best in scores.argmax(axis=1)]
-    return predicted(name, blocks, labels, scores=scores)
-
-
-def test_pictures_leave_out_measures_that_do_not_exist(tmp_path, monkeypatch):
-    pytest.importorskip("matplotlib")
-    from matplotlib.figure import Figure
-
-    drawn = []
-    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
-    random = np.random.default_rng(0)
-    probable = [
-        probable_recording(f"talos/{name}-{seed:03d}", blocks, random)
-        for seed in range(8)
-        for name, blocks in (("good", GOOD), ("blow", IMPACT), ("swing", OSCILLATION))
-    ]
-    silent = [
-        predicted("a", OSCILLATION[1:2], ["ok"] * len(frames()))
-    ]  # no ok motion, and nothing found
-    for recordings in (probable, many(6), silent):
-        train.draw(measure(recordings), tmp_path / "p.png", title="m", overwrite=True)
-    texts = [
-        {text.get_text() for text in figure.findobj() if hasattr(text, "get_text")}
-        for figure in drawn
-    ]
-    assert any(text.startswith("expected calibration error") for text in texts[0])
-    assert "the scores are not probabilities" in texts[1]
-    assert drawn[0].get_suptitle() == "m: 24 runs of 8 groups, 0.0253 h of ok motion"

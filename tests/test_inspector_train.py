@@ -54,41 +54,6 @@ def test_logs_that_a_profile_cannot_be_trained_on_are_left_out_and_counted(tmp_p
     assert set(nc.Classifier.load(tmp_path / "m.npz").runs) == {"good0", "good1"}
 
 
-MADE_BY = {"mujoco": "4.0.0", "pinocchio": "4.1.0", "numpy": "1.0"}
-
-
-def simulated(path, seed, versions):
-    """A log whose `meta` has the versions of the software that simulated it."""
-    with np.load(log(path, seed=seed)) as arrays:
-        kept = dict(arrays)
-    np.savez(path, **kept, meta=json.dumps({"versions": versions}))
-    return path
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("profile", ["joints", "general"])
-def test_a_model_names_all_versions_of_what_simulated_its_runs(tmp_path, profile):
-    others = {**MADE_BY, "mujoco": "4.1.0"}
-    for seed, versions in enumerate((others, MADE_BY, "nonsense", {"mujoco": 3})):
-        simulated(tmp_path / f"run{seed}.npz", seed, versions)
-    output = tmp_path / "m" / "m.npz"
-    output.parent.mkdir()
-    rate = () if profile == "general" else ("--rate", 1000)
-    runs = sorted(tmp_path.glob("*.npz"))
-    status, _, err = call("train", *runs, "-o", output, "--profile", profile, *rate)
-    assert (status, err) == (0, "")
-    versions = nc.load(output).versions
-    assert versions["mujoco"] == "3, 4.0.0, 4.1.0"
-    assert versions["pinocchio"] == "4.1.0"
-    assert versions["numpy"] == np.__version__
-
-
-def test_a_model_of_logs_names_no_simulator(tmp_path):
-    train(log(tmp_path / "log.npz"), output=tmp_path / "m.npz")
-    versions = nc.load(tmp_path / "m.npz").versions
-    assert versions.keys() == {"noise-inspector", "numpy", "scikit-learn"}
-
-
 def test_the_noise_alone_can_be_trained_on_without_desired_velocities(tmp_path):
     path = log(tmp_path / "missing.npz", desired="missing")
     status, out, _ = train(path, output=tmp_path / "m.npz", profile="scalar")

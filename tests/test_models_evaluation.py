@@ -73,13 +73,13 @@ def test_it_prints_a_small_evaluation_whole():
     }
     lines = [name.ljust(26) + "".join(cell.rjust(19) for cell in row) for name, row in rows.items()]
     foot = (
-        "The paper divides by all frames: predicting ok for all of them would detect 60.0% of"
-        " failures by its measure, and none by failure recall."
+        "The paper divides by all frames: predicting ok for all of them would detect",
+        "60.0% of failures by its measure, and none by failure recall.",
     )
     assert str(MIXED).split("\n") == [
         *(head, "", "As the paper measures", *lines[:4], ""),
         *("Of the frames in question", *lines[4:9], ""),
-        *("Frames of (row) predicted (column)", *lines[9:], "", foot),
+        *("Frames of (row) predicted (column)", *lines[9:], "", *foot),
     ]
     only = Evaluation.of(np.array(["ok"]), np.array(["ok"]), ("ok", "a" * 30))
     found = str(only).split("\n")

@@ -142,7 +142,6 @@ def evaluate(
     inputs: Inputs,
     as_json: AsJson = False,
     output: Annotated[Path | None, option("Write JSON to this file.", "--output", "-o")] = None,
-    picture: Annotated[Path | None, option("Write a PNG (needs the extra `report`).")] = None,
     part: InPart = "all",
     by: Annotated[
         Literal["robot", "domain", "scenario"] | None,
@@ -160,15 +159,11 @@ def evaluate(
     from noiseclassifier.assessment import table
     from noisemodel.files import refuse_existing, write_whole
 
-    for path in filter(None, (output, picture)):
-        refuse_existing(path, overwrite=overwrite)
-    if picture:
-        training.require()
+    if output:
+        refuse_existing(output, overwrite=overwrite)
     (file,) = model_files([model])
     report = training.evaluate(file, inputs, part=part, seen_too=seen_too)
     text = training.as_json(report, file)
     if output:
         write_whole(output, f"{text}\n", overwrite=overwrite)
-    if picture:
-        training.draw(report, picture, title=file.stem, overwrite=overwrite)
     typer.echo(text if as_json else table(report, by or ""))

@@ -21,7 +21,7 @@ import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.report.picture import require
 from inspector.text import progress
-from inspector.training.train import LeftOut, Simulators, classified, profile_at
+from inspector.training.train import LeftOut, classified, profile_at
 from inspector.verdict import resumed
 from noiseclassifier.jsontext import from_json
 from noiseclassifier.modelfile import versions
@@ -114,11 +114,10 @@ class Tuned:
         if self.search.validation:
             ((first, second),) = self.trial.splits
             learn, check = [learn[i] for i in first], [learn[i] for i in second]
-        simulators = Simulators()
-        examples = nc.Examples.read(simulators.noting(learn), best)
+        examples = nc.Examples.read(learn, best)
         validation = nc.Dataset.of(check, best, training=False) if check else None
         trained = nc.Classifier.train(examples, best, validation=validation)
-        simulators.signed(trained).save(output, overwrite=overwrite)
+        trained.save(output, overwrite=overwrite)
 
     def table(self, criterion: Criterion, *, rows: int = 10) -> str:
         """The best points as a table, with remarks."""

@@ -12,45 +12,30 @@ from noiseclassifier.classifier import Classifier, Model
 from noiseclassifier.dataset import Dataset, Examples, check
 from noiseclassifier.errors import DatasetError, SignalError
 from noiseclassifier.labels import Event, Labels, interval
-from noiseclassifier.matching import (
-    FALSE,
-    OK,
-    UNCLEAR,
-    Predictions,
-    Unanswered,
-    origin_of,
-    truth_of,
-    within,
-)
+from noiseclassifier.matching import UNCLEAR, Predictions, Unanswered, origin_of, truth_of, within
 from noiseclassifier.measures import (
     LEAST_GROUPS,
     RATES,
-    WORST,
     Estimate,
     Evaluation,
+    Part,
     Protocol,
     Resampling,
-    calibration,
-    frame_estimates,
-    plain,
 )
 from noiseclassifier.recording import Recording, check_apart, group_of, seen
-from noiseclassifier.signals import Array, named
+from noiseclassifier.signals import named
 
 FORMAT = "noise-evaluation/3"
 ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"
 NO_FRAME = "no frame without a gap"
-NAME, WIDE, NARROW = 38, 26, 12
-"""Widths of the columns: names, figures with intervals, plain numbers."""
-CLASS = 24
-"""Width of the names of classes."""
-SHOWN, ROWS_SHOWN = 5, 12
-"""Most lines of a list, and most rows of a table by robot or domain; the JSON has all."""
+WIDTHS = (38, 26, 26, 12, 12)
+"""Of the columns of the summary: names, figures with intervals, plain numbers."""
+SHOWN = 5
+"""Most lines of a list; the JSON has all."""
 LONGEST = 32
-"""Characters of a name at most."""
+"""Characters of a name in a table at most."""
 ROWS = (
     ("False alarms per hour of ok time", "false_alarms_per_hour", "false_alarms"),
-    ("  by findings unknown", "unknown_false_alarms_per_hour", "unknown_false_alarms"),
     ("Ok time flagged", "ok_flagged", ""),
     ("Alarms per hour of unlabelled time", "alarms_in_unlabelled_per_hour", "alarms_in_unlabelled"),
     ("Faults found, of all injected", "recall_injected", "found/faults"),
@@ -59,23 +44,22 @@ ROWS = (
     ("Events by class, precision", "class_precision", "matched_by_class/findings"),
     ("  recall", "class_recall", "matched_by_class/faults"),
     ("  F1", "class_f1", ""),
-    ("Events of any class, precision", "any_precision", "matched/findings"),
-    ("  recall", "any_recall", "matched/faults"),
-    ("  F1", "any_f1", ""),
+    ("Delay until a live listener knows", "delay", ""),
+    ("  90 %", "late_delay", ""),
 )
 """Title, measure and counts of each row."""
 COLUMNS = {
     "false/h": "false_alarms_per_hour",
     "ok flagged": "ok_flagged",
-    "unlab./h": "alarms_in_unlabelled_per_hour",
     "found": "recall_injected",
     "detectable": "recall_felt",
     "F1 class": "class_f1",
     "delay": "delay",
+    "AUC": "auc",
+    "pAUC": "pauc",
 }
-"""Measures of a table by robot or domain, by title."""
+"""Measures of a table by robot, domain or scenario, by title."""
 
-Form = Callable[[float], str]
 Localise = Callable[[Recording, Labels], tuple[tuple[Event, ...], tuple[Event, ...]]]
 """Gives the events of labels by their frames, and the same from onset to end."""
 
@@ -85,43 +69,29 @@ class Assessment:
     """All measures of a model.
 
     Attributes:
-        runs: How many recordings.
+        runs: How many recordings have a verdict.
         groups: How many groups of them that share their motion.
-        blocks: Annotated blocks of each class.
-        runs_with: Recordings with such a block, of each class.
         copies: Recordings that were left out, and the equal one of each, by name.
         seen: Recordings that the model was trained on, and what of them, by name.
         protocol: Measures of the findings as they are reported, robots weighed alike.
         evaluation: All frames that are cut from blocks.
-        frames: Its measures with intervals, by name, and the measures of each class by class.
-        reliability: Confidence beside truth in bins; None if the scores are no probabilities.
-        calibration_error: Expected calibration error; None likewise.
     """
 
     runs: int
     groups: int
-    blocks: dict[str, int]
-    runs_with: dict[str, int]
     copies: dict[str, str]
     seen: dict[str, str]
     protocol: Protocol
     evaluation: Evaluation
-    frames: dict[str, Any]
-    reliability: dict[str, Array] | None
-    calibration_error: Estimate | None
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
-        names = ("runs", "groups", "blocks", "runs_with", "copies", "seen")
+        names = ("runs", "groups", "copies", "seen")
         return {
             "format": FORMAT,
             **{name: getattr(self, name) for name in names},
             "protocol": self.protocol.as_dict(),
-            "classes": list(self.evaluation.classes),
-            "confusion": self.evaluation.confusion.tolist(),
-            "frames": {"frames": int(self.evaluation.frames), **plain(self.frames)},
-            "calibration_error": plain(self.calibration_error),
-            "reliability": plain(self.reliability),
+            "frames": self.evaluation.as_dict(),
         }
 
     def __str__(self) -> str:
@@ -146,9 +116,6 @@ def assess(
         seen_too: Whether recordings count that the model was trained on, or that share their
             motion with such; the assessment lists them.
         localise: Estimates onset and end of the findings; else they last as their frames do.
-
-    Returns:
-        All measures.
 
     Raises:
         DatasetError: If the model was trained on a recording, unless ``seen_too``, there is no
@@ -237,25 +204,17 @@ def measure(
     if not any(len(one.truth) for one in predictions):
         raise DatasetError(f"no annotated frame in {len(predictions)} recordings; annotate blocks")
     groups = [one.group for one in predictions]
-    resampling = Resampling.of(groups)
-    evaluation, frames = frame_estimates(predictions, resampling)
-    reliability, error = calibration(predictions, resampling) or (None, None)
-    owned = {
-        label: [sum(block.label == label for block in one.blocks) for one in predictions]
-        for label in evaluation.classes
-    }
     return Assessment(
         runs=len(predictions),
         groups=len(set(groups)),
-        blocks={label: sum(counts) for label, counts in owned.items()},
-        runs_with={label: sum(map(bool, counts)) for label, counts in owned.items()},
         copies=dict(copies or {}),
         seen=dict(known or {}),
-        protocol=Protocol.of(predictions, resampling, unanswered),
-        evaluation=evaluation,
-        frames=frames,
-        reliability=reliability,
-        calibration_error=error,
+        protocol=Protocol.of(predictions, Resampling.of(groups), unanswered),
+        evaluation=Evaluation.of(
+            np.concatenate([one.truth for one in predictions]),
+            np.concatenate([one.predicted for one in predictions]),
+            predictions[0].labels.classes,
+        ),
     )
 
 
@@ -274,29 +233,23 @@ def table(assessment: Assessment, by: str = "") -> str:
     """Table of an assessment, as text, in lines of up to 140 characters.
 
     Args:
-        by: ``robot``, ``domain`` or ``scenario``: the one table of parts to print, whole.
+        by: ``robot``, ``domain`` or ``scenario``: the one table of parts to print.
     """
+    protocol = assessment.protocol
+    keys = [by] if by else [key for key in ("robot", "domain") if len(protocol.by[key]) > 1]
     foot = ["Brackets are 95 % confidence intervals over groups of runs."]
     if assessment.groups < LEAST_GROUPS:
         foot.append(f"Measures of fewer than {LEAST_GROUPS} groups have none.")
     paragraphs = [
         _head(assessment),
-        *protocol_lines(assessment.protocol, by),
-        _errors(assessment.protocol),
-        _frames(assessment),
-        _paper(assessment),
-        _confusion(assessment.evaluation),
+        _summary(protocol),
+        _not_answered(protocol),
+        *(_parts(key, protocol.by[key]) for key in keys),
+        _errors(protocol),
+        ["Frames that are cut from annotated blocks", *str(assessment.evaluation).splitlines()],
         foot,
     ]
     return "\n\n".join("\n".join(lines) for lines in paragraphs if lines)
-
-
-def protocol_lines(protocol: Protocol, by: str = "") -> list[list[str]]:
-    """Paragraphs of lines: the measures, where they are worst, and by robot and domain."""
-    keys = [by] if by else [key for key in ("robot", "domain") if len(protocol.by[key]) > 1]
-    parts = [_summary(protocol), _not_answered(protocol), _worst(protocol)]
-    parts += [_table(protocol, key, whole=bool(by)) for key in keys]
-    return [part for part in parts if part]
 
 
 def _head(assessment: Assessment) -> list[str]:
@@ -323,27 +276,22 @@ def _head(assessment: Assessment) -> list[str]:
 
 
 def _summary(protocol: Protocol) -> list[str]:
-    counts, alike, pooled = protocol.counts, protocol.alike, protocol.pooled
+    counts, unanswered = protocol.counts, len(protocol.unanswered)
     lines = [
         "At the operating point that ships: findings as `inspector classify` reports them",
-        _line("", ["robots alike", "all runs pooled"], ["by chance", "counts"]),
+        _line("", "robots alike", "all runs pooled", "by chance", "counts"),
     ]
     for title, name, behind in ROWS:
-        figures = [_ranged(each[name], _form(name)) for each in (alike, pooled)]
-        chance = _share(protocol.by_chance[name]) if name in protocol.by_chance else ""
+        figures = [_ranged(name, each[name]) for each in (protocol.alike, protocol.pooled)]
+        chance = _figure("", protocol.by_chance[name]) if name in protocol.by_chance else ""
         count = " of ".join(f"{counts[each]:.0f}" for each in behind.split("/")) if behind else ""
-        lines.append(_line(title, figures, [chance, count]))
-    late = f"{_time(alike['delay'].value)}, 90 %: {_time(alike['late_delay'].value)}"
-    figures = [late, _ranged(pooled["delay"], _time)]
-    runs = len(protocol.outcomes) + len(protocol.unanswered)
-    count = f"{len(protocol.unanswered)} of {runs}"
+        lines.append(_line(title, *figures, chance, count))
+    runs = f"{unanswered} of {len(protocol.outcomes) + unanswered}"
     return [
         *lines,
-        _line("Delay until a live listener knows", figures),
-        _line("AUC of runs, mean over domains", [_share(protocol.auc), ""], ["50.0%"]),
-        _line("pAUC (FPR up to 10 %)", [_share(protocol.pauc), ""], ["50.0%"]),
-        _line("Score of DCASE task 2 (harmonic mean)", [_share(protocol.official), ""], ["50.0%"]),
-        _line("Runs without a verdict", [_share(protocol.not_answered), ""], ["", count]),
+        _line("AUC of runs, mean over domains", _figure("auc", protocol.auc), "", "50.0%"),
+        _line("pAUC (FPR up to 10 %)", _figure("pauc", protocol.pauc), "", "50.0%"),
+        _line("Runs without a verdict", _figure("", protocol.not_answered), "", "", runs),
     ]
 
 
@@ -352,69 +300,25 @@ def _not_answered(protocol: Protocol) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for each in protocol.unanswered:
         reasons.setdefault(each.reason, []).append(origin_of(each)["robot"])
-    lines = []
-    for reason, robots in reasons.items():
-        names = sorted(set(robots))
-        rest = f" and {len(names) - WORST} more" if len(names) > WORST else ""
-        few = ", ".join(names[:WORST])
-        lines.append(f"not answered: {_many(len(robots), 'run')} ({reason}) of {few}{rest}")
-    return lines
+    return [
+        f"not answered: {_many(len(robots), 'run')} ({reason}) of {_named(set(robots), 'robot')}"
+        for reason, robots in reasons.items()
+    ]
 
 
-def _worst(protocol: Protocol) -> list[str]:
-    lines = []
-    cases, cells = protocol.cases, protocol.cells
-    if worst := protocol.worst(cases, "recall_injected"):
-        lines.append(f"The worst {len(worst)} of robot and scenario, by injected faults found")
-    for key in worst:
-        counts = cases[key].counts
-        found = (
-            f"{counts['found']:.0f} of {counts['faults']:.0f} injected,"
-            f" {counts['found_felt']:.0f} of {counts['felt']:.0f} detectable"
-        )
-        share = _share(cases[key].measures["recall_injected"])
-        lines.append(_line("  " + _short(" ".join(key)), [share], [found]))
-    for measure, what in (
-        ("false_alarms_per_hour", "ok time"),
-        ("alarms_in_unlabelled_per_hour", "unlabelled time"),
-    ):
-        alarms, hours = RATES[measure]
-        if worst := protocol.worst(cells, measure):
-            head = f"The worst {len(worst)} of robot and domain, by alarms per hour of {what}"
-            lines.append(head)
-        for key in worst:
-            counts = cells[key].counts
-            rate = f"{_rate(cells[key].measures[measure])} per hour"
-            found = f"{counts[alarms]:.0f} in {counts[hours]:.3g} h"
-            lines.append(_line("  " + _short(" ".join(key)), [rate], [found]))
-    return lines
-
-
-def _table(protocol: Protocol, key: str, *, whole: bool) -> list[str]:
-    """A row for each robot, domain or scenario; of many the worst, each cell as wide as needed."""
-    parts = protocol.by[key]
-    names, head, lines = list(parts), f"By {key}", list[str]()
-    if not whole and len(names) > ROWS_SHOWN:
-        f1 = {name: part.measures["class_f1"] for name, part in parts.items()}
-        names = sorted(names, key=lambda name: 2.0 if isnan(f1[name]) else f1[name])[:ROWS_SHOWN]
-        lines = [f"By {key}, the worst {ROWS_SHOWN} of {len(parts)} by F1 of the class"]
-        head = ""
-    ranked = protocol.ranked if key == "domain" else {}
-    titles = ["runs", "ok h", *COLUMNS, *(("AUC", "pAUC") if ranked else ())]
-    rows = [(head, titles)]
-    for name in names:
-        part = parts[name]
+def _parts(key: str, parts: Mapping[str, Part]) -> list[str]:
+    """A row for each robot, domain or scenario."""
+    titles = ["runs", "ok h", *COLUMNS]
+    rows = [(f"By {key}", titles)]
+    for name, part in parts.items():
         runs = f"{part.counts['runs']:.0f}" + (f"+{part.unanswered}" if part.unanswered else "")
-        figures = [runs, f"{part.counts['ok_hours']:.3g}"]
-        figures += [_form(measure)(part.measures[measure]) for measure in COLUMNS.values()]
-        if ranked:
-            own = ranked.get(name)
-            figures += [_share(own.auc), _share(own.pauc)] if own else ["-", "-"]
-        rows.append((_short(name), figures))
+        figures = [_figure(measure, part.measures[measure]) for measure in COLUMNS.values()]
+        rows.append((_short(name), [runs, f"{part.counts['ok_hours']:.3g}", *figures]))
+    lines = []
     for name, cells in rows:
         pairs = zip(cells, titles, strict=True)
-        figures = [cell.rjust(max(len(title), 7) + 2) for cell, title in pairs]
-        lines.append(name.ljust(LONGEST) + "".join(figures))
+        columns = [cell.rjust(max(len(title), 7) + 2) for cell, title in pairs]
+        lines.append(name.ljust(LONGEST) + "".join(columns))
     if any(part.unanswered for part in parts.values()):
         lines.append("(+n: runs without a verdict)")
     return lines
@@ -424,7 +328,7 @@ def _errors(protocol: Protocol) -> list[str]:
     lines = []
     for title, errors in (
         ("Missed, of the detectable faults", [e for e in protocol.missed() if e["felt"]]),
-        ("False alarms", protocol.alarms(FALSE)),
+        ("False alarms", protocol.false_alarms()),
     ):
         if errors:
             lines.append(title)
@@ -434,101 +338,36 @@ def _errors(protocol: Protocol) -> list[str]:
     return lines
 
 
-def _frames(assessment: Assessment) -> list[str]:
-    frames, evaluation = assessment.frames, assessment.evaluation
-    lines = [
-        "Frames that are cut from annotated blocks, as the paper does",
-        _row("", ["recall", "precision"], ["frames", "blocks", "runs"]),
-    ]
-    for label, count in zip(evaluation.classes, evaluation.confusion.sum(axis=1), strict=True):
-        figures = [_ranged(frames[name][label]) for name in ("recall", "precision")]
-        behind = [count, assessment.blocks[label], assessment.runs_with[label]]
-        lines.append(_row(label, figures, behind))
-    error = assessment.calibration_error
-    calibrated = f"{_ranged(error)} in ten bins" if error else "- (the scores are no probabilities)"
-    return [
-        *lines,
-        _row("Balanced accuracy", [_ranged(frames["balanced_accuracy"])]),
-        _row("Failure recall", [_ranged(frames["failure_recall"])]),
-        _row("False alarm rate", [_ranged(frames["false_alarm_rate"])]),
-        _row("Calibration error", [calibrated]),
-    ]
+def _line(*cells: str) -> str:
+    return "".join(cell.ljust(width) for cell, width in zip(cells, WIDTHS, strict=False)).rstrip()
 
 
-def _paper(assessment: Assessment) -> list[str]:
-    frames, evaluation = assessment.frames, assessment.evaluation
-    ok = evaluation.confusion[[name == OK for name in evaluation.classes]].sum()
-    errors = ("false_negative_errors", "false_positive_errors")
-    nothing = f"(calling all frames ok: {ok / evaluation.frames:.1%})"
-    return [
-        "As the paper measures, in shares of ALL frames",
-        _row("", [name.replace("_", " ") for name in errors]),
-        *(
-            _row(label, [_ranged(frames[name][label]) for name in errors])
-            for label in evaluation.classes
-        ),
-        _row("Failure detection rate", [_ranged(frames["failure_detection_rate"]), nothing]),
-        _row("Subset accuracy", [_ranged(frames["subset_accuracy"])]),
-    ]
+def _figure(measure: str, value: float) -> str:
+    """A value as text: a delay, a rate per hour, or a share."""
+    if isnan(value):
+        return "-"
+    if measure.endswith("delay"):
+        return f"{value:.3g} s"
+    if measure in RATES:
+        return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
+    return f"{100.0 * value:.1f}%"
 
 
-def _confusion(evaluation: Evaluation) -> list[str]:
-    width = max(len(name) for name in evaluation.classes) + 2
-    rows = [("Frames of row predicted", evaluation.classes)]
-    rows += zip(evaluation.classes, evaluation.confusion.tolist(), strict=True)
-    return [
-        name.ljust(CLASS) + "".join(str(cell).rjust(width) for cell in cells)
-        for name, cells in rows
-    ]
-
-
-# --- figures, rows and lists
-
-
-def _share(value: float) -> str:
-    return "-" if isnan(value) else f"{100.0 * value:.1f}%"
-
-
-def _rate(value: float) -> str:
-    return "-" if isnan(value) else f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
-def _time(value: float) -> str:
-    return "-" if isnan(value) else f"{value:.3g} s"
-
-
-def _form(measure: str) -> Form:
-    return _time if measure == "delay" else _rate if measure in RATES else _share
-
-
-def _ranged(estimate: Estimate, form: Form = _share) -> str:
+def _ranged(measure: str, estimate: Estimate) -> str:
     """A figure and its bounds as text: ``97.9% [96.1, 98.8]``."""
-    if isnan(estimate.value) or isnan(estimate.low):
-        return form(estimate.value)
-    bounds = f" [{form(estimate.low)}, {form(estimate.high)}]"
-    return form(estimate.value) + bounds.replace("%", "").replace(" s", "")
-
-
-def _line(name: str, figures: Sequence[str], others: Sequence[str] = ()) -> str:
-    line = name.ljust(NAME) + "".join(figure.ljust(WIDE) for figure in figures)
-    return (line + "".join(other.ljust(NARROW) for other in others)).rstrip()
-
-
-def _row(name: str, figures: Sequence[str], counts: Sequence[object] = ()) -> str:
-    line = name.ljust(CLASS) + "".join(figure.ljust(WIDE + 1) for figure in figures)
-    return (line + "".join(str(count).rjust(NARROW - 2) for count in counts)).rstrip()
+    value, low, high = (_figure(measure, each) for each in vars(estimate).values())
+    return value if low == "-" else f"{value} [{low}, {high}]".replace("%,", ",").replace("%]", "]")
 
 
 def _short(name: str) -> str:
     """A name that fits its column: its middle is left out if it is long."""
-    most = LONGEST - 2
-    half = (most - 1) // 2
-    return name if len(name) <= most else f"{name[:half]}…{name[-half:]}"
+    half = (LONGEST - 3) // 2
+    return name if len(name) <= LONGEST - 2 else f"{name[:half]}…{name[-half:]}"
 
 
 def _named(names: Iterable[str], what: str) -> str:
     """How many there are, with their names if they are few."""
-    names = list(names)
+    names = sorted(names)
     few = f" ({', '.join(names)})" if len(names) <= SHOWN else ""
     return f"{_many(len(names), what)}{few}"
 

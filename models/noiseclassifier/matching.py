@@ -52,12 +52,9 @@ class Span(Protocol):
     """What has a start and a stop in [s]: a block, an event, a finding, a fault."""
 
     @property
-    def start(self) -> float:
-        """Start, in [s]."""
-
+    def start(self) -> float: ...  # noqa: D102
     @property
-    def stop(self) -> float:
-        """Stop, in [s]."""
+    def stop(self) -> float: ...  # noqa: D102
 
 
 # --- spans
@@ -114,8 +111,6 @@ def match(
     """Match findings with faults, or findings of two runs, one to one.
 
     Args:
-        found: Whatever has a start and a stop in [s].
-        wanted: What it is matched with.
         collar: Time between two that still meet, in [s].
         same: Whether two may be matched at all, by their indices, say because their class is one.
 
@@ -126,9 +121,7 @@ def match(
     if same is not None:
         for row, column in np.argwhere(met):
             met[row, column] = same(int(row), int(column))
-    return [
-        (row, fault) for row, fault in enumerate(_partners(met[None])[0].tolist()) if fault >= 0
-    ]
+    return pairs(met)
 
 
 def meet(spans: Array, wanted: Array, collar: float = COLLAR) -> Mask:
@@ -138,34 +131,21 @@ def meet(spans: Array, wanted: Array, collar: float = COLLAR) -> Mask:
     return np.asarray(early & late)
 
 
-def one_to_one(met: Mask) -> Array:
-    """Most pairs of findings and faults that meet, by ``met`` (cases, findings, faults)."""
-    return np.asarray((_partners(met) >= 0).sum(axis=1), dtype=np.float64)
-
-
-def _partners(met: Mask) -> Index:
-    """The fault of each finding, -1 for none, shape (cases, findings)."""
+def pairs(met: Mask) -> list[tuple[int, int]]:
+    """Most pairs of findings and faults that meet, by ``met`` (findings, faults)."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import maximum_bipartite_matching
 
-    cases, findings, faults = met.shape
-    case, row, column = np.nonzero(met)
-    if not len(case):
-        return np.full((cases, findings), -1, dtype=np.intp)
-    # All cases at once, as the blocks of one matrix.
-    shape = cases * findings, cases * faults
-    pairs = (np.ones(len(case)), (case * findings + row, case * faults + column))
-    partner = maximum_bipartite_matching(csr_matrix(pairs, shape=shape), perm_type="column")
-    first = np.arange(cases)[:, None] * faults
-    own = np.reshape(partner, (cases, findings))
-    return np.asarray(np.where(own >= 0, own - first, -1), dtype=np.intp)
+    if not met.any():
+        return []
+    partner = maximum_bipartite_matching(csr_matrix(met), perm_type="column").tolist()
+    return [(finding, fault) for finding, fault in enumerate(partner) if fault >= 0]
 
 
 def truth_of(start: Array, stop: Array, blocks: Iterable[Block], *, step: float) -> Words:
-    """True class of each frame, `UNCLEAR` where annotations tell none, shape (frames,).
+    """True class of each frame from start to stop in [s], `UNCLEAR` where annotations tell none.
 
     Args:
-        start, stop: Of each frame, shape (frames,), in [s].
         step: Time from one sample to the next, in [s].
     """
     blocks = list(blocks)
@@ -192,15 +172,10 @@ class Unanswered:
     """A recording that a model cannot classify."""
 
     name: str
-    """Its name."""
     facts: Mapping[str, str] = field(default_factory=dict)
     """Its robot, scenario and domain."""
     reason: str = ""
     """Why there is no verdict, in a few words."""
-
-    def as_dict(self) -> dict[str, str]:
-        """All of it for JSON."""
-        return {"run": self.name, **origin_of(self), "reason": self.reason}
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,18 +204,11 @@ class Predictions:
         """The same findings from onset to end, as they are reported."""
         return self.spans if self.located is None else self.located[1]
 
-    @cached_property
-    def whole_truth(self) -> Words:
-        """True class of each frame of the whole recording, `UNCLEAR` where not annotated."""
-        return truth_of(self.labels.start, self.labels.stop, self.blocks, step=self.step)
-
 
 def origin_of(one: Unanswered | Predictions) -> dict[str, str]:
     """Robot, domain (simulator, drives, sensing and control) and scenario of a recording."""
-    known = {
-        "robot": robot_of(one.name),
-        **{name: each for name, each in one.facts.items() if each},
-    }
+    robot = one.facts.get("robot") or robot_of(one.name)
+    known = {**one.facts, "robot": robot}
     return {key: known.get(key) or UNNAMED for key in ("robot", "domain", "scenario")}
 
 
@@ -289,16 +257,15 @@ class Outcome:
         same = label[:, None] == np.array([fault.label for fault in faults], dtype=str)
         counts = {
             "runs": 1.0,
-            "faulty": float(len(faults) > 0),
             "ok_hours": duration(ok) / HOUR,
             "ok_hours_flagged": duration(common(ok, spans)) / HOUR,
             "unlabelled_hours": (duration(classified) - duration(common(classified, known))) / HOUR,
             "findings": len(findings),
             "false_alarms": int((kind == FALSE).sum()),
-            "unknown_false_alarms": int(((label == UNKNOWN) & (kind == FALSE)).sum()),
             "alarms_in_unlabelled": int((kind == UNLABELLED).sum()),
             "faults": len(faults),
             "felt": int(felt.sum()),
+            "half_of_both": (len(findings) + len(faults)) / 2.0,
             **_matches(met[None], close[None], felt, same),
         }
         chance = _matches(*_by_chance(run, spans, wanted), felt, same)
@@ -337,8 +304,8 @@ def run_score(labels: Labels) -> float:
         return float(scores.max())
     apart = labels.apart
     alone = np.append(True, apart) | np.append(apart, True)
-    pairs = np.minimum(scores[1:], scores[:-1])[~apart]
-    return float(np.concatenate((scores[alone], pairs)).max())
+    both = np.minimum(scores[1:], scores[:-1])[~apart]
+    return float(np.concatenate((scores[alone], both)).max())
 
 
 def failure_score(scores: Array, classes: Sequence[str]) -> Array:
@@ -362,8 +329,7 @@ def _matches(met: Mask, close: Mask, felt: Mask, same: Mask) -> dict[str, float]
         "found": float(found.sum(axis=1).mean()),
         "found_felt": float(found[:, felt].sum(axis=1).mean()),
         "onset_close": float(np.any(close, axis=1).sum(axis=1).mean()),
-        "matched_by_class": float(one_to_one(met & same).mean()),
-        "matched": float(one_to_one(met).mean()),
+        "matched_by_class": float(np.mean([len(pairs(case)) for case in met & same])),
     }
 
 
