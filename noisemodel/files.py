@@ -1,17 +1,10 @@
 """Files: written whole or not at all, read within limits, and the cache of what takes long."""
 
-import fcntl
 import hashlib
-import hmac
 import io
 import os
-import platform
-import re
-import stat
-import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
@@ -26,11 +19,6 @@ from noisemodel.types import NoiseModelError, OutputError, RobotError
 
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 
-TEMPORARY = re.compile(r"\.noise-inspector-([0-9a-f]{8})?[0-9a-f]{8}")
-"""Names of temporary files: with the machine, or without it for model files."""
-# Ages from which a temporary file is one of a process that was killed, in [s]: on any machine that
-# shares the folder, and on this one, whose locks are known.
-ABANDONED, ABANDONED_HERE = 86_400.0, 60.0
 EXISTS = "{}: exists already; choose another name, or overwrite it (--overwrite)"
 
 LIMITS = MappingProxyType(
@@ -43,8 +31,7 @@ PREFIX = "NOISE_LIMIT_"  # of environment variables with other limits: NOISE_LIM
 MAX_BYTES = 64 * 2**20  # most bytes of a URDF or an MJCF
 MAX_DEPTH = 500  # most elements of XML within each other, as in MuJoCo; parsers that recurse crash
 MAX_ATTRIBUTES = 200  # most attributes of an element; Pinocchio compares each with all others
-DIGEST = 32  # bytes after a cached archive that show that it is whole, and this user's for its key
-
+DIGEST = 32  # bytes after a cached archive that show that it is whole, and made for its key
 
 _read: dict[Path, None] | None = None
 """What the running command reads; None outside of one, where programs decide for themselves."""
@@ -86,30 +73,30 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """Offer a temporary path beside ``path`` that takes its place only if the block succeeds.
 
     A link stays, and what it leads to is written. Of several that write one file at once and may
-    not replace it, one succeeds. Temporary files that no process holds are deleted from the folder:
-    after a minute without a change, or after a day if another machine may hold them.
+    not replace it, one succeeds.
     """
     path = Path(path)
     refuse_existing(path, overwrite=overwrite)
     if path.is_symlink():
         path = Path(os.path.realpath(path))
-    _sweep(path.parent.absolute())
-    temporary = path.with_name(f".noise-inspector-{_machine()}{uuid4().hex[:8]}")
-    try:  # with the permissions that the umask leaves to any file
-        held = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+    temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")
     try:
-        _lock(held)  # a live recording may wait for its next sample for days
+        temporary.touch(exist_ok=False)  # with the permissions that the umask leaves to any file
         yield temporary
         if not overwrite:
-            _claim(temporary, path)
+            try:
+                os.link(temporary, path)  # unless another process has taken the name
+            except FileExistsError:
+                raise
+            except OSError:  # a file system without hard links: an empty file claims the name
+                path.touch(exist_ok=False)
         temporary.replace(path)  # which does nothing where both are one file
+    except FileExistsError:
+        raise OutputError(EXISTS.format(path)) from None
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
-        os.close(held)
 
 
 def write_whole(path: str | Path, content: str | bytes, *, overwrite: bool = False) -> None:
@@ -131,56 +118,6 @@ def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
         raise OutputError(EXISTS.format(path))
     if not path.parent.is_dir():
         raise OutputError(f"{path}: cannot be written (No such file or directory: {path.parent})")
-
-
-def _lock(file: int) -> bool:
-    """Lock an open file; whether nobody else has. It ends with the process."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks: age alone decides
-        return True
-    return True
-
-
-def _claim(temporary: Path, path: Path) -> None:
-    """Take a file's final name, which another process may have taken since it was checked."""
-    try:
-        try:
-            os.link(temporary, path)
-        except FileExistsError:
-            raise
-        except OSError:  # a file system without hard links: an empty file claims the name
-            path.open("xb").close()
-    except FileExistsError:
-        raise OutputError(EXISTS.format(path)) from None
-
-
-@cache
-def _sweep(folder: Path) -> None:
-    """Delete what processes that were killed have left in a folder, once per process."""
-    with suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            if found := TEMPORARY.fullmatch(entry.name):
-                age = ABANDONED_HERE if found[1] == _machine() else ABANDONED
-                with suppress(OSError):
-                    if time.time() - entry.stat().st_mtime <= age:
-                        continue
-                    file = os.open(entry.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-                    with os.fdopen(file):
-                        if _lock(file):  # no process holds it
-                            Path(entry.path).unlink()
-
-
-@cache
-def _machine() -> str:
-    """This machine since it was started, as 8 hexadecimal digits."""
-    try:
-        name = Path("/proc/sys/kernel/random/boot_id").read_text()
-    except OSError:
-        name = platform.node()
-    return hashlib.sha256(name.encode()).hexdigest()[:8]
 
 
 def limit(name: str) -> int:
@@ -247,56 +184,38 @@ def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
     """Arrays by a key: from the user's cache if it has them, or else made and kept.
 
     The key holds all that the arrays depend on, also the version of the code, in letters, digits
-    and hyphens. A file that is damaged, or comes from elsewhere, is made anew; a folder that cannot
-    be written to is left alone. The cache may be deleted at any time.
+    and hyphens. A damaged file is made anew; a folder that others can write to, or that cannot be
+    written to, is left alone. The cache may be deleted at any time.
     """
     try:
         file = cache_folder() / f"{key}.npz"
-    except RuntimeError:  # the user has no home folder
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        about = file.parent.stat()
+    except (OSError, RuntimeError):  # the user has no home folder
         return make()
-    try:
+    if about.st_uid != os.getuid() or about.st_mode & 0o022:  # who knows whose arrays these are
+        return make()
+    with suppress(OSError, ValueError):  # what is damaged or made for another key is made anew
         content = file.read_bytes()
         archive, digest = content[:-DIGEST], content[-DIGEST:]
-        if not hmac.compare_digest(_digest(file, archive), digest):
-            raise ValueError("damaged, or from elsewhere")
-        with np.load(io.BytesIO(archive), allow_pickle=False) as kept:
-            return dict(kept)
-    except (OSError, ValueError):
-        arrays = make()
+        if _digest(file, archive) == digest:
+            with np.load(io.BytesIO(archive), allow_pickle=False) as kept:
+                return dict(kept)
+    arrays = make()
     with suppress(OSError, ValueError, OutputError):
-        file.parent.mkdir(parents=True, exist_ok=True)
         stream = io.BytesIO()
         np.savez(stream, allow_pickle=False, **arrays)
-        with replacing(file, overwrite=True) as temporary:
-            temporary.write_bytes(stream.getvalue() + _digest(file, stream.getvalue()))
+        write_whole(file, stream.getvalue() + _digest(file, stream.getvalue()), overwrite=True)
     return arrays
 
 
 def cache_folder() -> Path:
-    """The folder of cached surfaces (which need not exist)."""
+    """The folder of cached meshes and surfaces (which need not exist)."""
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if not base.is_absolute():  # as the XDG base directory specification has it
         base = Path.home() / ".cache"
-    return base / "noise-inspector" / "surfaces"
+    return base / "noise-inspector" / "geometry"
 
 
 def _digest(file: Path, archive: bytes) -> bytes:
-    """A digest that only this user can make, so that nobody else's arrays are taken for ours."""
-    return hmac.digest(_secret(file.parent.parent), file.name.encode() + archive, "sha256")
-
-
-def _secret(parent: Path) -> bytes:
-    """The user's secret, made when it is first needed; an error if others can read it."""
-    file = parent / "secret"
-    with suppress(FileExistsError):
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
-        parent.mkdir(parents=True, exist_ok=True)
-        with os.fdopen(os.open(file, flags, 0o600), "wb") as stream:
-            stream.write(os.urandom(DIGEST))
-    about = file.stat()
-    if about.st_uid != os.getuid() or stat.S_IMODE(about.st_mode) & 0o077:
-        raise ValueError("others can read the secret")
-    secret = file.read_bytes()
-    if len(secret) != DIGEST:
-        raise ValueError("the secret is being written, or was cut off")
-    return secret
+    return hashlib.sha256(file.name.encode() + archive).digest()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
 from noisemodel.run import Run, rows_of, stretches
 from noisemodel.runfile import AT_ONCE, OnDemand, pieces
-from noisemodel.surface import LinkSurface, Surface, point_speeds, turning_speed
+from noisemodel.surface import TINY, LinkSurface, Surface, point_speeds, turning_speed
 from noisemodel.types import Array, GeometryError, Mask, NoiseModelError, Real, UnknownKindError
 
 Index: TypeAlias = NDArray[np.intp]
@@ -133,15 +133,10 @@ def _rows(signal: Real, columns: list[int]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """The sound that a robot's links radiate.
+    """The sound that a robot's links radiate."""
 
-    Attributes:
-        power: Sound power of each link, shape (samples, links), in [W].
-        names: The links.
-    """
-
-    power: Array
-    names: tuple[str, ...]
+    power: Array  # sound power of each link, shape (samples, links), in [W]
+    names: tuple[str, ...]  # of the links
 
     @property
     def total(self) -> Array:
@@ -154,69 +149,40 @@ class Noise:
         return decibel(self.total / REFERENCE_POWER)
 
     def pressure(self, distance: float) -> Array:
-        """Sound pressure where the robot is a point that radiates evenly, in [Pa].
+        """Sound pressure at a distance in [m] from a robot that is a point and radiates evenly.
 
-        It has the shape (samples,); ``distance`` is from the robot, in [m].
-
-        Raises:
-            NoiseModelError: If ``distance`` is not positive.
+        It has the shape (samples,), in [Pa]; a NoiseModelError if ``distance`` is not positive.
         """
-        check_positive("distance", distance, "m")
+        if not 0.0 < distance < np.inf:
+            raise NoiseModelError(f"distance is {distance:g} m, expected a positive number")
         impedance = DENSITY * SOUND_SPEED
         # p = sqrt(P rho c / (4 pi d²)), Sygulla & Rixen, Sec. II-A
         return np.asarray(np.sqrt(self.total * impedance / (4.0 * np.pi * distance**2)))
 
-    def shares(self, stretches: Sequence[tuple[int, int]] | None = None) -> Array:
-        """Share of each link in the energy that the robot radiates in stretches of time.
-
-        Args:
-            stretches: First sample and the one after the last of each; unless given, all samples.
-
-        Returns:
-            Shape (stretches, links); each row has the sum 1, or 0 in silence.
-
-        Raises:
-            NoiseModelError: If a stretch is empty or outside of the samples.
-        """
-        stretches = [(0, len(self.power))] if stretches is None else stretches
-        for start, stop in stretches:
-            if not 0 <= start < stop <= len(self.power):
-                raise NoiseModelError(
-                    f"a stretch from sample {start} to {stop}, expected one within 0 to"
-                    f" {len(self.power)}"
-                )
-        parts = [self.power[start:stop].sum(axis=0) for start, stop in stretches]
-        energy = np.array(parts).reshape(len(stretches), len(self.names))
-        whole = energy.sum(axis=1, keepdims=True)
-        return np.asarray(np.divide(energy, whole, out=np.zeros_like(energy), where=whole > 0.0))
+    @property
+    def shares(self) -> Array:
+        """Share of each link in the energy, shape (links,), of sum 1; all 0 in silence."""
+        energy = self.power.sum(axis=0)
+        return np.asarray(energy / max(energy.sum(), TINY))
 
     def __str__(self) -> str:
         mean = float(decibel(self.total.mean() / REFERENCE_POWER))
-        share = self.shares()[0]
+        share = self.shares
         lines = [f"{len(self.power)} samples, mean sound power {mean:.1f} dB re 1 pW"]
         loudest = [link for link in np.argsort(-share, kind="stable")[:LOUDEST] if share[link]]
         return "\n".join([*lines, *(f"{self.names[i]:28} {share[i]:6.1%}" for i in loudest)])
 
 
-def sound_power(mean_square: Array, area: Array | float, efficiency: Array | float = 1.0) -> Array:
-    """Sound power that surfaces radiate, in [W], of shapes that broadcast.
-
-    ``mean_square`` speeds are in [m²/s²], areas in [m²].
-    """
-    # P_i = rho c sigma_i S_i v_i², Sygulla & Rixen, Sec. II-A
-    return np.asarray(DENSITY * SOUND_SPEED * efficiency * area * mean_square)
+def sound_power(mean_square: Array, area: Array | float) -> Array:
+    """Sound power in [W] of surfaces, by mean-square speeds in [m²/s²] and areas in [m²]."""
+    # P_i = rho c sigma_i S_i v_i² with sigma_i = 1, Sygulla & Rixen, Sec. II-A
+    return np.asarray(DENSITY * SOUND_SPEED * area * mean_square)
 
 
 def decibel(ratio: Array) -> Array:
     """Express ratios of powers in [dB]; 0 is -inf."""
     with np.errstate(divide="ignore"):
         return np.asarray(10.0 * np.log10(ratio))
-
-
-def check_positive(name: str, value: float, unit: str) -> None:
-    """Refuse a number that is not positive and finite."""
-    if not 0.0 < value < np.inf:
-        raise NoiseModelError(f"{name} is {value:g} {unit}, expected a positive number")
 
 
 # Mean speeds of a link's surface: the paper's equation and its alternatives.
@@ -250,9 +216,7 @@ def surface_speed(robot: Robot, surface: Surface, q: Real, v: Real, kind: str = 
     return speeds.T
 
 
-def chunk_speeds(
-    robot: Robot, surface: Surface, q: Real, v: Real, kind: str, dipole: "Dipole | None" = None
-) -> Array:
+def chunk_speeds(robot: Robot, surface: Surface, q: Real, v: Real, kind: str) -> Array:
     """Mean speeds of all links in a few thousand samples, shape (links, samples)."""
     twists = np.empty((len(robot.joints) + 1, 6, len(q)))
     chunk_twists(robot.joints, q, v, out=twists)
@@ -260,12 +224,9 @@ def chunk_speeds(
     speeds = np.zeros((len(surface.links), len(q)))
     for place, (link, index) in enumerate(zip(surface.links, surface.joint, strict=True)):
         if link.area:
-            joint, twist = robot.joints[index - 1], twists[index]
+            joint = robot.joints[index - 1]
             velocity = velocities[joint.first_v : joint.first_v + joint.nv]
-            if dipole is not None:
-                radiating = dipole(place, np.vstack((twist, velocity)))
-                twist, velocity = radiating[:6], radiating[6:]
-            speeds[place] = _link_speed(kind, link, joint, twist, velocity)
+            speeds[place] = _link_speed(kind, link, joint, twists[index], velocity)
     return speeds
 
 
@@ -324,49 +285,6 @@ def _check_motion(robot: Robot, q: Real, v: Real, names: tuple[str, str]) -> Non
             )
 
 
-class Dipole:
-    """The radiation of small bodies that oscillate: the lower the frequency, the less.
-
-    A sphere of radius a that oscillates at the frequency f radiates with the efficiency
-    x^4 / (4 + x^4), x = 2 pi f a / c. That is the squared magnitude of a Butterworth high-pass of
-    order 2 with its corner at f_c = sqrt(2) c / (2 pi a), so it acts on motions in time. A link
-    counts as the sphere of its area, a = sqrt(S / 4 pi); its frame hardly turns during 1 / f_c.
-    The filter of every link keeps its state from one chunk to the next.
-
-    Before its first sample the robot counts as having moved as it does then.
-    """
-
-    def __init__(self, surface: Surface, rate: float) -> None:
-        from scipy.signal import butter
-
-        sources = np.flatnonzero(surface.area)
-        corners = np.full(len(surface.area), np.inf)
-        radius = np.sqrt(surface.area[sources] / (4.0 * np.pi))
-        corners[sources] = np.sqrt(2.0) * SOUND_SPEED / (2.0 * np.pi * radius)
-        small = [link for link in sources if corners[link] >= 0.5 * rate]
-        if small:
-            named = ", ".join(f"{surface.names[i]} ({corners[i]:.0f} Hz)" for i in small)
-            raise NoiseModelError(
-                f"at {rate:g} Hz efficiency 'dipole' needs corners below {rate / 2:g} Hz, these"
-                f" links are too small: {named}; give a number for the efficiency, or a higher rate"
-            )
-        self._filters = {
-            int(link): butter(2, corners[link], "highpass", fs=rate, output="sos")
-            for link in sources
-        }
-        self._states: dict[int, Array] = {}
-
-    def __call__(self, link: int, motion: Array) -> Array:
-        """Filter the next chunk of a link's motion."""
-        from scipy.signal import sosfilt, sosfilt_zi
-
-        sections = self._filters[link]
-        if link not in self._states:
-            self._states[link] = sosfilt_zi(sections)[:, None, :] * motion[:, :1]
-        radiating, self._states[link] = sosfilt(sections, motion, zi=self._states[link])
-        return radiating
-
-
 def extended(
     robot: Robot,
     surface: Surface,
@@ -374,12 +292,10 @@ def extended(
     v: Real,
     kind: str = "paper",
     *,
-    efficiency: float | Sequence[float] | Real | str = 1.0,
-    rate: float | None = None,
     q_desired: Real | None = None,
     v_desired: Real | None = None,
 ) -> Noise:
-    """Estimate the sound power that each link radiates.
+    """Estimate the sound power that each link radiates, with a radiation efficiency of 1.
 
     Args:
         robot: The robot.
@@ -387,11 +303,6 @@ def extended(
         q: Configurations as Pinocchio has them, shape (samples, nq).
         v: Velocities as Pinocchio has them, shape (samples, nv).
         kind: How the mean speed of a surface is taken, see ``surface_speed``.
-        efficiency: Radiation efficiency: one for all links, one for each, shape (links,), or
-            "dipole": a small body that oscillates radiates less at low frequencies, see `Dipole`.
-            This is physics for the kind "normal"; the other kinds get the same filter, so that
-            they can be compared.
-        rate: Sample rate, which only "dipole" needs, in [Hz].
         q_desired: Desired configurations, shape (samples, nq); ``q`` unless given.
         v_desired: Desired velocities, shape (samples, nv); the power of this motion is added.
             A floating base is stationary in it, whatever is given.
@@ -399,32 +310,14 @@ def extended(
     Raises:
         UnknownKindError: If the kind does not exist.
         GeometryError: If the surface belongs to another robot.
-        NoiseModelError: If ``q`` or ``v`` are of another shape than the robot's, or not finite; a
-            number is not positive; lengths differ; or a link is too small for "dipole".
+        NoiseModelError: If a motion is of another shape than the robot's, or not finite.
     """
     _check(robot, surface, q, v, kind)
-    if isinstance(efficiency, str) and efficiency != "dipole":
-        raise NoiseModelError(f"efficiency is {efficiency!r}, expected numbers or 'dipole'")
     motions = _motions(robot, q, v, q_desired, v_desired)
-    dipoles: list[Dipole | None] = [None] * len(motions)
-    if isinstance(efficiency, str):
-        if rate is None:
-            raise NoiseModelError("efficiency 'dipole' needs the rate of the samples, in Hz")
-        check_positive("rate", rate, "Hz")
-        dipoles = [Dipole(surface, rate) for _ in motions]
-        efficiency = 1.0  # it is in the motion instead
-    each, links = np.asarray(efficiency, dtype=np.float64), len(surface.links)
-    if each.shape not in ((), (links,)):
-        raise NoiseModelError(
-            f"efficiency has shape {each.shape}, expected one number or ({links},)"
-        )
-    if not ((each > 0.0) & (each < np.inf)).all():
-        raise NoiseModelError(f"efficiency is {each.min():g}, expected positive numbers")
-    each = np.broadcast_to(each, links)[:, None]
-    power, stop = np.empty((links, len(q))), 0
-    for squares in _squares(robot, surface, motions, kind, CHUNK, dipoles):
-        start, stop = stop, stop + squares.shape[1]
-        power[:, start:stop] = sound_power(squares, surface.area[:, None], each)
+    power, stop = np.empty((len(surface.links), len(q))), 0
+    for part in _powers(robot, surface, motions, kind, CHUNK):
+        start, stop = stop, stop + len(part)
+        power[:, start:stop] = part.T
     return Noise(power.T, surface.names)
 
 
@@ -447,22 +340,16 @@ def _motions(
     return [(q, v), (wanted, v_desired)]
 
 
-def _squares(
-    robot: Robot,
-    surface: Surface,
-    motions: Sequence[tuple[Real, Real]],
-    kind: str,
-    chunk: int,
-    dipoles: "Sequence[Dipole | None]" = (None, None),
+def _powers(
+    robot: Robot, surface: Surface, motions: Sequence[tuple[Real, Real]], kind: str, chunk: int
 ) -> Iterator[Array]:
-    """Squared mean speeds of links, summed over motions, chunk by chunk: (links, samples)."""
+    """Power of links, summed over motions, chunk by chunk: (samples, links)."""
     for start in range(0, len(motions[0][0]), chunk):
         rows = slice(start, start + chunk)
         first, *more = (
-            chunk_speeds(robot, surface, q[rows], v[rows], kind, dipole) ** 2
-            for (q, v), dipole in zip(motions, dipoles, strict=False)
+            chunk_speeds(robot, surface, q[rows], v[rows], kind) ** 2 for q, v in motions
         )
-        yield sum(more, first)
+        yield sound_power(sum(more, first), surface.area[:, None]).T
 
 
 # The noise of a run, link by link, in bins of time.
@@ -643,8 +530,7 @@ def by_samples(robot: Robot, surface: Surface, run: Run, kind: str, bins: Index)
         motions.append(wanted)
     means, start = [], 0
     chunk = size * max(1, CHUNK // size)
-    for squares in _squares(robot, surface, motions, kind, chunk):
-        power = sound_power(squares, surface.area[:, None]).T
+    for power in _powers(robot, surface, motions, kind, chunk):
         counted = run.mask[start : start + len(power), None]
         firsts = np.arange(0, len(counted), size)
         energy = np.add.reduceat(power * counted, firsts, axis=0)

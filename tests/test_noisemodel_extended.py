@@ -51,7 +51,7 @@ def test_standstill_is_silent(solo):
     noise = extended(robot, surface, q, 0 * v)
     assert not noise.power.any()
     assert (noise.level == -np.inf).all()
-    assert not noise.shares().any()
+    assert not noise.shares.any()
 
 
 def test_pressure_halves_with_twice_the_distance_and_spreads_over_a_sphere(solo):
@@ -69,17 +69,6 @@ def test_a_noise_prints_the_level_of_its_mean_power(watts, decibels):
     assert str(noise).startswith(f"3 samples, mean sound power {decibels} dB re 1 pW\n")
 
 
-def test_the_efficiency_scales_the_power(solo):
-    robot, surface = solo
-    q, v = motion(robot)
-    plain = extended(robot, surface, q, v)
-    thin = extended(robot, surface, q, v, efficiency=0.5)
-    assert np.allclose(thin.power, 0.5 * plain.power, rtol=1e-12)
-    each = np.linspace(0.1, 1.0, len(surface.links))
-    weighed = extended(robot, surface, q, v, efficiency=each)
-    assert np.allclose(weighed.power, each * plain.power, rtol=1e-12)
-
-
 def test_desired_motion_adds_its_own_power_with_a_resting_base(solo):
     robot, surface = solo
     (q, v), (q_desired, v_desired) = motion(robot), motion(robot, seed=2)
@@ -95,26 +84,16 @@ def test_desired_motion_adds_its_own_power_with_a_resting_base(solo):
     )
 
 
-def test_shares_add_up_link_by_link_and_stretch_by_stretch(solo):
+def test_shares_are_those_in_the_energy(solo):
     robot, surface = solo
     noise = extended(robot, surface, *motion(robot))
-    stretches = [(0, 15), (15, 40), (0, 40)]
-    shares = noise.shares(stretches)
-    assert shares.shape == (3, len(surface.links))
-    assert np.allclose(shares.sum(axis=1), 1.0, rtol=1e-14)
-    first, second, whole = (noise.total[start:stop].sum() for start, stop in stretches)
-    assert np.allclose(shares[0] * first + shares[1] * second, shares[2] * whole, rtol=1e-12)
-    assert np.array_equal(noise.shares(), shares[2:])
-    assert noise.shares([]).shape == (0, len(surface.links))
-
-
-def test_the_shares_of_a_silent_stretch_are_zero(solo):
-    robot, surface = solo
-    q, v = motion(robot)
-    v[:10] = 0
-    shares = extended(robot, surface, q, v).shares([(0, 10), (0, 40)])
-    assert not shares[0].any()
-    assert shares[1].sum() == pytest.approx(1.0)
+    energy = noise.power.sum(axis=0)
+    assert np.allclose(noise.shares, energy / energy.sum(), rtol=1e-12)
+    loudest = int(noise.shares.argmax())
+    assert str(noise).splitlines()[1].split() == [
+        surface.names[loudest],
+        f"{noise.shares[loudest]:.1%}",
+    ]
 
 
 def test_a_link_without_geometry_radiates_nothing(tmp_path):
@@ -127,13 +106,6 @@ def test_a_link_without_geometry_radiates_nothing(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"efficiency": 0.0}, "efficiency is 0, expected positive numbers"),
-        ({"efficiency": [1.0] * 12 + [-0.5]}, r"efficiency is -0\.5, expected positive"),
-        ({"efficiency": [1.0, 1.0]}, r"efficiency has shape \(2,\), expected one number or \(13,"),
-        ({"efficiency": np.inf}, "efficiency is inf, expected positive numbers"),
-        ({"efficiency": "monopole"}, "efficiency is 'monopole', expected numbers or 'dipole'"),
-        ({"efficiency": "dipole"}, "efficiency 'dipole' needs the rate of the samples"),
-        ({"efficiency": "dipole", "rate": 0.0}, "rate is 0 Hz, expected a positive number"),
         ({"q_desired": np.zeros((40, 19))}, "q_desired is given and v_desired is not"),
         ({"v_desired": np.zeros((40, 12))}, r"v_desired has shape \(40, 12\), expected \(40, 18"),
         ({"v_desired": np.full((40, 18), np.nan)}, "v_desired: nan in row 0, column 0"),
@@ -143,7 +115,7 @@ def test_a_link_without_geometry_radiates_nothing(tmp_path):
         ),
     ],
 )
-def test_numbers_and_motions_that_cannot_be_are_refused(solo, options, message):
+def test_desired_motions_that_cannot_be_are_refused(solo, options, message):
     robot, surface = solo
     with pytest.raises(NoiseModelError, match=message):
         extended(robot, surface, *motion(robot), **options)
@@ -153,14 +125,6 @@ def test_numbers_and_motions_that_cannot_be_are_refused(solo, options, message):
 def test_distances_that_are_not_positive_are_refused(distance):
     with pytest.raises(NoiseModelError, match="distance is .* m, expected a positive number"):
         Noise(np.ones((1, 1)), ("link",)).pressure(distance)
-
-
-@pytest.mark.parametrize("stretch", [(0, 0), (3, 2), (-1, 2), (0, 5)])
-def test_stretches_outside_of_the_samples_are_refused(stretch):
-    with pytest.raises(
-        NoiseModelError, match="a stretch from sample .* expected one within 0 to 4"
-    ):
-        Noise(np.ones((4, 1)), ("link",)).shares([stretch])
 
 
 EVERY = ("revolute", "continuous", "prismatic", "planar", "floating", "revolute")
@@ -319,81 +283,14 @@ def test_motions_that_cannot_be_are_refused(panda, q, v, message):
         surface_speed(*panda, q, v)
 
 
-RATE = 20_000.0
-SPHERE = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'
-
-
-def slider(tmp_path, *shapes):
-    robot = chain(tmp_path, *["prismatic"] * len(shapes), shapes=shapes)
-    return robot, Surface.of(robot)
-
-
-def shaking(robot, frequency, samples=4000):
-    """All joints go to and fro with the velocity of a cosine."""
-    phase = 2 * np.pi * frequency * np.arange(samples) / RATE
-    ones = np.ones((1, robot.nv))
-    q = np.sin(phase)[:, None] / (2 * np.pi * frequency) * ones
-    return q, np.cos(phase)[:, None] * ones
-
-
-def shaken(robot, surface, frequency, kind="normal", **options):
-    """Mean power after the filter's transient."""
-    motion = shaking(robot, frequency)
-    return extended(robot, surface, *motion, kind, **options).total[1000:].mean()
-
-
-@pytest.mark.parametrize("frequency", [50.0, 200.0, 770.0, 2000.0])
-def test_a_shaking_sphere_radiates_as_acoustics_has_it(tmp_path, frequency):
-    """sigma = x^4 / (4 + x^4) with x = 2 pi f a / c."""
-    robot, surface = slider(tmp_path, SPHERE)
-    x = 2 * np.pi * frequency * np.sqrt(surface.area[0] / (4 * np.pi)) / 343.2
-    full = shaken(robot, surface, frequency)
-    radiated = shaken(robot, surface, frequency, efficiency="dipole", rate=RATE)
-    assert radiated / full == pytest.approx(x**4 / (4 + x**4), rel=0.03)
-
-
-def test_uniform_motion_is_silent_from_the_first_sample_on(tmp_path):
-    robot, surface = slider(tmp_path, SPHERE)
-    q = np.linspace(0, 1, 500)[:, None]
-    loud = extended(robot, surface, q, np.full_like(q, 3.0))
-    radiated = extended(robot, surface, q, np.full_like(q, 3.0), efficiency="dipole", rate=RATE)
-    assert radiated.total.max() < 1e-20 * loud.total.max()
-
-
 @pytest.mark.parametrize("kind", KINDS)
-def test_chunks_carry_on_with_the_filters_of_the_chunk_before(tmp_path, kind, monkeypatch):
-    robot, surface = slider(tmp_path, SPHERE, BAR)
-    q, v = shaking(robot, 130.0, samples=300)
-    options = {"efficiency": "dipole", "rate": RATE, "v_desired": v[::-1] ** 3}
-    whole = extended(robot, surface, q, v, kind, **options).power
-    for chunk in (1, 64):
-        monkeypatch.setattr(sys.modules["noisemodel.noise"], "CHUNK", chunk)
-        together = extended(robot, surface, q, v, kind, **options).power
-        assert np.allclose(together, whole, rtol=1e-9, atol=1e-12 * whole.max())
-
-
-def test_terms_add_up_after_the_filter_too(tmp_path):
-    robot, surface = slider(tmp_path, SPHERE, BAR)
-    q, v = shaking(robot, 130.0)
-    roots = {
-        kind: np.sqrt(extended(robot, surface, q, v, kind, efficiency="dipole", rate=RATE).power)
-        for kind in ("paper", "A", "B", "C")
-    }
-    assert np.allclose(roots["paper"], roots["A"] + roots["B"] + roots["C"], rtol=1e-9)
-    assert roots["A"][:, 1].any()
-
-
-def test_links_that_are_too_small_for_the_rate_are_named(tmp_path):
-    tiny = SPHERE.replace("0.1", "0.001")
-    robot, surface = slider(tmp_path, SPHERE, tiny, "")
-    q, v = shaking(robot, 100.0)
-    message = (
-        r"at 20000 Hz .* below 10000 Hz, these links are too small: link2 \(77\d\d\d Hz\); give"
-    )
-    with pytest.raises(NoiseModelError, match=message):
-        extended(robot, surface, q, v, efficiency="dipole", rate=RATE)
-    with pytest.raises(NoiseModelError, match="link1"):
-        extended(robot, surface, q, v, efficiency="dipole", rate=1000.0)
+def test_motions_are_estimated_in_chunks_as_whole(solo, kind, monkeypatch):
+    robot, surface = solo
+    q, v = motion(robot)
+    whole = extended(robot, surface, q, v, kind, v_desired=v[::-1]).power
+    monkeypatch.setattr(sys.modules["noisemodel.noise"], "CHUNK", 7)
+    together = extended(robot, surface, q, v, kind, v_desired=v[::-1]).power
+    assert np.allclose(together, whole, rtol=1e-9, atol=1e-12 * whole.max())
 
 
 def arm_run(rattling=None, *, rate=1000.0, seconds=4.0, **changes):

@@ -15,7 +15,7 @@ BRICK = urdf.box(1, 2, 3)
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache" / "noise-inspector" / "surfaces"
+    return tmp_path / "cache" / "noise-inspector" / "geometry"
 
 
 def area(triangles):
@@ -280,7 +280,7 @@ def test_a_file_that_is_no_mesh_is_named_in_one_line(tmp_path, cache, name, cont
     with pytest.raises(MeshError, match=f"mesh {tmp_path}/{name}: .*{problem}") as caught:
         read(tmp_path, name, content)
     assert "\n" not in str(caught.value)
-    assert not cache.exists()
+    assert not list(cache.glob("*"))
 
 
 def test_a_file_that_cannot_be_opened_is_named(tmp_path):

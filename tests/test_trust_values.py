@@ -15,7 +15,6 @@ from inspector.analysis import Estimate, noise_level
 from inspector.errors import InspectorError, LogError
 from inspector.logs.mapping import ReadOptions
 from noisemodel import MeshError, Robot, RobotError, Run, RunError, meshes
-from noisemodel.files import cache_folder, cached
 
 TIME = np.arange(40) / 1000
 
@@ -143,26 +142,6 @@ def test_a_mapping_that_is_hostile_is_one_line(tmp_path, text):
     with pytest.raises(InspectorError, match="m.toml: not a mapping in TOML") as caught:
         ReadOptions.load(tmp_path / "m.toml")
     assert "\n" not in str(caught.value)
-
-
-def test_arrays_of_the_cache_that_another_user_made_are_made_anew(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    right, wrong = {"a": np.ones(3)}, {"a": 10 * np.ones(3)}
-    assert cached("key", lambda: right)["a"][0] == 1
-    assert cached("key", lambda: wrong)["a"][0] == 1  # it is kept
-    file = cache_folder() / "key.npz"
-    cached("other", lambda: wrong)
-    (cache_folder() / "other.npz").replace(file)  # of another key
-    assert cached("key", lambda: right)["a"][0] == 1
-    (cache_folder().parent / "secret").unlink()  # as if it had been made elsewhere
-    assert cached("key", lambda: wrong)["a"][0] == 10
-
-
-def test_a_secret_that_others_can_read_is_not_used(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    cached("key", lambda: {"a": np.ones(3)})
-    (cache_folder().parent / "secret").chmod(0o644)
-    assert cached("key", lambda: {"a": np.zeros(3)})["a"][0] == 0
 
 
 @pytest.mark.parametrize(

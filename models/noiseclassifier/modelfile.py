@@ -93,7 +93,7 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
         raise OutputError(path, EXISTS)
     if path.is_symlink():  # the link stays
         path = Path(os.path.realpath(path))
-    temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")  # swept by `noisemodel`
+    temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")
     try:
         file = temporary.open("xb")
     except OSError as error:
