@@ -17,7 +17,7 @@ end, where a longer run may stay. So each row of costs follows from the row befo
 repetitions at once.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
@@ -65,8 +65,8 @@ NEAR, NEAREST = 1.0, 60
 many of them are the reference."""
 APART = 1.0
 """Time from which moments of one motion stand for moments of another, in [s]."""
-ROWS, LEVELS = 256, 8192
-"""Frames that are compared at once, and frames times joints."""
+ROWS = 256
+"""Frames that are compared at once."""
 POOL = 12_000
 """Most frames of other motions that are looked at."""
 ASSUMED_DB = 6.0
@@ -211,35 +211,28 @@ class Cells:
             tuple(o for o in run.octaves if all(o in each.octaves for each in others)),
         )
 
-    def unknown(self, frames: int, part: slice = slice(None)) -> Real32:
+    def unknown(self, frames: int) -> Real32:
         """Levels of which nothing is known yet, shape (frames, joints, 2, octaves)."""
-        shape = (frames, len(self.joints[part]), len(SIGNALS), len(self.octaves))
+        shape = (frames, len(self.joints), len(SIGNALS), len(self.octaves))
         return np.full(shape, np.nan, dtype=np.float32)
 
-    def of(self, run: Levels, part: slice = slice(None)) -> Real32:
-        """Levels of a run; NaN of those that it lacks."""
-        found, joints = self.unknown(len(run.level), part), self.joints[part]
-        places = [(to, run.joints.index(j)) for to, j in enumerate(joints) if j in run.joints]
-        bands = [
-            (to, run.octaves.index(o)) for to, o in enumerate(self.octaves) if o in run.octaves
-        ]
-        if places and bands:
-            to, at = np.array(places).T
-            into, of = np.array(bands).T
-            found[:, to[:, None], :, into] = run.level[:, at[:, None], :, of]
+    def of(self, run: Levels, joint: int) -> Real32:
+        """Levels of a joint, shape (frames, 2, octaves); NaN of those that the run lacks."""
+        found = np.full((len(run.level), len(SIGNALS), len(self.octaves)), np.nan, np.float32)
+        name = self.joints[joint]
+        if name in run.joints:
+            own = run.level[:, run.joints.index(name)]
+            for place, octave in enumerate(self.octaves):
+                if octave in run.octaves:
+                    found[..., place] = own[..., run.octaves.index(octave)]
         return found
-
-    def parts(self, *runs: Levels) -> Iterator[slice]:
-        """Joints that are compared at once: of long runs, all levels take several times as much."""
-        count = max(1, LEVELS // max(1, *(len(each.level) for each in runs)))
-        return (slice(first, first + count) for first in range(0, len(self.joints), count))
 
     def noise(self, run: Levels) -> Array:
         """Level of a run's velocities, all joints and octaves, shape (frames,); NaN without any."""
         power = np.zeros(len(run.guide))
-        for part in self.parts(run):
-            level = self.of(run, part)[:, :, 0]
-            power += np.nansum(10.0 ** (level / 10), axis=(1, 2), dtype=np.float64)
+        for joint in range(len(self.joints)):
+            level = self.of(run, joint)[:, 0]
+            power += np.nansum(10.0 ** (level / 10), axis=1, dtype=np.float64)
         return np.asarray(10 * np.log10(np.where(power > 0.0, power, np.nan)))
 
 
@@ -523,7 +516,7 @@ def _largest(values: Real32) -> Real32:
 
 
 def _floor(references: Sequence[Real32], share: float = FLOOR_SHARE) -> Real32:
-    """Power below which nothing is compared, shape (joints, 2, octaves), in [rad²/s²]."""
+    """Power below which nothing is compared, shape (2, octaves), in [rad²/s²]."""
     loudest = np.full(references[0].shape[1:], -np.inf)
     for level in references:
         loudest = np.fmax(
@@ -553,15 +546,16 @@ def _over_repetitions(
     """Exceedance over the loudest repetition, NaN without one, and frames that one covers."""
     over = cells.unknown(len(run.guide))
     covered = np.any([path.same for path in aligned], axis=0)
-    for part in cells.parts(run, *references):
-        views = [cells.of(each, part) for each in references]
-        floor, loudest = _floor(views), cells.unknown(len(over), part)
+    for joint in range(len(cells.joints)):
+        views = [cells.of(each, joint) for each in references]
+        loudest = np.full_like(over[:, joint], np.nan)
         for view, path in zip(views, aligned, strict=True):
             loud = _spread(view)[path.frame]
             loud[~path.same] = np.nan
             loudest = np.fmax(loudest, loud)
-        own = _raised(cells.of(run, part), floor) - _raised(loudest, floor)
-        over[covered, part] = own[covered]
+        floor = _floor(views)
+        own = _raised(cells.of(run, joint), floor) - _raised(loudest, floor)
+        over[covered, joint] = own[covered]
     return over, covered
 
 
@@ -582,19 +576,17 @@ def _over_others(
     if not shared:
         return found
     near, close, thin = _nearest(run, rows, references, shared, apart)
-    for place in range(len(cells.joints)):
-        part = slice(place, place + 1)
-        views = [cells.of(each, part) for each in references]
-        floor, mine = _floor(views, OTHERS_FLOOR), cells.of(run, part)
-        level = np.concatenate([_spread(view) for view in views])[::thin, 0]
+    for joint in range(len(cells.joints)):
+        views = [cells.of(each, joint) for each in references]
+        floor, mine = _floor(views, OTHERS_FLOOR), cells.of(run, joint)
+        level = np.concatenate([_spread(view) for view in views])[::thin]
         level[np.isnan(level)] = -np.inf
         for first in range(0, len(rows), ROWS):
             own = slice(first, first + ROWS)
             known = close[own, :, None, None]
             loudest = np.where(known, level[near[own]], np.float32(-np.inf)).max(axis=1)
             loudest[~np.isfinite(loudest)] = np.nan
-            raised = _raised(mine[rows[own]], floor) - _raised(loudest[:, None], floor)
-            found[own, place] = raised[:, 0]
+            found[own, joint] = _raised(mine[rows[own]], floor) - _raised(loudest, floor)
     tracked = np.isfinite(found[:, :, 1]).any(axis=(0, 2))
     found[:, tracked, 0] = np.nan
     return found
@@ -635,16 +627,16 @@ def _quieter(
     run: Levels, references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells
 ) -> float:
     """By how much the run is quieter than each repetition in its loudest joint, in [dB]."""
-    parts, own = list(cells.parts(run, *references)), cells.unknown(len(run.guide))
-    floors, margins = [], []
-    for part in parts:
-        floors.append(_floor([cells.of(each, part) for each in references]))
-        own[:, part] = _raised(_spread(cells.of(run, part)), floors[-1])
+    joints, own = range(len(cells.joints)), cells.unknown(len(run.guide))
+    floors = [_floor([cells.of(each, joint) for each in references]) for joint in joints]
+    for joint in joints:
+        own[:, joint] = _raised(_spread(cells.of(run, joint)), floors[joint])
+    margins = []
     for repetition, path in zip(references, aligned, strict=True):
         over = cells.unknown(len(run.guide))
-        for part, floor in zip(parts, floors, strict=True):
-            level = _raised(cells.of(repetition, part)[path.frame], floor)
-            over[path.same, part] = (level - own[:, part])[path.same]
+        for joint in joints:
+            level = _raised(cells.of(repetition, joint)[path.frame], floors[joint])
+            over[path.same, joint] = (level - own[:, joint])[path.same]
         margins.append(_top(scores_of(over)))
     return max(0.0, min((each for each in margins if np.isfinite(each)), default=0.0))
 
@@ -676,7 +668,7 @@ def _exceedances(
         place = np.unravel_index(exceeded.argmax(), exceeded.shape)
         frame, joint, signal, octave = map(int, place)
         row = group[frame]
-        level = cells.of(run, slice(joint, joint + 1))[row, 0, signal, octave]
+        level = cells.of(run, joint)[row, signal, octave]
         evidence = Evidence(
             KINDS[kind[row]].value,
             round(float(exceeded.max()), 2),
