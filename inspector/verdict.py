@@ -19,9 +19,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from functools import cache, partial
-from itertools import zip_longest
 from pathlib import Path
-from time import monotonic, perf_counter, sleep
+from time import perf_counter
 from typing import IO, Any, TypeVar
 
 import noiseclassifier as nc
@@ -44,10 +43,6 @@ EXPECTED = (InspectorError, nc.ModelsError, nm.NoiseModelError)
 UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
 KIND = "noise-classify-state/"
 FORMAT = f"{KIND}2"
-PATIENCE = 2.0
-"""How long a file that another process holds is waited for, in [s]."""
-SETTINGS = ("how logs are read", "--unknown", "--report", "--reference")
-"""The first settings of a header; what follows are files that options name."""
 MAX_BYTES = 256 * 2**20
 """Most bytes of a file that is resumed: enough for some hundred thousand runs."""
 DRAWING = 0.4
@@ -57,6 +52,11 @@ LONGEST_LINE = 2**16
 
 
 Kept = TypeVar("Kept")
+Drawing = Callable[[Analysis, "Verdict", Any], Path]
+"""Draws a picture of an analysis with its verdict and comparison, which is None without a
+reference, and gives its path."""
+Referring = Callable[[Analysis, "Verdict"], tuple["Verdict", Any]]
+"""Adds the evidence of a reference and gives the comparison with it, see `References`."""
 
 
 class StateError(FileError):
@@ -94,7 +94,6 @@ class Missing:
     start: float | None = None  # earliest onset, in [s]; None if any
     stop: float | None = None  # latest one
     reason: str = ""
-    line: int = 0  # of the file that requires it, from 1; 0 if that is not known
 
     def __str__(self) -> str:
         when = "" if self.start is None else f" from {self.start:.2f} s to {self.stop:.2f} s"
@@ -278,6 +277,11 @@ class Beside:
         return cls(**{**content, "scenarios": scenarios, "failures": failures})
 
 
+TEXTS = ("model", "model_sha256", "message", "assumed", "scenario", "expectations")
+NUMBERS = ("begin", "duration", "rate", "seconds")
+"""What of a verdict JSON holds as it is, and rounded."""
+
+
 @dataclass(frozen=True)
 class Verdict:
     """What was found in one file; texts are empty where nothing is known."""
@@ -358,8 +362,6 @@ class Verdict:
         """The verdict as a run of ``noise-verdict/3``, as JSON can hold it."""
         return {
             "run": str(self.path),
-            "model": self.model,
-            "model_sha256": self.model_sha256,
             "status": self.status.value,
             "unknown": self.unknown.value,
             "events": [event.as_dict() for event in self.events],
@@ -372,18 +374,12 @@ class Verdict:
                 }
                 for missing in self.missing
             ],
-            "expectations": self.expectations,
             "reference": None if self.beside is None else asdict(self.beside),
-            "message": self.message,
-            "assumed": self.assumed,
-            "scenario": self.scenario,
-            "begin": round(self.begin, 6),
-            "duration": round(self.duration, 6),
-            "rate": round(self.rate, 6),
             "joints": self.joints,
-            "seconds": round(self.seconds, 3),
             "counted": not self.ignored,
             "picture": None if self.picture is None else str(self.picture),
+            **{name: getattr(self, name) for name in TEXTS},
+            **{name: round(getattr(self, name), 6) for name in NUMBERS},
         }
 
     @classmethod
@@ -394,11 +390,9 @@ class Verdict:
             for each in content["missing"]
         )
         " ".join(map(str, missing))  # a number that is none fails here
-        texts = ("model", "message", "model_sha256", "assumed", "scenario", "expectations")
-        if not all(isinstance(content[name], str) for name in ("run", *texts)):
+        if not all(isinstance(content[name], str) for name in ("run", *TEXTS)):
             raise TypeError("expected text")
-        plain: dict[str, Any] = {name: content[name] for name in texts}
-        numbers = ("begin", "duration", "rate", "seconds")
+        plain: dict[str, Any] = {name: content[name] for name in TEXTS}
         return cls(
             Path(content["run"]),
             Status(content["status"]),
@@ -409,7 +403,7 @@ class Verdict:
             joints=int(content["joints"]),
             ignored=not content["counted"],
             picture=None if content["picture"] is None else Path(content["picture"]),
-            **plain | {name: float(content[name]) for name in numbers},
+            **plain | {name: float(content[name]) for name in NUMBERS},
         )
 
 
@@ -419,18 +413,14 @@ def classify_file(
     *,
     reading: Reading | None = None,
     unknown: Unknown = Unknown.FINDING,
-    draw: Callable[[Analysis, Verdict, Any], Path] | None = None,
-    reference: Callable[[Analysis, Verdict], tuple[Verdict, Any]] | None = None,
+    draw: Drawing | None = None,
+    reference: Referring | None = None,
 ) -> Verdict:
     """Classify one file; errors become part of the verdict.
 
     Args:
         path: A run file, any log that `inspector import` reads, or one of NoisyTest's two-column
             logs (``*.log``).
-        draw: Draws a picture of a file's analysis with its verdict and comparison, which is None
-            without a reference, and gives its path.
-        reference: Adds the evidence of a reference and gives the comparison with it, see
-            `inspector.reference.verdicts`.
     """
     source = path if isinstance(path, Source) else Source(path)
     begun = perf_counter()
@@ -469,15 +459,15 @@ def classify_files(
     *,
     reading: Reading | None = None,
     unknown: Unknown = Unknown.FINDING,
-    draw: Callable[[Analysis, Verdict, Any], Path] | None = None,
-    reference: Callable[[Analysis, Verdict], tuple[Verdict, Any]] | None = None,
+    draw: Drawing | None = None,
+    reference: Referring | None = None,
     jobs: Jobs = 1,
     resume: Path | None = None,
 ) -> Iterator[Verdict]:
     """Classify many files; one bad file never stops the rest.
 
     Args:
-        draw: See `classify_file`, as for the reference; importable for several jobs.
+        draw: Importable for several jobs, as ``reference`` is.
         jobs: How many to work on at once, or the address of a Dask scheduler. A run with which a
             worker dies is an internal error.
         resume: A file that keeps the verdicts; those on unchanged runs are taken from it.
@@ -490,25 +480,27 @@ def classify_files(
         draw=draw,
         reference=reference,
     )
-    end = partial(_died, unknown=unknown)
+    end = partial(died, unknown=unknown)
     each = DRAWING if draw is not None else 0.0
     if resume is None:
         yield from in_order(one, paths, jobs=jobs, died=end, work=work_of(paths, each))
         return
     reading = reading or Reading()
-    beside = (reading.desired, Path(str(reading.options.robot or "")))
+    files = [each for each in (reading.desired, Path(str(reading.options.robot))) if each]
     settings = {
         "version": program_version(),
         "models": {name: model.sha256 for name, model in library.items()},
-        "settings": [repr(reading), unknown.value, draw is not None, str(reference or "")]
-        + [digest(each) for each in beside if each and each.is_file()],
+        "reading of logs": [repr(reading), *(digest(each) for each in files if each.is_file())],
+        "--unknown": unknown.value,
+        "--report": draw is not None,
+        "--reference": str(reference or ""),
     }
     content = cache(digest)
-    with kept(resume, settings) as state:
+    with kept(resume, settings) as (verdicts, add):
         todo = []
         for path in paths:
             run = path if isinstance(path, Source) else Source(path)
-            known = state.verdicts.get((run.shown, content(run.path)))
+            known = verdicts.get((run.shown, content(run.path)))
             if known is None or (known.picture is not None and not known.picture.exists()):
                 todo.append(run)
             else:
@@ -517,7 +509,7 @@ def classify_files(
         for _, (verdict, sha256) in as_done(
             work, todo, jobs=jobs, died=lambda run: (end(run), ""), work=work_of(todo, each)
         ):
-            state.add(verdict, sha256)
+            add(verdict, sha256)
             yield verdict
 
 
@@ -526,7 +518,7 @@ def _with_digest(run: Source, one: Callable[[Source], Verdict]) -> tuple[Verdict
     return one(run), sha256
 
 
-def _died(path: Path | Source, unknown: Unknown) -> Verdict:
+def died(path: Path | Source, unknown: Unknown) -> Verdict:
     """The verdict on a run with which a worker died."""
     shown = path.shown if isinstance(path, Source) else path
     message = f"{DIED}; classify this run alone to see why"
@@ -601,25 +593,17 @@ def read_results(path: Path) -> list[Verdict]:
         raise InspectorError(f"{path}: no results of classify{by} ({error})") from error
 
 
-@dataclass(eq=False)
-class State:
-    """The verdicts so far, by run and SHA-256 of its content."""
-
-    verdicts: dict[tuple[Path, str], Verdict]
-    _append: Callable[[Mapping[str, Any]], None]
-
-    def add(self, verdict: Verdict, sha256: str) -> None:
-        """Append a verdict, flushed to the disk."""
-        if verdict.status is not Status.INTERNAL_ERROR:
-            self._append({"sha256": sha256, **verdict.as_dict(), "lost": list(verdict.lost)})
-
-
 @contextmanager
-def kept(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
+def kept(
+    path: Path, settings: Mapping[str, Any]
+) -> Iterator[tuple[dict[tuple[Path, str], Verdict], Callable[[Verdict, str], None]]]:
     """Open a state file to resume, or create it.
 
     Args:
         settings: Models and settings, by name, as JSON can hold them.
+
+    Returns:
+        The verdicts so far, by run and SHA-256 of its content, and a function that adds one.
     """
     header = {"format": FORMAT, **settings}
 
@@ -629,19 +613,20 @@ def kept(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
         for number, row in enumerate(rows, start=2):
             try:
                 content = from_json(row)
-                verdict = Verdict.from_dict(content)
-                lost = tuple(map(" ".join, ([each] for each in content["lost"])))
-                verdict = replace(verdict, lost=lost)
+                verdict = replace(Verdict.from_dict(content), lost=tuple(content["lost"]))
+                " ".join(verdict.lost)  # what is no text fails here
                 verdicts[verdict.path, content["sha256"]] = verdict
             except (ValueError, KeyError, TypeError, AttributeError) as error:
                 raise StateError(path, f"is damaged in line {number}") from error
         return verdicts
 
-    with resumed(path, header, read, partial(StateError, path), "holds no state of classify") as (
-        verdicts,
-        append,
-    ):
-        yield State(verdicts or {}, append)
+    with resumed(path, header, read, partial(StateError, path)) as (verdicts, append):
+
+        def add(verdict: Verdict, sha256: str) -> None:
+            if verdict.status is not Status.INTERNAL_ERROR:
+                append({"sha256": sha256, **verdict.as_dict(), "lost": list(verdict.lost)})
+
+        yield verdicts or {}, add
 
 
 @contextmanager
@@ -650,7 +635,6 @@ def resumed(
     header: Mapping[str, Any],
     read: Callable[[bytes, list[bytes]], Kept],
     refused: Callable[[str], InspectorError],
-    nothing: str,
     *,
     afresh: bool = False,
 ) -> Iterator[tuple[Kept | None, Callable[[Mapping[str, Any]], None]]]:
@@ -660,7 +644,6 @@ def resumed(
         header: Its first line.
         read: Reads the first line and the others, or raises.
         refused: Makes an error of a problem of the file.
-        nothing: The problem of a file that does not begin as this one.
         afresh: Whether to discard what it holds.
 
     Returns:
@@ -674,7 +657,7 @@ def resumed(
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     try:
         try:
-            _lock(file)
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise InspectorError(
                 f"{path}: is being written by another process; wait for it, or name another file"
@@ -684,12 +667,10 @@ def resumed(
         file.seek(0)
         whole, end, torn = (b"" if afresh else file.read()).rpartition(b"\n")
         found, append = None, partial(_append, path, file)
-        if end:
-            first, *rows = whole.split(b"\n")
-            found = read(first, rows)
-        elif not json.dumps(header).encode().startswith(torn):
-            raise refused(nothing)
+        first, *rows = whole.split(b"\n") if end else [torn]
         # A line without its end was being written when the process was killed.
+        if end or not json.dumps(header).encode().startswith(torn):
+            found = read(first, rows)
         file.truncate(len(whole) + len(end))
         if not end:
             append(header)
@@ -697,18 +678,6 @@ def resumed(
     finally:
         with suppress(OSError):  # what it could not write has been said by then
             file.close()
-
-
-def _lock(file: IO[bytes]) -> None:
-    """Lock a file, once the workers of a process that was killed have ended."""
-    until = monotonic() + PATIENCE
-    while True:
-        try:
-            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            if monotonic() > until:
-                raise
-            sleep(0.02)
 
 
 def digest(path: Path) -> str:
@@ -738,23 +707,8 @@ def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:
         there = from_json(line)
     except ValueError:
         there = None
-    form = there.get("format") if isinstance(there, dict) else None
-    if not isinstance(there, dict) or not str(form).startswith(KIND):
+    if not isinstance(there, dict) or not str(there.get("format")).startswith(KIND):
         raise StateError(path, "holds no state of classify")
-    if form != header["format"]:
-        raise StateError(path, f"is of format {form}, this version writes {header['format']}")
-    there = {"version": header.get("version"), **there}  # 0.5.0 wrote none
     for name, value in header.items():
         if there.get(name) != value:
-            raise StateError(path, f"is of {_difference(name, there.get(name), value)}")
-
-
-def _difference(name: str, there: Any, here: Any) -> str:
-    """What of a header differs, in words."""
-    if name == "version":
-        return f"another version ({there}, this is {here})"
-    if name != "settings" or not isinstance(there, list):
-        return f"other {name}"
-    differs = [one != two for one, two in zip_longest(there, here)]
-    named = [what for what, other in zip(SETTINGS, differs, strict=False) if other]
-    return f"other settings ({', '.join(named or ['the file of an option'])})"
+            raise StateError(path, f"is of another batch (its {name} differs)")

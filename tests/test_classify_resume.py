@@ -21,7 +21,6 @@ from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.read import Reading, Source, open_source
-from inspector.text import program_version
 from inspector.verdict import Evidence, Finding, StateError, Verdict, classify_files, digest, kept
 from noisemodel import OutputError
 
@@ -50,8 +49,7 @@ def start(*arguments):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_a_killed_batch_resumes_without_loss_or_repetition(runs, tmp_path, monkeypatch, jobs):
-    monkeypatch.setattr(verdict, "PATIENCE", 300.0)  # until the workers have ended
+def test_a_killed_batch_resumes_without_loss_or_repetition(runs, tmp_path, jobs):
     state = tmp_path / "state.jsonl"
     process = start("classify", runs, "--resume", state, "-j", jobs)
     while process.poll() is None:  # the batch may end before this process sees it
@@ -94,23 +92,7 @@ def test_a_run_whose_picture_is_gone_is_done_again(tmp_path):
     assert len(pictures) == 2
 
 
-def test_a_state_that_another_process_releases_in_time_is_opened(tmp_path, monkeypatch):
-    holder, waits = (tmp_path / "state.jsonl").open("ab"), []
-    fcntl.flock(holder, fcntl.LOCK_EX)
-
-    def sleep(seconds):
-        waits.append(seconds)
-        if len(waits) == 3:
-            holder.close()
-
-    monkeypatch.setattr(verdict, "sleep", sleep)
-    with kept(tmp_path / "state.jsonl", {}) as opened:
-        assert opened.verdicts == {}
-    assert len(waits) == 3
-
-
-def test_a_state_that_another_process_keeps_is_not_opened(tmp_path, monkeypatch):
-    monkeypatch.setattr(verdict, "PATIENCE", 0.05)
+def test_a_state_that_another_process_keeps_is_not_opened(tmp_path):
     with (tmp_path / "state.jsonl").open("ab") as holder:
         fcntl.flock(holder, fcntl.LOCK_EX)
         refused = pytest.raises(InspectorError, match="is being written by another process; wait")
@@ -133,52 +115,30 @@ def test_only_what_changed_is_done_again(runs, tmp_path):
     assert rows(state)[-1]["status"] == "bad-input"
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "problem"),
-    [
-        (
-            "format",
-            "noise-classify-state/0",
-            "is of format noise-classify-state/0, this version writes noise-classify-state/2",
-        ),
-        ("version", "0.4.9", f"is of another version (0.4.9, this is {program_version()})"),
-    ],
-)
-def test_a_state_of_another_version_is_refused(tmp_path, key, value, problem):
-    state = tmp_path / "state.jsonl"
-    call("classify", demo_run(), "--resume", state)
-    head, _, rest = state.read_text().partition("\n")
-    state.write_text(f"{json.dumps(json.loads(head) | {key: value})}\n{rest}")
-    status, _, err = call("classify", demo_run(), "--resume", state)
-    assert (status, err) == (
-        3,
-        f"inspector: {state}: {problem}; name another file, or delete it\n",
-    )
-
-
-def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
+def test_a_state_of_another_batch_or_no_state_is_refused_and_kept(tmp_path):
     state, other = tmp_path / "state.jsonl", tmp_path / "other.npz"
     shutil.copy(model_files()[0], other)
     call("classify", demo_run(), "--resume", state)
-    for options, differs in [
-        (("--unknown", "ignore"), "--unknown"),
-        (("--format", "json", "--robot", "panda"), "how logs are read"),
-    ]:
-        status, _, err = call("classify", demo_run(), "--resume", state, *options)
-        advice = "name another file, or delete it"
-        assert (status, err) == (
-            3,
-            f"inspector: {state}: is of other settings ({differs}); {advice}\n",
-        )
-    status, _, err = call("classify", demo_run(), "--resume", state, "--model", other)
-    assert status == 3
-    assert err == f"inspector: {state}: is of other models; name another file, or delete it\n"
-    for content in ("some notes\n", '{"format": "notes/1"}\n', '["noise-state/1"]\n', "7\n"):
+    whole = state.read_text()
+    head, _, rest = whole.partition("\n")
+
+    def refused(content, problem, *options):
         state.write_text(content)
-        status, _, err = call("classify", demo_run(), "--resume", state)
-        assert status == 3
-        assert "holds no state of classify" in err
-        assert state.read_text() == content
+        status, _, err = call("classify", demo_run(), "--resume", state, *options)
+        said = f"inspector: {state}: {problem}; name another file, or delete it\n"
+        assert (status, err, state.read_text()) == (3, said, content)
+
+    for name, options in {
+        "--unknown": ("--unknown", "ignore"),
+        "reading of logs": ("--format", "json", "--robot", "panda"),
+        "models": ("--model", other),
+    }.items():
+        refused(whole, f"is of another batch (its {name} differs)", *options)
+    for name, value in {"format": "noise-classify-state/0", "version": "0.4.9"}.items():
+        changed = f"{json.dumps(json.loads(head) | {name: value})}\n{rest}"
+        refused(changed, f"is of another batch (its {name} differs)")
+    for content in ("some notes\n", '{"format": "notes/1"}\n', '["noise-state/1"]\n', "7\n", "x"):
+        refused(content, "holds no state of classify")
 
 
 def test_a_run_that_kills_its_worker_is_named_and_the_others_are_classified(runs, monkeypatch):
@@ -210,11 +170,11 @@ def die_of_seven(source, reading=None):
 )
 def test_a_state_of_other_types_is_damaged(tmp_path, change):
     path = tmp_path / "state"
-    with kept(path, {}) as opened:
-        opened.add(Verdict(Path("a.npz"), Status.OK), "0" * 64)
+    with kept(path, {}) as (_, add):
+        add(Verdict(Path("a.npz"), Status.OK), "0" * 64)
     header, row = path.read_text().splitlines()
-    with kept(path, {}) as opened:
-        assert len(opened.verdicts) == 1
+    with kept(path, {}) as (verdicts, _):
+        assert len(verdicts) == 1
     path.write_text(f"{header}\n{json.dumps(json.loads(row) | change)}\n")
     with pytest.raises(StateError, match="is damaged in line 2"), kept(path, {}):
         pass
@@ -249,13 +209,13 @@ def verdict_of(name, **more):
 def test_a_verdict_is_read_back_as_it_was_written(tmp_path):
     path, settings = tmp_path / "state", {"models": {"a": "0"}, "version": "1"}
     plain = Verdict(Path("b.npz"), Status.OK)
-    with kept(path, settings) as opened:
-        opened.add(verdict_of("a.npz"), "0" * 64)
-        opened.add(plain, "1" * 64)
-        opened.add(Verdict(Path("c.npz"), Status.INTERNAL_ERROR), "2" * 64)  # tried again
-    with kept(path, settings) as opened:
-        found = opened.verdicts
-    assert found == {
+    with kept(path, settings) as (_, add):
+        add(verdict_of("a.npz"), "0" * 64)
+        add(plain, "1" * 64)
+        add(Verdict(Path("c.npz"), Status.INTERNAL_ERROR), "2" * 64)  # tried again
+    with kept(path, settings) as (verdicts, _):
+        pass
+    assert verdicts == {
         (Path("a.npz"), "0" * 64): verdict_of("a.npz"),
         (Path("b.npz"), "1" * 64): plain,
     }
@@ -264,14 +224,14 @@ def test_a_verdict_is_read_back_as_it_was_written(tmp_path):
 @pytest.mark.parametrize("torn", [b'{"run": "half a li', b"{}", b"\xff"])
 def test_a_line_that_was_being_written_is_dropped(tmp_path, torn):
     path = tmp_path / "state"
-    with kept(path, {"a": 1}) as opened:
-        opened.add(Verdict(Path("a.npz"), Status.OK), "0" * 64)
+    with kept(path, {"a": 1}) as (_, add):
+        add(Verdict(Path("a.npz"), Status.OK), "0" * 64)
     whole = path.read_bytes()
     path.write_bytes(whole + torn)
-    with kept(path, {"a": 1}) as opened:
-        assert list(opened.verdicts) == [(Path("a.npz"), "0" * 64)]
+    with kept(path, {"a": 1}) as (verdicts, add):
+        assert list(verdicts) == [(Path("a.npz"), "0" * 64)]
         assert path.read_bytes() == whole
-        opened.add(Verdict(Path("b.npz"), Status.OK), "1" * 64)
+        add(Verdict(Path("b.npz"), Status.OK), "1" * 64)
     assert path.read_bytes().startswith(whole)
     assert len(rows(path)) == 2
 
@@ -287,24 +247,6 @@ def test_a_header_that_was_being_written_is_written_again(tmp_path):
     path.write_bytes(whole[:7] + b"x")
     with pytest.raises(StateError, match="holds no state"), kept(path, {"a": 1}):
         pass
-
-
-@pytest.mark.parametrize(
-    ("settings", "problem"),
-    [
-        ({"version": "1", "models": {"a": "1"}}, "is of other models"),
-        ({"version": "2", "models": {"a": "0"}}, "is of another version (1, this is 2)"),
-        ({"version": "1", "models": {"a": "0"}, "robot": 1}, "is of other robot"),
-        ({"version": "1", "zeta": 1, "models": 0}, "is of other zeta"),
-    ],
-)
-def test_a_state_of_other_settings_says_which(tmp_path, settings, problem):
-    path = tmp_path / "state"
-    with kept(path, {"version": "1", "models": {"a": "0"}}):
-        pass
-    with pytest.raises(StateError) as caught, kept(path, settings):
-        pass
-    assert str(caught.value) == f"{path}: {problem}; name another file, or delete it"
 
 
 def test_a_state_that_cannot_be_a_file_is_refused(tmp_path, monkeypatch):
@@ -333,19 +275,6 @@ def test_a_state_that_cannot_be_a_file_is_refused(tmp_path, monkeypatch):
         pass
 
 
-def test_a_state_of_the_largest_size_is_read(tmp_path, monkeypatch):
-    path = tmp_path / "state"
-    with kept(path, {"a": 1}):
-        pass
-    size = path.stat().st_size
-    monkeypatch.setattr(verdict, "MAX_BYTES", size)
-    with kept(path, {"a": 1}):
-        pass
-    monkeypatch.setattr(verdict, "MAX_BYTES", size - 1)
-    with pytest.raises(StateError, match="is larger than"), kept(path, {"a": 1}):
-        pass
-
-
 @pytest.mark.parametrize("beside", ["robot", "desired"])
 def test_a_file_that_logs_are_read_with_is_one_of_the_settings(tmp_path, beside):
     path, other = tmp_path / "state", tmp_path / "other"
@@ -356,7 +285,7 @@ def test_a_file_that_logs_are_read_with_is_one_of_the_settings(tmp_path, beside)
         reading = Reading(options, desired)
         done = classify_files([], LIBRARY, resume=path, reading=reading)
         if refused:
-            with pytest.raises(StateError, match="is of other settings"):
+            with pytest.raises(StateError, match="its reading of logs differs"):
                 list(done)
         else:
             assert list(done) == []

@@ -274,8 +274,7 @@ def diff(
         _prepare(report, overwrite=overwrite)
     library, where = load_library(model), jobs_or_dask(jobs, dask)
     found = difference(reference, candidate, library, margin=margin, unknown=unknown, jobs=where)
-    for bad in found.failed:
-        typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.problem}", err=True)
+    _name_failed(found.failed)
     gate = Gate(
         new=fail_on != "worse",
         worse=fail_on != "new",

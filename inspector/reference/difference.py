@@ -4,27 +4,29 @@ The runs after are classified beside those before, and the other way round. So t
 scenario depends neither on the order of scenarios nor on their number.
 """
 
-import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from statistics import median
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from inspector.errors import EXIT, InspectorError, Status, Unknown, without_path
+from inspector.analysis import Analysis
+from inspector.errors import EXIT, InspectorError, Status, Unknown
 from inspector.errors import worst as worst_code
 from inspector.library import Library
 from inspector.logs.read import Source, sources
 from inspector.reference.judging import Comparison, Kind, compare, same_motion
-from inspector.reference.levels import HOP, SIGNALS, Levels
-from inspector.reference.store import Reference, levels_of, of_runs
-from inspector.reference.verdicts import References
-from inspector.verdict import END, EXPECTED, UNREAD, Finding, Verdict, classify_files
-from noiseclassifier import Event
+from inspector.reference.levels import HOP, SIGNALS, Levels, levels
+from inspector.reference.store import Reference, of_runs, scenario_of
+from inspector.reference.verdicts import beside
+from inspector.verdict import END, Finding, Verdict, classify_file, died, work_of
+from noiseclassifier import Event, Labels
 from noiseclassifier.matching import match
-from noisemodel.parallel import Jobs
+from noisemodel.parallel import Jobs, in_order
 
 RARE = 3.0
 """By how many decibels over its margin a single run of several makes its scenario worse."""
@@ -101,23 +103,12 @@ class Row:
         return tuple(each for each in self.findings if each.kind != RESOLVED)
 
 
-@dataclass(frozen=True, eq=False)
-class Failed:
-    """A file that cannot be compared, or that shows a bug."""
-
-    path: Path
-    problem: str
-    status: Status = Status.BAD_INPUT
-    trace: str = ""
-
-
 @dataclass(frozen=True)
 class Gate:
-    """What fails: new or louder findings, scenarios that are worse or broken, files not read."""
+    """What fails beside broken scenarios: new or louder findings, worse ones, files not read."""
 
     new: bool = False
     worse: bool = True
-    broken: bool = True
     failed: bool = True  # they always do if there are no others
 
 
@@ -126,7 +117,7 @@ class Difference:
     """What became of all scenarios, the worst first."""
 
     rows: tuple[Row, ...]
-    failed: tuple[Failed, ...] = ()
+    failed: tuple[Verdict, ...] = ()  # on files that cannot be compared, or that show a bug
     gate: Gate = field(default_factory=Gate)
     margin: float = 0.0  # the least one, in [dB]
     picture: Path | None = None  # of the worst scenario
@@ -146,10 +137,8 @@ class Difference:
 
     def status(self, row: Row) -> Status:
         """Whether a scenario fails."""
-        failing = (row.outcome in BROKEN and self.gate.broken) or (
-            row.outcome is Outcome.WORSE and self.gate.worse
-        )
-        if failing or (row.new and self.gate.new):
+        worse = row.outcome is Outcome.WORSE and self.gate.worse
+        if row.outcome in BROKEN or worse or (row.new and self.gate.new):
             return Status.FINDINGS
         return Status.CANNOT_TELL if row.outcome is Outcome.INCONCLUSIVE else Status.OK
 
@@ -166,20 +155,31 @@ class Difference:
         return worst_code([*told, *bad])
 
 
-@dataclass(frozen=True, eq=False)
+class _Run(NamedTuple):
+    """A run with the verdict by the general model."""
+
+    verdict: Verdict
+    levels: Levels
+    labels: Labels | None
+
+
 class _Side:
     """The runs of one side that can be compared, and the verdicts on them beside the other."""
 
-    reference: Reference
-    levels: Sequence[Levels]
-    verdicts: Mapping[Path, Verdict]
-
-    @property
-    def names(self) -> list[str]:
-        return sorted({each.name for each in self.levels})
+    def __init__(self, path: Path, runs: Sequence[_Run]) -> None:
+        self.runs, self.levels = runs, [each.levels for each in runs]
+        self.reference = Reference(path, of_runs(self.levels))
+        self.names = sorted({each.name for each in self.levels})
+        self.verdicts: dict[Path, Verdict] = {}
 
     def named(self, name: str) -> list[Levels]:
         return [each for each in self.levels if each.name == name]
+
+    def compare(self, other: Reference) -> None:
+        """Add the verdicts beside the other side."""
+        for verdict, run, labels in self.runs:
+            found = beside(verdict, compare(run, other.scenarios), other, labels)
+            self.verdicts[verdict.path] = found
 
 
 def difference(
@@ -197,57 +197,44 @@ def difference(
         margin: Least margin from which a run is louder, in [dB].
         jobs: How many runs to work on at once.
     """
-    failed: list[Failed] = []
-    paths = before, after
-    found = [sources([path])[0] for path in paths]
-    levels = [_measured(own, path, failed) for own, path in zip(found, paths, strict=True)]
-    if not before.is_dir() and not after.is_dir():  # two files that are named themselves are a pair
-        levels[1] = [replace(each, name=levels[0][0].name) for each in levels[1] if levels[0]]
-    references = [Reference(path, of_runs(own)) for path, own in zip(paths, levels, strict=True)]
-    verdicts: list[dict[Path, Verdict]] = []
-    for own, other, measured in zip(found, reversed(references), levels, strict=True):
-        known = {Path(each.run): each for each in measured}
-        runs = [each for each in own if each.shown in known]
-        beside = References({other.path: other}, {each.shown: other.path for each in runs}, known)
-        classified = classify_files(runs, library, unknown=unknown, reference=beside, jobs=jobs)
-        verdicts.append({each.path: each for each in classified})
-        failed += [
-            Failed(each.path, each.message, each.status, each.trace)
-            for each in verdicts[-1].values()
-            if each.status in UNREAD
-        ]
-    broken = {each.path for each in failed}
-    sides = [
-        _Side(reference, [each for each in own if Path(each.run) not in broken], of)
-        for reference, own, of in zip(references, levels, verdicts, strict=True)
-    ]
-    rows = _rows(sides[0], sides[1], margin)
-    result = Difference(
-        tuple(sorted(rows, key=lambda row: (ORDER.index(row.outcome), not row.new, row.name))),
-        tuple(failed),
-        margin=margin,
-    )
-    if sides[0].levels and sides[1].levels and len(result.alone) == len(rows):
-        first, second = (", ".join(side.names[:3]) for side in sides)
+    sides, failed, name = [], [], ""
+    for path in (before, after):
+        root, of = path if path.is_dir() else None, sources([path])[0]
+        one = partial(_classified, library=library, root=root, unknown=unknown, name=name)
+        end = partial(died, unknown=unknown)
+        found = list(in_order(one, of, jobs=jobs, died=end, work=work_of(of)))
+        failed += [each for each in found if isinstance(each, Verdict)]
+        sides.append(_Side(path, [each for each in found if isinstance(each, _Run)]))
+        if not before.is_dir() and not after.is_dir():  # two files that are named are a pair
+            name = "".join(sides[0].names)
+    first, second = sides
+    first.compare(second.reference)
+    second.compare(first.reference)
+    rows = _rows(first, second, margin)
+    rows.sort(key=lambda row: (ORDER.index(row.outcome), not row.new, row.name))
+    result = Difference(tuple(rows), tuple(failed), margin=margin)
+    if first.levels and second.levels and len(result.alone) == len(rows):
+        here, there = (", ".join(side.names[:3]) for side in sides)
         raise InspectorError(
             f"{before} and {after} have no run in common, neither by name nor by motion"
-            f" ({first} and {second})"
+            f" ({here} and {there})"
         )
     return result
 
 
-def _measured(runs: Sequence[Source], root: Path, failed: list[Failed]) -> list[Levels]:
-    """Levels of the runs that can be read; the others fail."""
-    found = []
-    for each in runs:
-        try:
-            found.append(levels_of(each, root if root.is_dir() else None))
-        except EXPECTED as error:
-            failed.append(Failed(each.shown, without_path(error, each.path)))
-        except Exception as error:  # a bug that one run shows must not hide changes of others
-            problem, trace = f"{type(error).__name__}: {error}", traceback.format_exc()
-            failed.append(Failed(each.shown, problem, Status.INTERNAL_ERROR, trace))
-    return found
+def _classified(
+    source: Source, library: Library, root: Path | None, unknown: Unknown, name: str
+) -> _Run | Verdict:
+    """Classify a run and measure its levels; the verdict alone if it cannot be read."""
+    known: list[Any] = []
+
+    def measure(analysis: Analysis, verdict: Verdict) -> tuple[Verdict, None]:
+        scenario = name or scenario_of(analysis.run, source.shown, root)
+        known[:] = levels(analysis.run, name=scenario, file=str(source.shown)), analysis.labels
+        return verdict, None
+
+    verdict = classify_file(source, library, unknown=unknown, reference=measure)
+    return _Run(verdict, *known) if known else verdict
 
 
 def _paths(runs: Sequence[Levels]) -> tuple[Path, ...]:

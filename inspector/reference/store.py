@@ -483,13 +483,6 @@ def _table(name: str, facts: Mapping[str, object]) -> list[str]:
     return [f"[[{name}]]", *(f"{key} = {_toml(value)}" for key, value in known.items())]
 
 
-def line_of(scenario: str, folder: Path) -> int:
-    """Line of a store's TOML that names a scenario, from 1; 0 if none does."""
-    lines = (folder / NAME).read_text(encoding="utf-8").splitlines()
-    named = f"name = {_toml(scenario)}"
-    return lines.index(named) + 1 if named in lines else 0
-
-
 def _toml(value: object) -> str:
     """A value as TOML."""
     if isinstance(value, bool | date | float | int):

@@ -26,7 +26,7 @@ from inspector.reference.judging import (
     robot_fits,
 )
 from inspector.reference.levels import HOP, Levels, levels
-from inspector.reference.store import NAME, Reference, find, line_of, scenario_of
+from inspector.reference.store import NAME, Reference, find, scenario_of
 from inspector.verdict import (
     END,
     FAILING,
@@ -54,7 +54,6 @@ class References:
 
     loaded: Mapping[Path, Reference] = field(default_factory=dict)
     of: Mapping[Path, Path] = field(default_factory=dict)  # of runs that have one
-    measured: Mapping[Path, Levels] = field(default_factory=dict)  # of runs, as far as they are
 
     @classmethod
     def found(
@@ -70,12 +69,10 @@ class References:
         if path is None or analysis.audit is None:
             return verdict, None
         reference = self.loaded[path]
-        run = self.measured.get(verdict.path)
-        if run is None:
-            name = scenario_of(analysis.run, verdict.path)
-            if reference.named(name) is None:
-                name = scenario_of(analysis.run, verdict.path, _root(verdict.path, path))
-            run = levels(analysis.run, name=name, file=str(verdict.path))
+        name = scenario_of(analysis.run, verdict.path)
+        if reference.named(name) is None:
+            name = scenario_of(analysis.run, verdict.path, _root(verdict.path, path))
+        run = levels(analysis.run, name=name, file=str(verdict.path))
         comparison = compare(run, reference.scenarios)
         return beside(verdict, comparison, reference, analysis.labels), comparison
 
@@ -123,8 +120,7 @@ class References:
                 if lacks and any(_asked(each, folder, top) for folder in given):
                     reason = f"no log; it had {len(each.repetitions)}"
                     reason = f"{number} of {each.at_least} logs" if number else reason
-                    line = line_of(each.name, path)
-                    missing.append(Missing(f"{LOG}{each.name}", reason=reason, line=line))
+                    missing.append(Missing(f"{LOG}{each.name}", reason=reason))
             if missing:
                 store, status = path / NAME, Status.FINDINGS
                 found.append(

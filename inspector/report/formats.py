@@ -103,7 +103,6 @@ class Case:
     picture: Path | None = None
     picture_url: str = ""  # where it will be published
     timeline: str = ""  # as text, for where there is no picture
-    line: int = 0  # in the file, from 1; 0 without
 
     @property
     def told(self) -> str:
@@ -203,8 +202,6 @@ def github(job: Job) -> str:
 
 def _annotation(kind: str, case: Case) -> str:
     about = {"file": str(case.path)}
-    if case.line:
-        about["line"] = str(case.line)
     if case.name != about["file"]:
         about["title"] = case.name
     listed = ",".join(
@@ -468,14 +465,14 @@ def _results(verdict: Verdict, case: Case) -> Iterator[dict[str, Any]]:
             "ruleId": rule,
             "level": "error",
             "message": {"text": f"{case.name}: {sentence}"},
-            "locations": [_location(verdict.path, case.line or 1)],
+            "locations": [_location(verdict.path)],
             "partialFingerprints": {"primaryLocationLineHash": same},
             "properties": span,
         }
 
 
-def _location(path: Path, line: int = 1) -> dict[str, object]:
-    place = {"artifactLocation": {"uri": _uri(path)}, "region": {"startLine": line}}
+def _location(path: Path) -> dict[str, object]:
+    place = {"artifactLocation": {"uri": _uri(path)}, "region": {"startLine": 1}}
     return {"physicalLocation": place}
 
 
@@ -501,7 +498,6 @@ def _case(verdict: Verdict) -> Case:
     return Case(
         name=str(verdict.path) if absent is None else absent.scenario,
         path=verdict.path,
-        line=0 if absent is None else absent.line,
         status=verdict.status,
         words=WORDS[verdict.status],
         outcome=Outcome.SKIPPED if verdict.ignored else OUTCOMES[verdict.status],
@@ -648,7 +644,7 @@ def diff_json(found: Difference) -> str:
             }
             for of, path in alone
         ],
-        "failed": {str(each.path): each.problem for each in found.failed},
+        "failed": {str(each.path): each.message for each in found.failed},
     }
     return json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False)
 
@@ -742,7 +738,7 @@ def _of_difference(found: Difference) -> Job:
             outcome=Outcome.ERROR if found.gate.failed else Outcome.SKIPPED,
             rank=(list(EXIT).index(each.status),),
             kind=each.status,
-            message=each.problem,
+            message=each.message,
             trace=each.trace,
         )
         for each in found.failed

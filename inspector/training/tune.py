@@ -378,8 +378,8 @@ def opened(
         _check_header(path, first, json.loads(json.dumps(header)))
         return _measures(path, rows, points)
 
-    refused, nothing = partial(_refused, path), "holds no results of tuning"
-    with resumed(path, header, read, refused, nothing, afresh=overwrite) as (measures, append):
+    refused = partial(_refused, path)
+    with resumed(path, header, read, refused, afresh=overwrite) as (measures, append):
         yield Results(points, measures or [], append)
 
 
