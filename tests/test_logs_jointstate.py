@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from samplelogs import Talk
 
-from inspector.logs.messages import Layout, stamp
+from inspector.logs.bags import Layout, stamp
 
 TALK = Talk()
 FLOATS = st.lists(st.floats(width=64), max_size=5)

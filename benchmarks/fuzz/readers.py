@@ -30,10 +30,10 @@ from inspector.export.labels import read_labels
 from inspector.library import load_library, model_files
 from inspector.live import pipe
 from inspector.live.samples import Clock, Warnings
+from inspector.logs.bags import STATE, STATES, Topic, decoder
 from inspector.logs.clocks import ordered, stamps_of
 from inspector.logs.log import Track
 from inspector.logs.mapping import ReadOptions, parse_mapping
-from inspector.logs.messages import STATE, STATES, Topic, decoder
 from inspector.logs.names import (
     Naming,
     array_signal,
