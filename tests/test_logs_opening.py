@@ -46,7 +46,7 @@ def test_only_angles_without_a_unit_in_the_header_are_said_to_be_taken_for_radia
     path = write(tmp_path / "log.csv", {"time": TIME, "elbow_vel [deg/s]": np.cos(TIME)})
     assumed = open_run(path).assumed
     assert "; other angles taken for radians; " in assumed
-    assert "elbow_vel [deg/s]: converted from deg/s, as the header says" in assumed
+    assert "elbow_vel [deg/s]: converted from deg/s, as their names say" in assumed
 
 
 def test_a_run_file_is_opened_as_it_is_and_nothing_is_assumed(run):
@@ -115,7 +115,7 @@ def test_a_folder_without_logs_is_refused(tmp_path):
 
 def test_a_single_run_is_not_chosen_from_several(tmp_path, run):
     log(tmp_path)
-    told = f"holds 2 logs (log.csv, run.npz); name what to open, such as {tmp_path / 'log.csv'}"
+    told = f"holds 2 runs (log.csv, run.npz); name one, such as {tmp_path / 'log.csv'}"
     with pytest.raises(LogError, match=re.escape(told)):
         open_run(tmp_path)
 
@@ -136,7 +136,7 @@ def test_episodes_are_runs_of_their_own(episodes):
     found, _ = sources([episodes], reading)
     assert found == (Source(episodes, "demo_0"), Source(episodes, "demo_1"))
     assert open_source(found[1], reading).run.rate == 100.0
-    with pytest.raises(LogError, match=r"holds 2 episodes \(demo_0, demo_1\); .*--episode"):
+    with pytest.raises(LogError, match=r"holds 2 runs \(demo_0, demo_1\); .*--episode"):
         open_run(episodes, reading)
     with pytest.raises(LogError, match="there is no episode 'demo_7'"):
         open_run(episodes, Reading(ReadOptions(rate=100.0), episodes=("demo_7",)))

@@ -32,7 +32,6 @@ def import_(
     """Convert logs of robots to run files.
 
     The exit status is 3 if a log cannot be read, 5 if a run file cannot be written; the others are.
-    Called again after an interruption, it writes the run files that a folder lacks.
     """
     from inspector.logs.read import import_logs, listing
     from inspector.text import printable, progress
@@ -57,9 +56,6 @@ def import_(
         if result.problem:
             statuses.append(OUTPUT_LOST if result.lost else EXIT[Status.BAD_INPUT])
             typer.echo(f"inspector: {result.problem}", err=True)
-            continue
-        if result.kept:
-            typer.echo(f"{result.path}: kept, it is there already")
             continue
         for remark in result.remarks:
             typer.echo(f"  {remark}")

@@ -1,8 +1,7 @@
 """A run file or any log, opened as a run in memory: what all commands read their inputs by.
 
 The format is found by a file's first bytes, or by the files in a folder. Logs are imported as run
-files one by one or a folder of them at a time; ``meta`` of each run file in a folder has a digest
-of its log and of how it was read, by which an interrupted import knows what it has written.
+files one by one or a folder of them at a time.
 """
 
 import hashlib
@@ -11,7 +10,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,7 +23,6 @@ from inspector.logs.motion import Imported, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
 from inspector.logs.plausibility import check_joints, contradictions, limit_warnings, named
 from inspector.text import counted, printable
-from noiseclassifier.jsontext import from_json
 from noisemodel import NoiseModelError, OutputError, Robot, RobotError, Run, RunFileError, runfile
 from noisemodel.files import also_reading, refuse_existing, replacing
 from noisemodel.robot import joint_limits
@@ -62,11 +60,8 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     libraries, extra = NEEDS.get(module, ((), ""))
     for library in libraries:
         if find_spec(library) is None:
-            raise LogError(
-                path,
-                f"{library} reads such logs and is not installed;"
-                f" pip install 'noise-inspector[{extra}]'",
-            )
+            how = f"pip install 'noise-inspector[{extra}]'"
+            raise LogError(path, f"{library} reads such logs and is not installed; {how}")
     reader: Callable[[Path, ReadOptions], LogReader] = import_module(
         f"inspector.logs.{module}"
     ).open_log
@@ -76,12 +71,14 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 def is_one_log(folder: Path) -> bool:
     """Whether a folder is one log: a LeRobot data set, or a bag; not a folder of logs."""
     try:
-        if (folder / INFO).is_file() or (folder / BAG).is_file():
-            return True
         files = [each for each in folder.iterdir() if not each.name.startswith(".")]
+        return (
+            (folder / INFO).is_file()
+            or (folder / BAG).is_file()
+            or (len(files) == 1 and files[0].suffix in (".mcap", ".db3"))
+        )
     except OSError as error:
         raise LogError(folder, f"cannot be read ({error.strerror})") from error
-    return len(files) == 1 and files[0].suffix in (".mcap", ".db3")
 
 
 def _is_folder(path: Path) -> bool:
@@ -173,21 +170,12 @@ def read_logs(
     episodes: Sequence[str] | None = None,
     progress: Progress = without_progress,
 ) -> Iterator[Imported]:
-    """Runs of a log, read one after the other.
+    """Runs of a log, an episode each, read one after the other; errors as of `read_log`.
 
     Args:
-        path: The log.
-        options: How to read it.
         desired: Another log with the desired motion.
         episodes: Which episodes to read, all unless given.
         progress: Wraps what is read, to show how much is done.
-
-    Yields:
-        A run per episode.
-
-    Raises:
-        InspectorError: As ``read_log``.
-        RobotError: As ``read_log``.
     """
     readers = readers_of(
         Path(path),
@@ -216,13 +204,11 @@ def readers_of(
     opened = open_log(path, options)
     other = open_log(desired, options) if desired else None
     for episode in opened.episodes:
-        if printable(episode) != episode:
-            raise LogError(
-                path, f"an episode is called {printable(episode)}, which has control characters"
-            )
+        if (shown := printable(episode)) != episode:
+            raise LogError(path, f"an episode is called {shown}, which has control characters")
     for episode in episodes or ():
         if episode not in opened.episodes:
-            known = listed([each or "no episodes" for each in opened.episodes])
+            known = listed(opened.episodes) or "no episodes"
             raise LogError(path, f"there is no episode {episode!r}; it has {known}")
     return {
         episode: partial(_read_episode, path, opened, other, episode, options, robot, progress)
@@ -249,13 +235,12 @@ def _read_episode(
     robot: Robot | None,
     progress: Progress,
 ) -> Imported:
+    """Run of an episode: its signals prepared, with the desired ones of another log."""
     name = _name(path, episode)
     if opened.run and not desired:
         run = opened.run()
-        if not options.robot:
-            return Imported(run, ("a run file, unchanged",), name)
-        remark = f"a run file, its robot is now {options.robot}"
-        return Imported(replace(run, robot=options.robot), (remark,), name)
+        robot_name = options.robot or run.robot
+        return Imported(replace(run, robot=robot_name), ("a run file, unchanged",), name)
     log = opened.read(episode, progress)
     problem = ""
     if robot is None and log.urdf:
@@ -329,20 +314,13 @@ class Opened:
 def open_run(
     path: str | Path, reading: Reading | None = None, *, progress: Progress = without_progress
 ) -> Opened:
-    """Open a run file or a log that is a single run.
-
-    Args:
-        path: A run file, any log that `inspector import` reads, or a folder with one of them.
-        progress: Wraps what is read, to show how much is done.
-    """
+    """Open a run file, a log that is a single run, or a folder with one of them."""
     reading = reading or Reading()
     found, _ = sources([Path(path)], reading)
     if len(found) != 1:
-        what = "episodes" if any(each.episode for each in found) else "logs"
         names = listed([each.episode or each.path.name for each in found])
-        named = f"name what to open, such as {found[0].path}"
-        how = "choose one (--episode)" if what == "episodes" else named
-        raise LogError(Path(path), f"holds {len(found)} {what} ({names}); {how}")
+        how = "choose one (--episode)" if found[0].episode else f"name one, such as {found[0].path}"
+        raise LogError(Path(path), f"holds {len(found)} runs ({names}); {how}")
     return open_source(found[0], reading, progress=progress)
 
 
@@ -441,29 +419,22 @@ def left_out(others: Sequence[Path]) -> str:
 
 def assumed(imported: Imported, path: Path) -> str:
     """Say in one line what was assumed when a log was read."""
-    run = imported.run
-    units = str(run.meta.get("units") or "radians")
-    decided = any("degrees" in remark for remark in imported.remarks)
+    run, remarks = imported.run, imported.remarks
     lacking = check_joints(run.joint_names, run.robot)
-    others = "other " if any(": converted from" in each for each in imported.remarks) else ""
-    held = [
-        name.replace("_", " ")
-        for name in (*JOINT_SIGNALS, *BASE_SIGNALS)
-        if getattr(run, name) is not None
-    ]
-    parts = [
-        f"read as {counted(len(run.joint_names), 'joint')} ({_listed(run)}): {', '.join(held)}",
-        *([] if decided else [f"{others}angles taken for {units}"]),
-        f"{run.rate:g} Hz",
-        f"robot {run.robot}" if run.robot else "no robot (--robot NAME)",
-        *([f"not in the log, assumed stationary: {listed(lacking)}"] if lacking else []),
-        *(["the log describes its robot, which `import` keeps"] if imported.urdf else []),
-        *(
-            remark.removeprefix(f"{path.name}: ")
-            for remark in imported.remarks
-            if not remark.startswith("time starts at 0")  # says where `import` keeps it
-        ),
-    ]
+    others = "other " if any(": converted from" in each for each in remarks) else ""
+    signals = [name for name in (*JOINT_SIGNALS, *BASE_SIGNALS) if getattr(run, name) is not None]
+    held = ", ".join(signals).replace("_", " ")
+    parts = [f"read as {counted(len(run.joint_names), 'joint')} ({_listed(run)}): {held}"]
+    if not any("degrees" in remark for remark in remarks):
+        parts.append(f"{others}angles taken for {run.meta.get('units') or 'radians'}")
+    parts.append(f"{run.rate:g} Hz")
+    parts.append(f"robot {run.robot}" if run.robot else "no robot (--robot NAME)")
+    if lacking:
+        parts.append(f"not in the log, assumed stationary: {listed(lacking)}")
+    if imported.urdf:
+        parts.append("the log describes its robot, which `import` keeps")
+    told = (each for each in remarks if not each.startswith("time starts at 0"))  # of `import`
+    parts += [each.removeprefix(f"{path.name}: ") for each in told]
     return "; ".join(" ".join(part.split()) for part in parts)
 
 
@@ -514,10 +485,6 @@ def _is_archive(path: Path) -> bool:
 
 # Import as run files
 
-DIGEST = "import_sha256"  # key of ``meta`` with the digest of what a run file was made of
-READ = (*SUFFIXES, ".json", ".yaml")
-"""Suffixes of the files of a folder that are read if it is a log."""
-
 
 @dataclass(frozen=True)
 class Written:
@@ -529,7 +496,6 @@ class Written:
     remarks: tuple[str, ...] = ()  # what was decided during the import, a sentence each
     problem: str = ""  # why there is no run file; empty if there is one
     lost: bool = False  # the log could be read, and the run file not be written
-    kept: bool = False  # the run file is there already, from a call that was interrupted
 
 
 def import_logs(
@@ -542,59 +508,36 @@ def import_logs(
     overwrite: bool = False,
     progress: Progress,
 ) -> Iterator[Written]:
-    """Write a run file for each run of some logs.
-
-    In a folder, those that an interrupted call of the same logs and options has written are kept.
-    """
+    """Write a run file for each run of some logs; one that cannot be read alone raises."""
     logs = [log for path in logs for log in logs_in(path)[0]]
     also_reading(logs)
     several = len(logs) > 1
     if desired and several:
         raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
-    jobs: list[tuple[Path, str, Callable[[], Imported]]] = []
-    failed: list[Written] = []
+    jobs: list[tuple[str, Callable[[], Imported]]] = []
+    inner = without_progress if several else progress  # there is one bar at a time
     for log in logs:
-        inner = without_progress if several else progress  # there is one bar at a time
         try:
             found = readers_of(
                 log, options, desired=desired, episodes=episodes or None, progress=inner
             )
-            jobs += ((log, _name(log, episode), read) for episode, read in found.items())
+            jobs += ((_name(log, episode), read) for episode, read in found.items())
         except (InspectorError, NoiseModelError) as error:
             if not several:
                 raise
-            failed.append(Written(log, problem=str(error)))
-    targets = _targets([name for _, name, _ in jobs], output, several=several)
-    in_folder = targets != (output,)
-    digest = cache(lambda log: _digest(options, log, desired) if in_folder else "")
-    for (log, _, _), target in zip(jobs, targets, strict=True):
-        if not (in_folder and target.exists() and _digest_in(target) == digest(log)):
-            refuse_existing(target, overwrite=overwrite)
-    there = {target for target in targets if target.exists() and not overwrite}
-    yield from failed
-    for (log, _, read), target in progress(zip(jobs, targets, strict=True), len(jobs)):
-        if target in there:
-            yield Written(target, kept=True)
-            continue
+            yield Written(log, problem=str(error))
+    targets = _targets([name for name, _ in jobs], output, several=several)
+    for target in targets:
+        refuse_existing(target, overwrite=overwrite)
+    reads = [read for _, read in jobs]
+    for read, target in progress(zip(reads, targets, strict=True), len(jobs)):
         try:
-            yield _written(read(), target, digest(log), overwrite=overwrite)
+            yield _written(read(), target, overwrite=overwrite)
         except (InspectorError, NoiseModelError) as error:
             if len(targets) == 1 and not several:
                 raise
             lost = isinstance(error, OutputError) and isinstance(error.__cause__, OSError)
             yield Written(target, problem=str(error), lost=lost)
-
-
-def _digest(options: ReadOptions, *logs: Path | None) -> str:
-    """SHA-256 of the options, the robot's file, and what is read of the logs."""
-    found = hashlib.sha256(repr(options).encode(errors="surrogatepass"))
-    for log in (*(log or Path() for log in logs), Path(options.robot)):
-        files = sorted(log.rglob("*")) if log != Path() and log.is_dir() else [log]
-        for path in files:  # not the videos of a data set
-            if path.is_file() and (path == log or path.suffix.lower() in READ):
-                with path.open("rb") as stream:
-                    found.update(hashlib.file_digest(stream, "sha256").digest())
-    return found.hexdigest()
 
 
 def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path, ...]:
@@ -607,11 +550,9 @@ def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path
             " (--episode)"
         )
     targets = tuple(output / f"{name}.npz" for name in names)
-    there = set[Path]()
-    for path in targets:
-        if path in there:
-            raise InspectorError(f"{path}: two logs would be written there; import them one by one")
-        there.add(path)
+    if twice := [path for path in targets if targets.count(path) > 1]:
+        problem = "two logs would be written there; import them one by one"
+        raise InspectorError(f"{twice[0]}: {problem}")
     try:
         output.mkdir(exist_ok=True)
     except OSError as error:
@@ -619,25 +560,13 @@ def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path
     return targets
 
 
-def _digest_in(target: Path) -> object:
-    """What a run file was made of; None of another file."""
-    try:
-        held = runfile.read_npz(target, ["meta"])["meta"]
-        meta = None if held.shape else from_json(str(held))
-    except (OSError, ValueError, KeyError):
-        return None
-    return meta.get(DIGEST) if isinstance(meta, dict) else None
-
-
-def _written(imported: Imported, target: Path, digest: str, *, overwrite: bool) -> Written:
+def _written(imported: Imported, target: Path, *, overwrite: bool) -> Written:
+    """Write a run, and beside it the robot that the log describes."""
     run, remarks = imported.run, list(imported.remarks)
-    if digest:
-        run = replace(run, meta={**run.meta, DIGEST: digest})
     if imported.urdf:
         urdf = target.with_suffix(".urdf")
-        if not (urdf.is_file() and urdf.read_bytes() == imported.urdf.encode()):
-            with replacing(urdf, overwrite=overwrite) as temporary:
-                temporary.write_bytes(imported.urdf.encode())
+        with replacing(urdf, overwrite=overwrite) as temporary:
+            temporary.write_bytes(imported.urdf.encode())
         run = replace(run, robot=str(urdf))
         remarks.append(f"{urdf.name}: the robot, as the log describes it")
     remarks += [*contradictions(run), *limit_warnings(run)]
