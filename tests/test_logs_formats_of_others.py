@@ -343,8 +343,8 @@ FORMATS = (
         ("Joint 1", "Joint 2"),
         (
             "stamps are in milliseconds",
-            "Joint 1 speed (deg/s), Joint 2 speed (deg/s): converted from deg/s, as the header"
-            " says",
+            "Joint 1 speed (deg/s), Joint 2 speed (deg/s): converted from deg/s, as their names"
+            " say",
         ),
     ),
     Format(
@@ -354,7 +354,7 @@ FORMATS = (
         (P,),
         ("J1", "J2"),
         (
-            "J1 [deg], J2 [deg]: converted from deg, as the header says",
+            "J1 [deg], J2 [deg]: converted from deg, as their names say",
             f"velocity: {METHOD}",
         ),
     ),
@@ -364,7 +364,7 @@ FORMATS = (
         table(f"time,{names('motor#_speed_rpm')}", (V,), scale={V: 30 / np.pi}),
         (V,),
         ("motor1", "motor2"),
-        ("motor1_speed_rpm, motor2_speed_rpm: converted from rpm, as the header says",),
+        ("motor1_speed_rpm, motor2_speed_rpm: converted from rpm, as their names say",),
     ),
     Format(
         "ROS 2, seconds and nanoseconds",

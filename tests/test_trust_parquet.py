@@ -47,7 +47,7 @@ def test_a_column_of_one_value_is_refused_before_it_is_unpacked(tmp_path, monkey
     [
         (TIME, "'episode_index' holds double, expected whole numbers"),
         (["a"] * 400, "'episode_index' holds string, expected whole numbers"),
-        (pa.array([None] * 400, pa.int64()), "'episode_index' has rows without a number"),
+        (pa.array([None] * 400, pa.int64()), "'episode_index' holds int64, expected whole numbers"),
     ],
 )
 def test_episodes_have_whole_numbers(tmp_path, index, problem):
@@ -67,8 +67,8 @@ def test_episodes_have_whole_numbers(tmp_path, index, problem):
         (json.dumps(INFO | {"fps": [1]}), "fps is .1., expected"),
         (json.dumps(INFO | {"fps": float("nan")}), "fps is nan, expected"),
         (json.dumps(INFO | {"fps": 1e-320}), "fps is 1e-320, expected"),
-        (json.dumps(INFO | {"features": {"action": 3}}), "the feature 'action' is no table"),
-        (json.dumps(INFO | {"features": []}), "has no features"),
+        (json.dumps(INFO | {"features": {"action": 3}}), "has no table of features"),
+        (json.dumps(INFO | {"features": []}), "has no table of features"),
     ],
 )
 def test_an_info_file_that_is_hostile_is_one_line(tmp_path, text, problem):
@@ -82,10 +82,10 @@ def test_an_info_file_that_is_hostile_is_one_line(tmp_path, text, problem):
 @pytest.mark.parametrize(
     ("column", "values", "problem"),
     [
-        ("timestamp", ["a"] * 400, "'timestamp' holds string, expected numbers"),
+        ("timestamp", ["a"] * 400, "'timestamp' holds a value that is no time"),
         ("timestamp", TIME * 1e30, "'timestamp' holds a value that is no time"),
         ("timestamp", TIME * np.nan, "'timestamp' holds a value that is no time"),
-        ("frame_index", ["a"] * 400, "'frame_index' holds string, expected numbers"),
+        ("frame_index", ["a"] * 400, "'frame_index' holds a value that is no time"),
         ("frame_index", [[1]] * 400, ""),
     ],
 )

@@ -29,7 +29,6 @@ from inspector.logs.names import (
     column_signal,
     factor_of,
     listed,
-    other_quantity,
     time_column,
     without_unit,
 )
@@ -176,11 +175,6 @@ class CsvReader:
             meaning = column_signal(column, naming)
             if meaning is None or meaning[0] not in SIGNALS:
                 continue
-            if unit := other_quantity(column, meaning):
-                raise LiveError(
-                    f"column {column!r} is named like {meaning[0]} and has a unit of {unit};"
-                    " rename it"
-                )
             if factor_of(column) == 1.0:
                 kind, joint = meaning
                 if not isinstance(joint, str):

@@ -21,7 +21,7 @@ from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, gathered
 from inspector.logs.clocks import counting, is_counter, stamps_since
 from inspector.logs.log import Field, Log, LogReader, Progress, Stamps
-from inspector.logs.mapping import ReadOptions, check_unit, no_motion
+from inspector.logs.mapping import ReadOptions, no_motion
 from inspector.logs.names import (
     JOINT_SIGNALS,
     TIME_UNITS,
@@ -29,8 +29,6 @@ from inspector.logs.names import (
     Naming,
     array_signal,
     column_signal,
-    factor_of,
-    listed,
     says_twice,
     time_column,
     without_unit,
@@ -136,24 +134,19 @@ def _log_of(path: Path, stream: TextIO, options: ReadOptions, progress: Progress
         raise LogError(path, f"the joints' names change ({header[min(named)]}); split the log")
     of_joints = dict(zip(named.values(), next(iter(joints), ()), strict=True))
     fields: list[Field] = []
-    converted: dict[str, list[str]] = {}
     for at, name in enumerate(header[place] for place in wanted):
         column = values[:, at : at + 1]
-        if (factor := factor_of(name)) != 1.0 and not options.units:
-            column = column * factor
-            converted.setdefault(without_unit(name)[1], []).append(name)
         known = column_signal(name)
         joint = of_joints.get(f"{NAME}{known[1]}") if known else None
         signal, of = (known[0], (joint,)) if known and joint else ("", ())
         rank = int(says_twice(name))
         fields.append(Field(name, column, stamps, of, signal, source=path.name, rank=rank))
     read = {time, rest, *wanted, *named}
-    remarks = (f"{listed(n)}: converted from {u}, as the header says" for u, n in converted.items())
     log = Log(
         path,
         tuple(fields),
         not_read=tuple(n for place, n in enumerate(header) if n and place not in read),
-        remarks=(*layout.remarks, *remarks),
+        remarks=layout.remarks,
         time="" if time is None else header[time],
     )
     return gathered(log, options)
@@ -266,12 +259,8 @@ def _no_header(path: Path, delimiter: str, skip: int, row: int) -> LogError:
     if not width:
         return LogError(path, "there is no row of numbers", row)
     names, how = _suggested(np.array([each for each in rows if len(each) == width]))
-    return LogError(
-        path,
-        f"there is no header; the first row has {width} numbers. Name the columns in their order,"
-        f" such as --columns {','.join(names)}{how}",
-        row,
-    )
+    problem = f"there is no header; the first row has {width} numbers. Name the columns in order"
+    return LogError(path, f"{problem}, such as --columns {','.join(names)}{how}", row)
 
 
 def _suggested(table: Array) -> tuple[list[str], str]:
@@ -346,10 +335,9 @@ def _counter(path: Path, stream: TextIO, layout: Layout, wanted: Sequence[int]) 
 
 def _counts(cells: Sequence[str]) -> bool:
     """Whether cells are whole numbers that grow, mostly by one."""
-    try:
+    with suppress(ValueError):
         return bool(counting({"cells": np.array(cells, dtype=np.float64)}))
-    except ValueError:
-        return False
+    return False
 
 
 def _wanted(
@@ -359,13 +347,9 @@ def _wanted(
     header, row = layout.header, layout.row or None
     if len(header) > limit("columns"):
         raise LogError(path, f"{len(header)} columns, {beyond('columns')}", row=row)
-    for name in header:
-        if not name.isprintable():
-            raise LogError(
-                path,
-                f"the name {name[:40]!r} cannot be printed; is a quotation mark not closed?",
-                row=row,
-            )
+    if odd := next((name for name in header if not name.isprintable()), ""):
+        problem = f"the name {odd[:40]!r} cannot be printed; is a quotation mark not closed?"
+        raise LogError(path, problem, row)
     mapped = {entry.source for entry in options.entries}
     naming = Naming.of(header, options.known_joints)
     wanted = [
@@ -381,9 +365,7 @@ def _wanted(
     ]
     for place in [*wanted, *([] if time is None else [time])]:
         if header.count(header[place]) > 1:
-            raise LogError(path, f"two columns are named {header[place]!r}", row=row)
-        if place != time and header[place] not in mapped:
-            check_unit(path, header[place], column_signal(header[place], naming), row)
+            raise LogError(path, f"two columns are named {header[place]!r}", row)
     if not wanted:
         joints = iter(range(1, len(header) + 1))
         names = ",".join(
@@ -509,11 +491,8 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
                     cells = cells[:width]  # the row does
                 if len(cells) != width:
                     names = "the header names" if layout.row else "--columns names"
-                    raise LogError(
-                        path,
-                        f"{len(cells)} cells where {names} {width} columns",
-                        first + lines.line_num,
-                    )
+                    problem = f"{len(cells)} cells where {names} {width} columns"
+                    raise LogError(path, problem, first + lines.line_num)
             elif cells[0][:1] in ("#", "%", "/") and cells[0].startswith(COMMENTS):
                 continue
             yield first + lines.line_num, cells
@@ -550,11 +529,10 @@ def _is_missing(cell: str) -> bool:
 
 
 def _is_number(cell: str) -> bool:
-    try:
+    with suppress(ValueError):
         float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return not _is_missing(cell)
+        return not _is_missing(cell)
+    return False
 
 
 # Stamps
@@ -578,21 +556,19 @@ def _decimals(
 
 
 def _decimal(cell: str) -> Decimal | None:
-    try:
+    with suppress(InvalidOperation):
         return Decimal(cell.strip().replace(",", "."))
-    except InvalidOperation:
-        return None
+    return None
 
 
 def _date(cell: str) -> Decimal | None:
     """A date in [s] since 1970, at UTC unless it tells its time zone; None of another cell."""
     if "-" not in cell.strip()[1:]:
         return None
-    try:
+    with suppress(ValueError):
         date = datetime.fromisoformat(cell.strip())
-    except ValueError:
-        return None
-    if date.year not in YEARS:
-        return None
-    since = (date if date.tzinfo else date.replace(tzinfo=UTC)) - DAY
-    return Decimal(since // timedelta(microseconds=1)).scaleb(-6)
+        since = (date if date.tzinfo else date.replace(tzinfo=UTC)) - DAY
+        return (
+            Decimal(since // timedelta(microseconds=1)).scaleb(-6) if date.year in YEARS else None
+        )
+    return None

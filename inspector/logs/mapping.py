@@ -18,14 +18,14 @@ from inspector.logs.log import JOINT, Entry, Field, Log, Track
 from inspector.logs.names import (
     BASE_SIGNALS,
     JOINT_SIGNALS,
-    Meaning,
     Naming,
     array_signal,
     column_signal,
+    factor_of,
     listed,
     number_of,
-    other_quantity,
     pattern_for,
+    without_unit,
 )
 from inspector.logs.plausibility import WrongRobotError, known_limits
 from noiseclassifier.jsontext import from_toml, text_of, toml_shown
@@ -256,6 +256,7 @@ def tracks_of(
     log: Log, options: ReadOptions, robot: Robot | None
 ) -> tuple[tuple[Track, ...], tuple[str, ...], tuple[str, ...]]:
     """Tracks of a log; the mapping takes precedence over the names of columns."""
+    log, converted = _in_si(log, options)
     names = [field.name for field in log.fields]
     options = options.for_columns(log.path, [name for name in names if name != log.time])
     joints = robot.joint_names if robot else ()
@@ -266,7 +267,7 @@ def tracks_of(
         raise no_motion(log.path, [*names, *log.not_read])
     read = {id(choice.field) for choice in kept}
     not_read = tuple(field.name for field in log.fields if id(field) not in read)
-    remarks = list[str]()
+    remarks = [f"{listed(n)}: converted from {u}, as their names say" for u, n in converted.items()]
     if naming.qd_is_desired:
         remarks.append("qd is the desired position, since dq is the velocity (else --map)")
     if naming.remark and any(not c.explicit and c.field.name in naming.bare for c in kept):
@@ -276,26 +277,26 @@ def tracks_of(
     return (*_base_tracks(log, kept), *_joint_tracks(kept)), (*log.not_read, *not_read), (*remarks,)
 
 
+def _in_si(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[str]]]:
+    """Log with columns in the units of a run, and the names of the others by their unit."""
+    found: dict[str, list[str]] = {}
+    fields = []
+    for each in log.fields:
+        factor = factor_of(each.name) if each.values.shape[1] == 1 else 1.0
+        if factor != 1.0 and not options.units:
+            found.setdefault(without_unit(each.name)[1], []).append(each.name)
+            fields.append(replace(each, values=each.values * factor))
+        else:
+            fields.append(each)
+    return replace(log, fields=tuple(fields)), found
+
+
 def no_motion(path: Path, names: Sequence[str], instead: str = "") -> LogError:
     """Error of a log of which no column is known: what to type, and the columns that it has."""
     example = pattern_for(names)
     how = f"no position or velocity of a joint; map columns, such as {example}"
     columns = listed([name for name in names if name])
     return LogError(path, f"{how if example else NO_MOTION + instead}; columns are {columns}")
-
-
-def check_unit(path: Path, name: str, meaning: Meaning | None, row: int | None = None) -> None:
-    """Refuse a column whose unit belongs to another quantity than its name says."""
-    if meaning is None or not (unit := other_quantity(name, meaning)):
-        return
-    signal, number = meaning
-    joint = number if isinstance(number, str) else f"joint_{number}"
-    raise LogError(
-        path,
-        f"column {name!r} is named like {signal} and has the unit of {unit}; say which it is: --map"
-        f" '{unit}.{joint}={name}' or --map '{signal}.{joint}={name}'",
-        row=row,
-    )
 
 
 def _is_column(field: Field) -> bool:

@@ -276,14 +276,8 @@ def factor_of(column: str) -> float:
     return UNITS.get(without_unit(column)[1], ("", 1.0))[1]
 
 
-def other_quantity(column: str, meaning: Meaning) -> str:
-    """The quantity of a column's unit where its name says another one; empty where they agree."""
-    quantity = UNITS.get(without_unit(column)[1], ("", 1.0))[0]
-    return "" if meaning[0].startswith(quantity) else quantity
-
-
 def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
-    """Signal and joint of a column, by its name; None for an unknown name."""
+    """Signal and joint of a column, by its name; None for another, and where its unit disagrees."""
     naming = naming or Naming()
     if column in naming.bare:
         return naming.bare[column]
@@ -302,7 +296,9 @@ def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
         joint, says_desired = _without_side(joint)
         if says_desired and signal in ("position", "velocity", "effort"):
             signal = None if signal == "effort" else f"{signal}_desired"
-    return (signal, joint) if signal and joint != "" else None
+    if not signal or joint == "" or not signal.startswith(UNITS.get(unit, (signal, 1.0))[0]):
+        return None
+    return signal, joint
 
 
 def _without_side(joint: str) -> tuple[str, bool]:

@@ -26,7 +26,7 @@ from inspector.errors import LogError
 from inspector.logs.arrays import floats
 from inspector.logs.clocks import counting, stamps_of
 from inspector.logs.log import Field, Log, LogReader, Stamps
-from inspector.logs.mapping import ReadOptions, check_unit
+from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
@@ -85,15 +85,11 @@ def _schema(path: Path) -> Any:
 
 def _episodes(path: Path) -> tuple[str, ...]:
     """Episodes in a file; "" if it does not number them."""
-    schema = _schema(path)
-    if EPISODE not in schema.names:
+    if EPISODE not in _schema(path).names:
         return ("",)
-    kind = schema.field(EPISODE).type
-    if not pyarrow.types.is_integer(kind):
-        raise LogError(path, f"column {EPISODE!r} holds {kind}, expected whole numbers")
     column = _table([path], [EPISODE], "").column(0)
-    if column.null_count:
-        raise LogError(path, f"column {EPISODE!r} has rows without a number")
+    if not pyarrow.types.is_integer(column.type) or column.null_count:
+        raise LogError(path, f"column {EPISODE!r} holds {column.type}, expected whole numbers")
     return tuple(str(each) for each in np.unique(column.to_numpy()))
 
 
@@ -127,10 +123,10 @@ def _values(path: Path, table: Any, name: str) -> NDArray[Any] | None:
     if not (pyarrow.types.is_floating(flat.type) or pyarrow.types.is_integer(flat.type)):
         return None
     numbers = flat.to_numpy(zero_copy_only=False)
-    if pyarrow.types.is_list(column.type) and len(pc.list_value_length(column).unique()) > 1:
-        raise LogError(path, f"column {name!r} has lists of different lengths")
-    if samples == 0 or len(numbers) % samples:
-        raise LogError(path, f"column {name!r} has {len(numbers)} numbers in {samples} rows")
+    widths = pc.list_value_length(column).unique() if pyarrow.types.is_list(column.type) else ()
+    if len(widths) > 1 or not samples or len(numbers) % samples:
+        problem = f"column {name!r} has {len(numbers)} numbers in {samples} rows of any length"
+        raise LogError(path, problem)
     return np.asarray(numbers).reshape(samples, -1)
 
 
@@ -144,9 +140,6 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     naming = Naming.of(names, options.known_joints)
     known = {n for n in signals if column_signal(n, naming) or array_signal(n)}
     wanted = [name for name in names if name in mapped | known]
-    for name in wanted:
-        if name not in mapped:
-            check_unit(path, name, column_signal(name, naming))
     counters = [
         each.name
         for each in schema
@@ -312,14 +305,12 @@ def _data_set(path: Path, folder: Path, options: ReadOptions) -> LogReader:
 
 def _info(path: Path) -> dict[str, Any]:
     try:
-        info = from_json(text_of(path))
+        info: dict[str, Any] = from_json(text_of(path))
     except (OSError, ValueError) as error:
         raise LogError(path, f"cannot be read ({error})") from error
-    if not isinstance(info, dict) or not isinstance(info.get("features"), dict):
-        raise LogError(path, "has no features")
-    for name, feature in info["features"].items():
-        if not isinstance(feature, dict):
-            raise LogError(path, f"the feature {name!r} is no table")
+    features = info.get("features") if isinstance(info, dict) else None
+    if not isinstance(features, dict) or not all(isinstance(f, dict) for f in features.values()):
+        raise LogError(path, "has no table of features")
     rate = info.get("fps")
     if rate is not None and not (type(rate) in (int, float) and SLOWEST <= rate <= FASTEST):
         raise LogError(path, f"fps is {rate!r}, expected {SLOWEST:g} to {FASTEST:g} Hz")
@@ -437,8 +428,7 @@ def _stamps(path: Path, info: dict[str, Any], table: Any, options: ReadOptions) 
         if name in table.column_names:
             values = _values(path, table, name)
             if values is None or values.shape[1] != 1 or values.dtype.kind not in "iuf":
-                kind = table.column(name).type
-                raise LogError(path, f"column {name!r} holds {kind}, expected numbers")
+                values = np.full((1, 1), np.nan)
             clock[name] = values[:, 0].astype(np.float64)
             if not (np.abs(clock[name]) < LATEST).all():
                 raise LogError(path, f"column {name!r} holds a value that is no time")
