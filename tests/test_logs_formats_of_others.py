@@ -39,29 +39,17 @@ P, V, PD, VD, E = "position", "velocity", "position_desired", "velocity_desired"
 
 @dataclass(frozen=True)
 class Format:
-    """A log that others write, and the run that it becomes.
+    """A log that others write, and the run that it becomes."""
 
-    Attributes:
-        title: What writes it, or what is peculiar to it.
-        shown: Its header.
-        text: The file.
-        signals: Signals of the run, which are those of the motion.
-        joints: Names of the joints.
-        said: The remarks, without the name of the file.
-        typed: What has to be typed beside the name of the file.
-        options: The same for ``read_log``.
-        gaps: Samples in gaps.
-    """
-
-    title: str
-    shown: str
-    text: str
-    signals: tuple[str, ...]
+    title: str  # what writes it, or what is peculiar to it
+    shown: str  # its header
+    text: str  # the file
+    signals: tuple[str, ...]  # of the run, which are those of the motion
     joints: tuple[str, ...] = ("joint_1", "joint_2")
-    said: tuple[str, ...] = ()
-    typed: str = ""
-    options: dict[str, Any] = field(default_factory=dict)
-    gaps: tuple[int, ...] = ()
+    said: tuple[str, ...] = ()  # the remarks, without the name of the file
+    typed: str = ""  # what has to be typed beside the name of the file
+    options: dict[str, Any] = field(default_factory=dict)  # the same for `read_log`
+    gaps: tuple[int, ...] = ()  # samples in gaps
 
     @property
     def row(self) -> str:
@@ -117,401 +105,225 @@ def damaged(text: str) -> str:
     return "\n".join(lines)
 
 
+def each_of(*patterns: str, first: int = 0, mark: str = ",") -> str:
+    """The names of both joints' columns, by several patterns."""
+    return ",".join(names(each, first) for each in patterns).replace(",", mark)
+
+
+def stamped(header: str, *signals: str, **how: Any) -> str:
+    """A table whose stamps are named "time"."""
+    return table(f"time,{header}", signals, **how)
+
+
 DEG = 180 / np.pi
-QDQ = names("q#") + "," + names("dq#")
+QDQ = each_of("q#", "dq#", first=1)
 START = f"time starts at 0; the first stamp, {EPOCH} s, is in meta"
 ROSTOPIC = (
     "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.name0,field.name1,"
-    + ",".join(names(f"field.{each}#", 0) for each in (P, V, E))
+    + each_of(*(f"field.{each}#" for each in (P, V, E)))
 )
-FRANKA = "time, success_rate, " + ", ".join(
-    names(each, 0)
-    for each in ("state.q[#]", "state.q_d[#]", "state.dq[#]", "state.dq_d[#]", "state.tau_J[#]")
+FRANKA = "time, success_rate, " + each_of(
+    *(f"state.{each}[#]" for each in ("q", "q_d", "dq", "dq_d", "tau_J")), "cmd.q_d[#]", mark=", "
 )
+RTDE = each_of("target_q_#", "target_qd_#", "target_moment_#", "actual_q_#", "actual_qd_#")
 UNREAD = "{} not read: {}"
+ELBOW, FROM_0 = ("shoulder", "elbow"), ("joint_0", "joint_1")
 
 FORMATS = (
     Format(
-        "names as in run files",
-        "time,elbow.velocity,elbow.velocity_desired",
-        table(
-            "time,shoulder.position,elbow.position,shoulder.velocity,elbow.velocity,"
-            "shoulder.velocity_desired,elbow.velocity_desired",
-            (P, V, VD),
-        ),
-        (P, V, VD),
-        ("shoulder", "elbow"),
+        "names as in run files", "time,elbow.velocity,elbow.velocity_desired",
+        stamped(",".join(f"{j}.{s}" for s in (P, V, VD) for j in ELBOW), P, V, VD),
+        (P, V, VD), ELBOW,
     ),
     Format(
-        "PlotJuggler, a JointState",
-        "__time,/joint_states/elbow/velocity",
-        table(
-            "__time,/joint_states/shoulder/position,/joint_states/elbow/position,"
-            "/joint_states/shoulder/velocity,/joint_states/elbow/velocity",
-            (P, V),
-            stamp=lambda time: f"{EPOCH + time:.2f}",
-        ),
-        (P, V),
-        ("shoulder", "elbow"),
-        (START,),
+        "PlotJuggler, a JointState", "__time,/joint_states/elbow/velocity",
+        table("__time," + ",".join(f"/joint_states/{j}/{s}" for s in (P, V) for j in ELBOW), (P, V),
+              stamp=lambda time: f"{EPOCH + time:.2f}"),
+        (P, V), ELBOW, (START,),
     ),
     Format(
         "PlotJuggler, a controller's state",
         "__time,/arm/state/feedback/velocities[0],/arm/state/reference/velocities[0]",
-        table(
-            "__time,"
-            + names("/arm/state/feedback/velocities[#]", 0)
-            + ","
-            + names("/arm/state/reference/velocities[#]", 0),
-            (V, VD),
-        ),
-        (V, VD),
-        ("joint_0", "joint_1"),
+        table("__time," + each_of(*(f"/arm/state/{each}/velocities[#]"
+                                    for each in ("feedback", "reference"))), (V, VD)),
+        (V, VD), FROM_0,
     ),
     Format(
-        "UR RTDE, record.py",
-        "timestamp actual_q_0 actual_qd_0 target_qd_0",
-        table(
-            "timestamp "
-            + " ".join(
-                names(each, 0).replace(",", " ")
-                for each in ("actual_q_#", "actual_qd_#", "target_qd_#", "actual_TCP_speed_#")
-            ),
-            (P, V, VD, E),
-            mark=" ",
-        ),
-        (P, V, VD),
-        ("joint_0", "joint_1"),
-        (UNREAD.format("2 columns", "actual_TCP_speed_0, actual_TCP_speed_1"),),
+        "UR RTDE, record.py", "timestamp actual_q_0 actual_qd_0 target_qd_0",
+        table("timestamp " + each_of("actual_q_#", "actual_qd_#", "target_qd_#",
+                                     "actual_TCP_speed_#", mark=" "), (P, V, VD, E), mark=" "),
+        (P, V, VD), FROM_0, (UNREAD.format("2 columns", "actual_TCP_speed_0, actual_TCP_speed_1"),),
     ),
     Format(
         "ur_rtde, startFileRecording",
         "timestamp,target_q_0,target_qd_0,target_moment_0,actual_q_0,actual_qd_0",
-        table(
-            "timestamp,"
-            + ",".join(
-                names(each, 0)
-                for each in (
-                    "target_q_#",
-                    "target_qd_#",
-                    "target_moment_#",
-                    "actual_q_#",
-                    "actual_qd_#",
-                )
-            ),
-            (PD, VD, E, P, V),
-        ),
-        (P, V, PD, VD),
-        ("joint_0", "joint_1"),
+        table(f"timestamp,{RTDE}", (PD, VD, E, P, V)), (P, V, PD, VD), FROM_0,
         (UNREAD.format("2 columns", "target_moment_0, target_moment_1"),),
     ),
     Format(
-        "ROS 1, rostopic echo -p",
-        "%time,field.header.seq,…,field.name0,field.velocity0",
-        table(
-            ROSTOPIC,
-            (P, V, E),
-            stamp=ticks(1e9),
-            cells=("1", f"{EPOCH}000000000", "base", "shoulder", "elbow"),
-        ),
-        (P, V, E),
-        ("shoulder", "elbow"),
-        (
-            "stamps are in nanoseconds",
-            UNREAD.format(
-                "3 columns", "field.header.seq, field.header.stamp, field.header.frame_id"
-            ),
-            START,
-        ),
+        "ROS 1, rostopic echo -p", "%time,field.header.seq,…,field.name0,field.velocity0",
+        table(ROSTOPIC, (P, V, E), stamp=ticks(1e9),
+              cells=("1", f"{EPOCH}000000000", "base", "shoulder", "elbow")),
+        (P, V, E), ELBOW,
+        ("stamps are in nanoseconds",
+         UNREAD.format("3 columns", ", ".join(f"field.header.{e}"
+                                              for e in ("seq", "stamp", "frame_id"))), START),
     ),
     Format(
         "libfranka, logToCSV",
         "time, success_rate, state.q[0], state.dq[0], state.dq_d[0], cmd.q_d[0]",
-        table(
-            FRANKA + ", " + names("cmd.q_d[#]", 0),
-            (P, PD, V, VD, E, E),
-            stamp=ticks(1e3, 42),
-            cells=("1.0",),
-        ),
-        (P, V, PD, VD, E),
-        ("joint_0", "joint_1"),
-        (
-            "stamps are in milliseconds",
-            UNREAD.format("3 columns", "success_rate, cmd.q_d[0], cmd.q_d[1]"),
-            "time starts at 0; the first stamp, 42 s, is in meta",
-        ),
+        table(FRANKA, (P, PD, V, VD, E, E), stamp=ticks(1e3, 42), cells=("1.0",)),
+        (P, V, PD, VD, E), FROM_0,
+        ("stamps are in milliseconds",
+         UNREAD.format("3 columns", "success_rate, cmd.q_d[0], cmd.q_d[1]"),
+         "time starts at 0; the first stamp, 42 s, is in meta"),
     ),
     Format(
-        "symbols, numbered from 1",
-        "time_s,q1,dq1,dq_d1",
-        table(f"time_s,{QDQ},{names('dq_d#')}", (P, V, VD)),
-        (P, V, VD),
+        "symbols, numbered from 1", "time_s,q1,dq1,dq_d1",
+        table(f"time_s,{QDQ},{names('dq_d#')}", (P, V, VD)), (P, V, VD),
     ),
     Format(
-        "symbols, the desired position as qd",
-        "t,q1,dq1,qd1",
-        table(f"t,{QDQ},{names('qd#')}", (P, V, PD)),
-        (P, V, PD),
-        said=(
-            "qd is the desired position, since dq is the velocity (else --map)",
-            f"velocity_desired: {METHOD}",
-        ),
+        "symbols, the desired position as qd", "t,q1,dq1,qd1",
+        table(f"t,{QDQ},{names('qd#')}", (P, V, PD)), (P, V, PD),
+        said=("qd is the desired position, since dq is the velocity (else --map)",
+              f"velocity_desired: {METHOD}"),
     ),
     Format(
-        "words, numbered",
-        "timestamp,joint_velocity_1,target_velocity_1",
+        "words, numbered", "timestamp,joint_velocity_1,target_velocity_1",
         table(f"timestamp,{names('joint_velocity_#')},{names('target_velocity_#')}", (V, VD)),
         (V, VD),
     ),
     Format(
-        "a joint's name, then words; a comma ends each line",
-        "time,arm_1_joint_velocity,",
-        table(
-            f"time,{names('arm_#_joint_position')},{names('arm_#_joint_velocity')},",
-            (P, V),
-            end=",",
-        ),
-        (P, V),
-        ("arm_1_joint", "arm_2_joint"),
+        "a joint's name, then words; a comma ends each line", "time,arm_1_joint_velocity,",
+        stamped(f"{names('arm_#_joint_position')},{names('arm_#_joint_velocity')},", P, V, end=","),
+        (P, V), ("arm_1_joint", "arm_2_joint"),
     ),
     Format(
-        "short words",
-        "time,joint1_pos,joint1_vel,joint1_cmd_vel,joint1_eff,joint1_target",
-        table(
-            "time,"
-            + ",".join(
-                names(f"joint#_{each}") for each in ("pos", "vel", "cmd_vel", "eff", "target")
-            ),
-            (P, V, VD, E, P),
-        ),
-        (P, V, VD, E),
-        ("joint1", "joint2"),
+        "short words", "time,joint1_pos,joint1_vel,joint1_cmd_vel,joint1_eff,joint1_target",
+        stamped(each_of(*(f"joint#_{e}" for e in ("pos", "vel", "cmd_vel", "eff", "target")),
+                        first=1), P, V, VD, E, P),
+        (P, V, VD, E), ("joint1", "joint2"),
         (UNREAD.format("2 columns", "joint1_target, joint2_target"),),
     ),
     Format(
-        "capitals",
-        "Timestamp,actualJointPosition1,actualJointVelocity1,desiredJointVelocity1",
-        table(
-            "Timestamp,"
-            + ",".join(
-                map(
-                    names, ("actualJointPosition#", "actualJointVelocity#", "desiredJointVelocity#")
-                )
-            ),
-            (P, V, VD),
-        ),
+        "capitals", "Timestamp,actualJointPosition1,actualJointVelocity1,desiredJointVelocity1",
+        table("Timestamp," + each_of("actualJointPosition#", "actualJointVelocity#",
+                                     "desiredJointVelocity#", first=1), (P, V, VD)),
         (P, V, VD),
     ),
     Format(
-        "two arms",
-        "time,left_q_1,left_dq_1,right_q_1,right_dq_1",
-        table("time,left_q_1,right_q_1,left_dq_1,right_dq_1", (P, V)),
-        (P, V),
-        ("left_1", "right_1"),
+        "two arms", "time,left_q_1,left_dq_1,right_q_1,right_dq_1",
+        stamped("left_q_1,right_q_1,left_dq_1,right_dq_1", P, V), (P, V), ("left_1", "right_1"),
     ),
     Format(
-        "a legged robot's joints",
-        "t,LF_HAA_q,LF_HAA_dq,LF_HAA_tau",
+        "a legged robot's joints", "t,LF_HAA_q,LF_HAA_dq,LF_HAA_tau",
         table("t,LF_HAA_q,LF_HFE_q,LF_HAA_dq,LF_HFE_dq,LF_HAA_tau,LF_HFE_tau", (P, V, E)),
-        (P, V, E),
-        ("LF_HAA", "LF_HFE"),
+        (P, V, E), ("LF_HAA", "LF_HFE"),
     ),
     Format(
-        "semicolons, units in brackets",
-        "Time [sec]; Joint1 Velocity [rad/s]",
-        table(
-            "Time [sec]; Joint1 Position [rad]; Joint2 Position [rad]; Joint1 Velocity [rad/s];"
-            " Joint2 Velocity [rad/s]",
-            (P, V),
-            mark="; ",
-        ),
-        (P, V),
-        ("Joint1", "Joint2"),
+        "semicolons, units in brackets", "Time [sec]; Joint1 Velocity [rad/s]",
+        table("Time [sec]; Joint1 Position [rad]; Joint2 Position [rad]; Joint1 Velocity [rad/s];"
+              " Joint2 Velocity [rad/s]", (P, V), mark="; "),
+        (P, V), ("Joint1", "Joint2"),
     ),
     Format(
-        "decimal commas, degrees in the header",
-        "Time (ms);Joint 1 speed (deg/s)",
-        table(
-            "Time (ms);Joint 1 speed (deg/s);Joint 2 speed (deg/s)",
-            (V,),
-            mark=";",
-            stamp=lambda time: comma(1e3 * time),
-            scale={V: DEG},
-            number=comma,
-        ),
-        (V,),
-        ("Joint 1", "Joint 2"),
-        (
-            "stamps are in milliseconds",
-            "Joint 1 speed (deg/s), Joint 2 speed (deg/s): converted from deg/s, as their names"
-            " say",
-        ),
+        "decimal commas, degrees in the header", "Time (ms);Joint 1 speed (deg/s)",
+        table("Time (ms);Joint 1 speed (deg/s);Joint 2 speed (deg/s)", (V,), mark=";",
+              stamp=lambda time: comma(1e3 * time), scale={V: DEG}, number=comma),
+        (V,), ("Joint 1", "Joint 2"),
+        ("stamps are in milliseconds",
+         "Joint 1 speed (deg/s), Joint 2 speed (deg/s): converted from deg/s, as their names say"),
     ),
     Format(
-        "a spreadsheet: tabs, units in a row of their own",
-        "Time\\tJ1\\tJ2",
+        "a spreadsheet: tabs, units in a row of their own", "Time\\tJ1\\tJ2",
         table("Time\tJ1\tJ2\n[s]\t[deg]\t[deg]", (P,), mark="\t", scale={P: DEG}),
-        (P,),
-        ("J1", "J2"),
-        (
-            "J1 [deg], J2 [deg]: converted from deg, as their names say",
-            f"velocity: {METHOD}",
-        ),
+        (P,), ("J1", "J2"),
+        ("J1 [deg], J2 [deg]: converted from deg, as their names say", f"velocity: {METHOD}"),
     ),
     Format(
-        "turns per minute",
-        "time,motor1_speed_rpm",
-        table(f"time,{names('motor#_speed_rpm')}", (V,), scale={V: 30 / np.pi}),
-        (V,),
-        ("motor1", "motor2"),
+        "turns per minute", "time,motor1_speed_rpm",
+        stamped(names("motor#_speed_rpm"), V, scale={V: 30 / np.pi}), (V,), ("motor1", "motor2"),
         ("motor1_speed_rpm, motor2_speed_rpm: converted from rpm, as their names say",),
     ),
     Format(
         "ROS 2, seconds and nanoseconds",
         "header.stamp.sec,header.stamp.nanosec,position[0],velocity[0]",
-        table(
-            f"header.stamp.sec,header.stamp.nanosec,{names('position[#]', 0)},"
-            + names("velocity[#]", 0),
-            (P, V),
-            stamp=lambda time: f"{EPOCH},{round(time * 1e9)}",
-        ),
-        (P, V),
-        joints=("joint_0", "joint_1"),
-        said=(f"time starts at 0; the first stamp, {EPOCH} s, is in meta",),
+        table("header.stamp.sec,header.stamp.nanosec," + each_of("position[#]", "velocity[#]"),
+              (P, V), stamp=lambda time: f"{EPOCH},{round(time * 1e9)}"),
+        (P, V), FROM_0, (START,),
     ),
     Format(
-        "the stamps' unit in their name",
-        "timestamp_ms,q1,dq1",
-        table(f"timestamp_ms,{QDQ}", (P, V), stamp=ticks(1e3, 0)),
-        (P, V),
+        "the stamps' unit in their name", "timestamp_ms,q1,dq1",
+        table(f"timestamp_ms,{QDQ}", (P, V), stamp=ticks(1e3, 0)), (P, V),
         said=("stamps are in milliseconds",),
     ),
     *(
         Format(
-            f"stamps in {unit}, since {when}",
-            "timestamp,q1,dq1",
-            table(f"timestamp,{QDQ}", (P, V), stamp=ticks(size, since)),
-            (P, V),
+            f"stamps in {unit}, since {when}", "timestamp,q1,dq1",
+            table(f"timestamp,{QDQ}", (P, V), stamp=ticks(size, since)), (P, V),
             said=(f"stamps are in {unit}", *((START,) if since else ())),
         )
         for unit, size in (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
         for since, when in ((0, "the start"), (EPOCH, "1970"))
     ),
     Format(
-        "dates",
-        "time,q1,dq1",
-        table(
-            f"time,{QDQ}",
-            (P, V),
-            stamp=lambda time: np.datetime64(EPOCH * 1000 + round(1000 * time), "ms"),
-        ),
-        (P, V),
-        said=(START,),
+        "dates", "time,q1,dq1",
+        stamped(QDQ, P, V,
+                stamp=lambda time: np.datetime64(EPOCH * 1000 + round(1000 * time), "ms")),
+        (P, V), said=(START,),
+    ),
+    Format("a separator at the end of each row alone", "time,q1,dq1",
+           stamped(QDQ, P, V, end=","), (P, V)),
+    Format("NumPy, savetxt with a header", "# time q1 dq1",
+           table(f"# time {QDQ}".replace(",", " "), (P, V), mark=" "), (P, V)),
+    Format(
+        "lines before the header, and comments", "# robot: arm 7, tool: none",
+        "# robot: arm 7, tool: none\nStation 4\n\n" + stamped(QDQ, P, V) + "# end\n",
+        (P, V), said=("2 lines before the rows not read",),
     ),
     Format(
-        "a separator at the end of each row alone",
-        "time,q1,dq1",
-        table(f"time,{QDQ}", (P, V), end=","),
+        "a byte order mark, quotes, DOS line ends", '"time","q1","dq1"',
+        "\ufeff" + stamped(QDQ, P, V).replace("\n", "\r\n").replace(f"time,{QDQ}", ",".join(
+            f'"{name}"' for name in f"time,{QDQ}".split(","))),
         (P, V),
     ),
+    Format("pandas, with an index", ",time,q1,dq1",
+           table(f",time,{QDQ}", (P, V), stamp=lambda time: f"{round(100 * time)},{time!r}"),
+           (P, V)),
     Format(
-        "NumPy, savetxt with a header",
-        "# time q1 dq1",
-        table(f"# time {QDQ}".replace(",", " "), (P, V), mark=" "),
-        (P, V),
-    ),
-    Format(
-        "lines before the header, and comments",
-        "# robot: arm 7, tool: none",
-        "# robot: arm 7, tool: none\nStation 4\n\n" + table(f"time,{QDQ}", (P, V)) + "# end\n",
-        (P, V),
-        said=("2 lines before the rows not read",),
-    ),
-    Format(
-        "a byte order mark, quotes, DOS line ends",
-        '"time","q1","dq1"',
-        "\ufeff"
-        + table(",".join(f'"{name}"' for name in f"time,{QDQ}".split(",")), (P, V)).replace(
-            "\n", "\r\n"
-        ),
-        (P, V),
-    ),
-    Format(
-        "pandas, with an index",
-        ",time,q1,dq1",
-        table(f",time,{QDQ}", (P, V), stamp=lambda time: f"{round(100 * time)},{time!r}"),
-        (P, V),
-    ),
-    Format(
-        "no header",
-        "0.0,0.0,0.42,25.1,6.79",
-        table("", (P, V)),
-        (P, V),
-        said=(),
+        "no header", "0.0,0.0,0.42,25.1,6.79", table("", (P, V)), (P, V),
         typed="--columns time,q1,q2,dq1,dq2",
         options={"columns": ("time", "q1", "q2", "dq1", "dq2")},
     ),
+    Format("no stamps", "q1,q2,dq1,dq2", table(QDQ, (P, V), stamp=None), (P, V),
+           said=("there are no stamps: 100 Hz, as --rate says",),
+           typed="--rate 100", options={"rate": 100.0}),
     Format(
-        "no stamps",
-        "q1,q2,dq1,dq2",
-        table(QDQ, (P, V), stamp=None),
-        (P, V),
-        said=("there are no stamps: 100 Hz, as --rate says",),
-        typed="--rate 100",
-        options={"rate": 100.0},
-    ),
-    Format(
-        "cells that are nan or empty",
-        "time,q1,dq1",
-        damaged(table(f"time,{QDQ}", (P, V))),
-        (P, V),
+        "cells that are nan or empty", "time,q1,dq1", damaged(stamped(QDQ, P, V)), (P, V),
         said=("2 samples without a number, marked as not valid: dq2, the first at 0.05 s",),
         gaps=(5, 10),
     ),
     Format(
-        "degrees that nothing tells",
-        "time,q1,dq1,dq_d1",
-        table(f"time,{QDQ},{names('dq_d#')}", (P, V, VD), scale=dict.fromkeys((P, V, VD), DEG)),
-        (P, V, VD),
-        said=(f"positions and velocities {FOUND}",),
+        "degrees that nothing tells", "time,q1,dq1,dq_d1",
+        stamped(f"{QDQ},{names('dq_d#')}", P, V, VD, scale=dict.fromkeys((P, V, VD), DEG)),
+        (P, V, VD), said=(f"positions and velocities {FOUND}",),
     ),
+    Format("degrees beside radians per second", "time,q1,dq1",
+           stamped(QDQ, P, V, scale={P: DEG}), (P, V), said=(f"positions {FOUND}",)),
+    Format("desired positions alone", "time,q1,dq1,q_d1",
+           stamped(f"{QDQ},{names('q_d#')}", P, V, PD), (P, V, PD),
+           said=(f"velocity_desired: {METHOD}",)),
     Format(
-        "degrees beside radians per second",
-        "time,q1,dq1",
-        table(f"time,{QDQ}", (P, V), scale={P: DEG}),
-        (P, V),
-        said=(f"positions {FOUND}",),
-    ),
-    Format(
-        "desired positions alone",
-        "time,q1,dq1,q_d1",
-        table(f"time,{QDQ},{names('q_d#')}", (P, V, PD)),
-        (P, V, PD),
-        said=(f"velocity_desired: {METHOD}",),
-    ),
-    Format(
-        "one joint",
-        "time,position,velocity,target_velocity,temperature",
+        "one joint", "time,position,velocity,target_velocity,temperature",
         "time,position,velocity,target_velocity,temperature\n"
-        + "".join(
-            f"{time!r},{p!r},{v!r},{d!r},40\n"
-            for time, p, v, d in zip(
-                TIME.tolist(), *(MOTION[each][:, 0].tolist() for each in (P, V, VD)), strict=True
-            )
-        ),
-        (P, V, VD),
-        ("joint_0",),
-        (UNREAD.format("1 column", "temperature"),),
+        + "".join(f"{time!r},{p!r},{v!r},{d!r},40\n" for time, p, v, d in zip(
+            TIME.tolist(), *(MOTION[each][:, 0].tolist() for each in (P, V, VD)), strict=True)),
+        (P, V, VD), ("joint_0",), (UNREAD.format("1 column", "temperature"),),
     ),
-)
+)  # fmt: skip
 
 
-def shown(each: Format) -> str:
-    """Name of a test."""
-    return each.title
-
-
-@pytest.mark.parametrize("each", FORMATS, ids=shown)
+@pytest.mark.parametrize("each", FORMATS, ids=lambda each: each.title)
 def test_a_log_of_others_is_imported_untouched_and_says_what_was_assumed(tmp_path, each):
     path = tmp_path / "log.csv"
     path.write_bytes(each.text.encode())
@@ -531,11 +343,6 @@ def test_a_log_of_others_is_imported_untouched_and_says_what_was_assumed(tmp_pat
             assert error.max() < 0.05 * np.abs(values).max()
         else:
             assert found is None, signal
-
-
-def test_there_are_enough_formats_of_different_names():
-    assert len(FORMATS) >= 20
-    assert len({each.title for each in FORMATS}) == len(FORMATS)
 
 
 def test_what_is_typed_is_what_the_command_takes(tmp_path):

@@ -96,26 +96,14 @@ def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
 @pytest.mark.parametrize(
     ("arrays", "mapping", "message"),
     [
-        (
-            {"dof_vel": VELOCITY},
-            [],
-            r"there are no stamps; give the log's rate",
-        ),
-        (
-            {"speed": VELOCITY, "t": TIME},
-            [],
-            "holds no known joint positions or velocit.* speed",
-        ),
+        ({"dof_vel": VELOCITY}, [], r"there are no stamps; give the log's rate"),
+        ({"speed": VELOCITY, "t": TIME}, [], "holds no known joint positions or velocit.* speed"),
         (
             {"dof_vel": VELOCITY.T, "t": TIME},
             [],
             r"'dof_vel' has shape \(3, 400\); expected 400 samples, as stamps, along its first",
         ),
-        (
-            {"dof_vel": VELOCITY, "t": TIME},
-            ["position=dof_pos"],
-            "no column 'dof_pos' to map; it",
-        ),
+        ({"dof_vel": VELOCITY, "t": TIME}, ["position=dof_pos"], "no column 'dof_pos' to map; it"),
         ({"dof_vel": VELOCITY, "t": TIME}, ["velocity=dof_vel[2:9]"], r"'dof_vel' has 3 columns"),
         (
             {"dof_vel": VELOCITY, "t": TIME},

@@ -20,12 +20,7 @@ def wide(tmp_path, **columns):
 
 
 @pytest.mark.parametrize(
-    "stamps",
-    [
-        TIMES,
-        (TIMES - TIMES[0]) * 1e-9,
-        pa.array(TIMES, pa.timestamp("ns")),
-    ],
+    "stamps", [TIMES, (TIMES - TIMES[0]) * 1e-9, pa.array(TIMES, pa.timestamp("ns"))]
 )
 def test_columns_are_read_bit_for_bit(tmp_path, stamps):
     columns = {f"{joint}.velocity": VELOCITY[:, n] for n, joint in enumerate(JOINTS)}

@@ -28,8 +28,7 @@ def pair(tmp_path, *, offset, drift=0.0, lag=0.0, seconds=60, rate=250, desired_
 
 
 @pytest.mark.parametrize(
-    ("offset", "drift"),
-    [(0.7, 0.0), (-0.4, 2e-4), (1234.5, 0.0), (12.0, -1e-4), (0.0, 1e-4)],
+    ("offset", "drift"), [(0.7, 0.0), (-0.4, 2e-4), (1234.5, 0.0), (12.0, -1e-4), (0.0, 1e-4)]
 )
 def test_offset_and_drift_are_estimated_and_removed(tmp_path, offset, drift):
     measured, desired = pair(tmp_path, offset=offset, drift=drift)

@@ -73,8 +73,7 @@ def test_a_polygon_of_many_slender_triangles_has_no_more_fine_points_than_others
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 @pytest.mark.parametrize(
-    ("name", "root"),
-    [("r.urdf", "<robot name='r'>{}</robot>"), ("r.xml", "<mujoco>{}</mujoco>")],
+    ("name", "root"), [("r.urdf", "<robot name='r'>{}</robot>"), ("r.xml", "<mujoco>{}</mujoco>")]
 )
 def test_entities_of_a_robot_are_not_expanded_in_any_encoding(tmp_path, name, root, encoding):
     path = tmp_path / name

@@ -38,10 +38,7 @@ UNITS = ("radians", "degrees", "normalised")
 """Units of angles; normalised is -100 to 100 of each joint's range, 0 to 100 of a gripper's."""
 RATES = (1e-3, 1e9)  # rates that a log may be said to have, in [Hz]
 
-CONVENTIONS = {
-    "base_pose": ("xyzw", "wxyz"),
-    "base_velocity": ("body", "world", "mujoco"),
-}
+CONVENTIONS = {"base_pose": ("xyzw", "wxyz"), "base_velocity": ("body", "world", "mujoco")}
 """Conventions of a base: the order of its quaternion; the axes of its velocity, which for MuJoCo
 are the world's for the linear part and the body's for the angular one. The first is the run's."""
 WIDTHS: Mapping[str, int] = {"base_pose": 7, "base_velocity": 6}
