@@ -6,29 +6,6 @@ from inspector import read_log
 from inspector.errors import LogError
 
 
-@pytest.mark.parametrize(
-    ("stamps", "unit"),
-    [
-        ([f"17000000001234567{n:02d}" for n in range(0, 50, 10)], None),
-        ([str(1_700_000_000_000_000_000 + n * 10_000_000) for n in range(5)], "nanoseconds"),
-        ([f"1700000000.{n:02d}" for n in range(5)], "seconds"),
-        ([f"{n}0000000" for n in range(5)], "nanoseconds"),
-    ],
-)
-def test_absolute_and_nanosecond_stamps_start_at_0(tmp_path, stamps, unit):
-    path = write(tmp_path / "log.csv", {"stamp": stamps, "a.velocity": np.ones(5)})
-    if unit is None:
-        with pytest.raises(
-            LogError,
-            match="the unit of stamps with a median step of 10 is none that is known; with",
-        ):
-            read_log(path)
-        return
-    imported = read_log(path)
-    assert np.allclose(imported.run.time, np.arange(5) / 100, rtol=0, atol=1e-12)
-    assert (f"log.csv: stamps are in {unit}" in imported.remarks) == (unit != "seconds")
-
-
 def test_the_first_stamp_is_kept_exactly(tmp_path):
     stamps = [f"17000000001234{n:02d}567" for n in range(5)]
     imported = read_log(

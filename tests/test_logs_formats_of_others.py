@@ -400,6 +400,7 @@ def test_columns_take_the_place_of_a_header_and_leave_columns_out(tmp_path):
     [
         (lambda time: round(100 * time), "'time' counts samples; give the log's rate.* --rate HZ"),
         (ticks(1e4, 0), "median step of 100 is milliseconds or microseconds; .* --rate 10$"),
+        (ticks(1e3, EPOCH * 10**5), "median step of 10 is none that is known; .* --rate 100$"),
     ],
 )
 def test_stamps_whose_unit_is_open_are_refused_with_the_option_to_type(tmp_path, stamp, message):
@@ -445,15 +446,6 @@ def test_what_is_no_joints_motion_is_not_read(tmp_path, column):
     path = tmp_path / "log.csv"
     path.write_text(table(f"time,elbow.velocity,{column}", (V,)))
     assert read_log(path).remarks == (f"log.csv: 1 column not read: {column}",)
-
-
-def test_a_log_without_header_and_stamps_gets_a_line_that_works(tmp_path):
-    rows = "\n".join(f"{1.0 - 0.01 * n},{0.01 * n},{-0.01},{0.01}" for n in range(22))
-    (tmp_path / "log.csv").write_text(rows)
-    with pytest.raises(LogError, match="such as --columns q1,q2,dq1,dq2$"):
-        read_log(tmp_path / "log.csv")
-    run = read_log(tmp_path / "log.csv", columns=("q1", "q2", "dq1", "dq2")).run
-    assert run.joint_names == ("joint_1", "joint_2")
 
 
 def test_columns_that_no_name_tells_get_a_line_that_works(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from samplelogs import numbers
 
-from inspector import read_log, read_logs
+from inspector import read_log
 from inspector.errors import LogError
 
 POSITION, VELOCITY = numbers(7), numbers(7, seed=1)
@@ -24,29 +24,6 @@ def write(path, episodes, env_args=None):
             for name, values in arrays.items():
                 home[f"{episode}/{name}"] = values
     return path
-
-
-def robomimic(tmp_path, count=2):
-    demo = {
-        "actions": np.zeros((400, 7)),
-        "obs/robot0_joint_pos": POSITION,
-        "obs/robot0_joint_vel": VELOCITY,
-        "obs/robot0_joint_pos_cos": np.cos(POSITION),
-        "obs/agentview_image": np.zeros((400, 8, 8, 3), dtype=np.uint8),
-    }
-    episodes = {f"demo_{n}": demo for n in range(count)}
-    args = {"env_name": "Lift", "env_kwargs": {"control_freq": 20}}
-    return write(tmp_path / "lift.hdf5", episodes, args)
-
-
-def test_robomimics_demonstrations_are_runs_in_their_order(tmp_path):
-    found = list(read_logs(robomimic(tmp_path, 11)))
-    assert [each.name for each in found] == [f"lift-demo_{n}" for n in range(11)]
-    run = found[10].run
-    assert np.array_equal(run.position, POSITION)
-    assert np.array_equal(run.velocity, VELOCITY)
-    assert run.rate == 20.0
-    assert run.position_desired is None  # actions are no joint positions
 
 
 def test_isaac_labs_states_take_precedence_over_observations_and_hold_the_base(tmp_path):

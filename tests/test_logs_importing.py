@@ -6,7 +6,7 @@ from csvlogs import TIME, jittered, log, swing, write
 
 from inspector import read_log
 from inspector.errors import LogError
-from noisemodel import Robot, Run, UnknownJointError, UnknownRobotError
+from noisemodel import Robot, UnknownJointError, UnknownRobotError
 
 PANDA = Path(__file__).parents[2] / "shared" / "data" / "panda"
 
@@ -24,12 +24,6 @@ def test_a_uniform_log_is_imported_bit_for_bit(tmp_path):
     assert imported.remarks == ()
     assert run.meta["source"] == ["log.csv"]
     assert run.meta["start"] == "0"
-
-
-def test_an_imported_run_is_saved_and_loaded(tmp_path):
-    run = read_log(log(tmp_path, jittered())).run
-    run.save(tmp_path / "run.npz")
-    assert Run.load(tmp_path / "run.npz").meta == run.meta
 
 
 def test_a_joint_without_positions_leaves_all_positions_out(tmp_path):
@@ -99,14 +93,6 @@ def test_logs_that_do_not_overlap_are_refused(tmp_path):
     message = r"desired.csv: the stamps from 1700000000.0 s to .* do not overlap with .* to 3.99 s"
     with pytest.raises(LogError, match=message):
         read_log(log(tmp_path), desired=desired)
-
-
-def test_desired_angles_that_wrap_are_interpolated_the_short_way(tmp_path):
-    time = np.arange(-1, 402) / 100 + 0.005
-    wrapped = (3 * time + np.pi) % (2 * np.pi) - np.pi
-    desired = write(tmp_path / "desired.csv", {"time": time, "elbow.position": wrapped})
-    run = read_log(log(tmp_path), desired=desired).run
-    assert np.allclose(np.diff(run.position_desired[:, 0]), 0.03, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("others", [{}, {"elbow.effort": TIME}])

@@ -159,12 +159,6 @@ def test_a_desired_log_belongs_to_one_log(tmp_path, run):
     assert (status, "belongs to one log, 2 are given" in err) == (2, True)
 
 
-def test_two_files_of_one_recording_are_two_runs_unless_one_is_named_desired(tmp_path):
-    log(tmp_path, name="measured.csv")
-    log(tmp_path, name="desired.csv")
-    assert len(sources([tmp_path])[0]) == 2
-
-
 def test_a_missing_extra_is_named_with_the_line_to_type(tmp_path, monkeypatch):
     (tmp_path / "a.hdf5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     monkeypatch.setattr("inspector.logs.read.find_spec", lambda name: None)
@@ -244,12 +238,6 @@ def test_every_command_that_takes_a_run_takes_a_log(tmp_path, monkeypatch, comma
     assert status == 0, err
     if name != "import":
         assert "read as 1 joint (elbow): velocity" in (out + err).replace("Read", "read")
-
-
-def test_a_log_is_analysed_from_python(tmp_path):
-    analysis = inspector.analyse(log(tmp_path))
-    assert analysis.assumed.startswith(READ)
-    assert analysis.remarks[0].startswith("Read as 1 joint")
 
 
 def test_a_csv_named_log_is_not_taken_for_noisytests(tmp_path):

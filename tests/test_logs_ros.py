@@ -4,10 +4,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
+from inspector.logs.bags import Layout, stamp
 from noisemodel import Robot
 
 TALK, OLD = Talk(), Talk(ros1=True)
@@ -36,21 +39,18 @@ def states(talk=TALK, **how):
     ],
 )
 def test_every_value_of_a_bag_is_read_bit_for_bit(tmp_path, talk, how):
-    run = read_log(bag(tmp_path, {"/joint_states": states(talk)}, talk=talk, **how)).run
-    assert run.joint_names == JOINTS
-    assert np.array_equal(run.position, POSITION)
-    assert np.array_equal(run.velocity, VELOCITY)
-    assert np.array_equal(run.effort, EFFORT)
-    assert run.rate == 100.0
-    assert run.meta["start"] == "1700000000"
-    assert run.meta["topics"] == ["/joint_states"]
-
-
-@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-def test_a_single_file_of_a_bag_is_enough(tmp_path, storage):
-    folder = bag(tmp_path, {"/joint_states": states()}, storage=storage)
-    (file,) = [each for each in folder.iterdir() if each.name != "metadata.yaml"]
-    assert np.array_equal(read_log(file).run.position, POSITION)
+    path = bag(tmp_path, {"/joint_states": states(talk)}, talk=talk, **how)
+    alone = how.get("compression") != "message"  # a single file of a bag is enough
+    files = [*path.glob("*.mcap"), *path.glob("*.db3")] if alone else []
+    for each in (path, *files):
+        run = read_log(each).run
+        assert run.joint_names == JOINTS
+        assert np.array_equal(run.position, POSITION)
+        assert np.array_equal(run.velocity, VELOCITY)
+        assert np.array_equal(run.effort, EFFORT)
+        assert run.rate == 100.0
+        assert run.meta["start"] == "1700000000"
+        assert run.meta["topics"] == ["/joint_states"]
 
 
 def test_the_stamps_are_those_of_the_messages_not_of_the_recorder(tmp_path):
@@ -271,24 +271,24 @@ def test_the_robot_is_read_from_the_bag(tmp_path):
     assert imported.urdf == described(kinds)
 
 
-def test_a_joint_that_the_robot_lacks_is_left_out_and_named(tmp_path):
-    text = TALK.make(
-        "std_msgs/String", data=described({"shoulder": "revolute", "elbow": "revolute"})
+@pytest.mark.parametrize(
+    ("text", "joints", "remark"),
+    [
+        (
+            described({"shoulder": "revolute", "elbow": "revolute"}), JOINTS[:2],
+            "bag: left out, not joints of 'robot_description': wrist",
+        ),
+        ("<robot name='x'><joint/></robot>", JOINTS, "joints are not checked"),
+    ],
+)  # fmt: skip
+def test_a_robot_that_does_not_fit_or_cannot_be_read_is_a_remark(tmp_path, text, joints, remark):
+    description = [(EPOCH, TALK.make("std_msgs/String", data=text))]
+    imported = read_log(
+        bag(tmp_path, {"/joint_states": states(), "/robot_description": description})
     )
-    topics = {"/joint_states": states(), "/robot_description": [(EPOCH, text)]}
-    imported = read_log(bag(tmp_path, topics))
-    assert imported.run.joint_names == ("shoulder", "elbow")
-    assert np.array_equal(imported.run.position, POSITION[:, :2])
-    assert "bag: left out, not joints of 'robot_description': wrist" in imported.remarks
-
-
-def test_an_invalid_robot_description_is_a_remark(tmp_path):
-    text = TALK.make("std_msgs/String", data="<robot name='x'><joint/></robot>")
-    topics = {"/joint_states": states(), "/robot_description": [(EPOCH, text)]}
-    imported = read_log(bag(tmp_path, topics))
-    assert imported.run.joint_names == JOINTS
-    assert imported.remarks[-1].endswith("joints are not checked")
-    assert imported.urdf == ""
+    assert imported.run.joint_names == joints
+    assert np.array_equal(imported.run.position, POSITION[:, : len(joints)])
+    assert any(each.endswith(remark) for each in imported.remarks)
 
 
 def test_topics_that_are_not_read_are_listed(tmp_path):
@@ -299,27 +299,21 @@ def test_topics_that_are_not_read_are_listed(tmp_path):
     assert expected in imported.remarks
 
 
+STOP = {"/stop": [(EPOCH, TALK.make("std_msgs/Bool", data=True))]}
+
+
 @pytest.mark.parametrize(
-    ("topics", "message"),
+    ("states", "message"),
     [
-        (
-            {"/joint_states": "sensor_msgs/msg/JointState"},
-            "no topic holds joints; the bag has /join",
-        ),
-        (
-            {"/stop": [(EPOCH, TALK.make("std_msgs/Bool", data=True))]},
-            r"no topic holds joints; the bag has /stop \(std_msgs/msg/Bool\)",
-        ),
-        (
-            {"/joint_states": joint_states(TALK, TIMES[:1], position=POSITION)},
-            "bag: 1 sample; a run needs at least 2",
-        ),
-        ({"/joint_states": joint_states(TALK, names=[])}, "no message holds joints"),
-        ({"/joint_states": joint_states(TALK, effort=EFFORT)}, "no message holds joints"),
+        ("sensor_msgs/msg/JointState", "no topic holds joints; the bag has /join"),
+        (None, r"no topic holds joints; the bag has /stop \(std_msgs/msg/Bool\)"),
+        (joint_states(TALK, TIMES[:1], position=POSITION), "bag: 1 sample; a run needs at least 2"),
+        (joint_states(TALK, names=[]), "no message holds joints"),
+        (joint_states(TALK, effort=EFFORT), "no message holds joints"),
     ],
 )
-def test_a_bag_without_motion_is_an_error_of_one_line(tmp_path, topics, message):
-    path = bag(tmp_path, topics)
+def test_a_bag_without_motion_is_an_error_of_one_line(tmp_path, states, message):
+    path = bag(tmp_path, {"/joint_states": states} if states else STOP)
     with pytest.raises(LogError, match=message) as caught:
         read_log(path)
     assert str(caught.value).startswith(str(path))
@@ -377,3 +371,46 @@ def test_some_of_a_robots_joints_are_enough_including_mimic_joints(tmp_path):
     assert run.joint_names == tuple(names)
     q, _ = Robot.load("panda", mimic=True).configuration(run)
     assert np.array_equal(q[:, [6, 7, 1]], position[:, [1, 2, 3]])
+
+
+FLOATS = st.lists(st.floats(width=64), max_size=5)
+
+
+@given(
+    st.lists(st.text(st.characters(codec="utf-8", exclude_characters="\0")), max_size=4),
+    FLOATS,
+    FLOATS,
+    FLOATS,
+    st.text(st.characters(codec="ascii", exclude_characters="\0"), max_size=9),
+)
+@settings(max_examples=100, deadline=None)
+def test_a_layout_gives_the_numbers_of_rosbags(names, position, velocity, effort, frame):
+    message = TALK.joint_state(1_700_000_000_123_456_789, names, position, velocity, effort)
+    message.header.frame_id = frame
+    data = bytes(TALK.raw(message))
+    layout = Layout.of(data)
+    assert layout.fits(data)
+    assert list(layout.names) == names
+    assert stamp(data) == 1_700_000_000_123_456_789
+    parsed = TALK.store.deserialize_cdr(data, "sensor_msgs/msg/JointState")
+    for (start, stop), name in zip(layout.arrays, ("position", "velocity", "effort"), strict=True):
+        assert data[start:stop] == getattr(parsed, name).tobytes()
+
+
+def test_another_layout_does_not_fit():
+    one, other, longer = (
+        bytes(TALK.raw(TALK.joint_state(0, names, values, values)))
+        for names, values in ((["ab"], [1.0]), (["ac"], [2.0]), (["ab", "c"], [1.0, 2.0]))
+    )
+    layout = Layout.of(one)
+    assert layout.fits(bytes(TALK.raw(TALK.joint_state(5, ["ab"], [3.0], [4.0]))))
+    assert not layout.fits(other)
+    assert not layout.fits(longer)
+
+
+def test_what_is_no_joint_state_has_no_layout():
+    data = bytes(TALK.raw(TALK.joint_state(0, ["a"], np.ones(1), np.ones(1))))
+    assert Layout.of(b"\x00\x00" + data[2:]) is None  # big-endian
+    for length in range(len(data)):
+        assert Layout.of(data[:length]) is None
+    assert Layout.of(data[:12] + b"\xff" * 40) is None

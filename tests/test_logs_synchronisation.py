@@ -112,17 +112,6 @@ def test_topics_of_two_computers_are_synchronised(tmp_path):
     assert np.abs(run.velocity - run.velocity_desired).max() < 0.01
 
 
-def test_gaps_of_either_log_are_gaps_after_synchronisation(tmp_path):
-    measured, desired = pair(tmp_path, offset=1234.5)
-    lines = desired.read_text().splitlines()
-    desired.write_text("\n".join(lines[:2000] + lines[2200:]) + "\n")
-    run = read_log(measured, desired=desired).run
-    gap = run.time[~run.mask]
-    assert gap[0] == pytest.approx(20, abs=0.1)
-    assert np.ptp(gap) == pytest.approx(2.0, abs=0.05)
-    assert not run.velocity_desired[~run.mask].any()
-
-
 def test_duplicate_and_backward_stamps_are_left_out_and_counted(tmp_path):
     time = np.arange(1000) / 100
     time[[100, 101]] = time[99]  # twice the same

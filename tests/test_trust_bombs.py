@@ -71,42 +71,32 @@ def test_a_polygon_of_many_slender_triangles_has_no_more_fine_points_than_others
     assert LinkSurface.of(corners, None).area == pytest.approx(np.pi, rel=1e-6)
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+LAUGHING = f'<!DOCTYPE a [<!ENTITY l0 "ha">{LAUGHS}]>'
+ATTRIBUTES = "".join(f'a{n}="" ' for n in range(100_000))
+
+
+@pytest.mark.parametrize(("name", "root"), [("r.urdf", "robot"), ("r.xml", "mujoco")])
 @pytest.mark.parametrize(
-    ("name", "root"), [("r.urdf", "<robot name='r'>{}</robot>"), ("r.xml", "<mujoco>{}</mujoco>")]
+    ("text", "encoding", "problem"),
+    [
+        ("{laughs}<{root}>&l9;</{root}>", "utf-8", "no document type or entities are read"),
+        ("{laughs}<{root}>&l9;</{root}>", "utf-16", "no document type or entities are read"),
+        ("<{root}>{links}</{root}>", "utf-8", "nested more than 500 deep"),
+        ("<{root}><a {attributes}/></{root}>", "utf-8", "an element has more than 200 attributes"),
+        ("{comments}", "utf-8", "not XML"),
+    ],
 )
-def test_entities_of_a_robot_are_not_expanded_in_any_encoding(tmp_path, name, root, encoding):
-    path = tmp_path / name
-    laughs = f'<!DOCTYPE a [<!ENTITY l0 "ha">{LAUGHS}]>{root.format("&l9;")}'
-    path.write_text(f'<?xml version="1.0" encoding="{encoding}"?>{laughs}', encoding=encoding)
-    with pytest.raises(RobotError, match="no document type or entities are read"):
-        Robot.load(path)
-
-
-@pytest.mark.parametrize(
-    ("name", "root"), [("r.urdf", "<robot name='r'>{}</robot>"), ("r.xml", "<mujoco>{}</mujoco>")]
-)
-def test_elements_that_are_nested_without_end_are_refused(tmp_path, name, root):
-    path = tmp_path / name
-    path.write_text(root.format("<link name='a'>" * 100_000 + "</link>" * 100_000))
-    with pytest.raises(RobotError, match="nested more than 500 deep"):
-        Robot.load(path)
-
-
-@pytest.mark.parametrize("name", ["r.urdf", "r.xml"])
-def test_an_element_of_attributes_without_end_is_refused(tmp_path, name):
-    attributes = "".join(f'a{n}="" ' for n in range(100_000))
-    root = "robot" if name == "r.urdf" else "mujoco"
-    (tmp_path / name).write_text(f"<{root}><a {attributes}/></{root}>")
-    with pytest.raises(RobotError, match="an element has more than 200 attributes"):
+def test_text_of_a_robot_that_asks_for_much_is_refused(
+    tmp_path, name, root, text, encoding, problem
+):
+    whole = text.format(
+        root=root, laughs=f'<?xml version="1.0" encoding="{encoding}"?>{LAUGHING}',
+        links="<link name='a'>" * 100_000 + "</link>" * 100_000,
+        attributes=ATTRIBUTES, comments="<!--" * 1_000_000,
+    )  # fmt: skip
+    (tmp_path / name).write_text(whole, encoding=encoding)
+    with pytest.raises(RobotError, match=problem):
         Robot.load(tmp_path / name)
-
-
-def test_a_file_of_unclosed_comments_is_looked_at_once(tmp_path):
-    path = tmp_path / "r.xml"
-    path.write_text("<!--" * 1_000_000)
-    with pytest.raises(RobotError, match="not XML"):
-        Robot.load(path)
 
 
 def attached(folder, count):

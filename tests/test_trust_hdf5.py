@@ -25,25 +25,22 @@ def log(path, **further):
     return path
 
 
-def test_bytes_of_other_files_are_not_imported(tmp_path):
-    secret = tmp_path / "secret"
-    secret.write_bytes(bytes(range(256)) * 100)
-    path = log(tmp_path / "a.h5")
-    with h5py.File(path, "a") as file:
-        file.create_dataset(
-            "joint_vel", (400, 2), "<f8", external=[(str(secret), 0, h5py.h5f.UNLIMITED)]
-        )
-    with pytest.raises(LogError, match="'/joint_vel' is stored in other files"):
-        read_log(path)
+def external(file, other):
+    everything = [(str(other), 0, h5py.h5f.UNLIMITED)]
+    file.create_dataset("joint_vel", (400, 2), "<f8", external=everything)
 
 
-def test_numbers_of_other_files_are_not_imported_by_virtual_datasets(tmp_path):
-    other = log(tmp_path / "other.h5")
-    path = log(tmp_path / "a.h5")
+def virtual(file, other):
     layout = h5py.VirtualLayout((400, 2), "<f8")
     layout[:] = h5py.VirtualSource(other, "joint_pos", (400, 2))
+    file.create_virtual_dataset("joint_vel", layout)
+
+
+@pytest.mark.parametrize("stored", [external, virtual])
+def test_numbers_of_other_files_are_not_imported(tmp_path, stored):
+    other, path = log(tmp_path / "other.h5"), log(tmp_path / "a.h5")
     with h5py.File(path, "a") as file:
-        file.create_virtual_dataset("joint_vel", layout)
+        stored(file, other)
     with pytest.raises(LogError, match="'/joint_vel' is stored in other files"):
         read_log(path)
 
@@ -60,23 +57,19 @@ def test_links_into_other_files_are_not_followed(tmp_path, home):
         read_log(path)
 
 
-def test_a_shape_that_is_not_in_the_file_is_refused(tmp_path):
+def test_a_shape_that_is_not_in_the_file_is_refused_if_it_is_asked_for(tmp_path):
+    huge = {"shape": (10**9, 2), "dtype": "<f8", "chunks": (10**4, 2), "compression": "gzip"}
     path = log(tmp_path / "a.h5")
     with h5py.File(path, "a") as file:
-        file.create_dataset("joint_vel", (10**9, 2), "<f8", chunks=(10**4, 2), compression="gzip")
-    with pytest.raises(
-        LogError, match="unpacks to 16 GB from .* MB, the limit is .*--max-unpacked"
-    ):
-        read_log(path)
-
-
-def test_a_huge_dataset_that_nobody_asked_for_is_not_read(tmp_path):
-    path = log(tmp_path / "a.h5")
-    with h5py.File(path, "a") as file:
-        file.create_dataset("pixels", (10**9, 2), "<f8", chunks=(10**4, 2), compression="gzip")
+        file.create_dataset("pixels", **huge)
     imported = read_log(path)
     np.testing.assert_allclose(imported.run.position, MOTION)
     assert any("pixels" in remark for remark in imported.remarks)
+    with h5py.File(path, "a") as file:
+        file.create_dataset("joint_vel", **huge)
+    expected = "unpacks to 16 GB from .* MB, the limit is .*--max-unpacked"
+    with pytest.raises(LogError, match=expected):
+        read_log(path)
 
 
 @pytest.mark.parametrize(
@@ -125,37 +118,36 @@ def test_attributes_of_any_number_and_size_cost_nothing(tmp_path):
 ARGUMENTS = json.dumps({"env_kwargs": {"control_freq": 50}})
 
 
+def environment(path, text=ARGUMENTS):
+    with h5py.File(path, "w") as file:
+        file["data/demo_0/joint_pos"] = MOTION
+        file["data"].attrs["env_args"] = text
+    return path
+
+
 @pytest.mark.parametrize("written", [ARGUMENTS, np.bytes_(ARGUMENTS)], ids=["free", "fixed"])
 def test_the_arguments_of_an_environment_are_read_whatever_their_length(tmp_path, written):
-    path = tmp_path / "a.h5"
-    with h5py.File(path, "w") as file:
-        file["data/demo_0/joint_pos"] = MOTION
-        file["data"].attrs["env_args"] = written
-    assert read_log(path).run.rate == 50.0
+    assert read_log(environment(tmp_path / "a.h5", written)).run.rate == 50.0
 
 
-def test_a_heap_that_libhdf5_searches_for_ever_is_given_up(tmp_path, monkeypatch):
-    path = tmp_path / "a.h5"
-    with h5py.File(path, "w") as file:
-        file["data/demo_0/joint_pos"] = MOTION
-        file["data"].attrs["env_args"] = ARGUMENTS
-    data = bytearray(path.read_bytes())
-    first = data.index(b"GCOL") + 16
-    free = first + 16 + -(-len(ARGUMENTS) // 8) * 8
-    data[free + 8 : free + 16] = bytes(8)  # the size of what is free: none
-    path.write_bytes(data)
+def endless(data):
+    """A heap that libhdf5 searches for ever, as it has a free place of no size."""
+    free = data.index(b"GCOL") + 32 + -(-len(ARGUMENTS) // 8) * 8
+    return data[: free + 8] + bytes(8) + data[free + 16 :]
+
+
+@pytest.mark.parametrize(
+    ("damage", "problem"),
+    [
+        (endless, "env_args is not found in 1 s"),
+        (lambda data: data.replace(b"GCOL", b"GONE"), "env_args cannot be read"),
+    ],
+)
+def test_arguments_in_a_damaged_heap_are_given_up(tmp_path, monkeypatch, damage, problem):
+    path = environment(tmp_path / "a.h5")
+    path.write_bytes(damage(path.read_bytes()))
     monkeypatch.setattr("inspector.logs.hdf5.TIMEOUT", 1.0)
-    with pytest.raises(LogError, match="damaged: env_args is not found in 1 s$"):
-        read_log(path)
-
-
-def test_an_environment_whose_text_is_gone_is_damaged(tmp_path):
-    path = tmp_path / "a.h5"
-    with h5py.File(path, "w") as file:
-        file["data/demo_0/joint_pos"] = MOTION
-        file["data"].attrs["env_args"] = ARGUMENTS
-    path.write_bytes(path.read_bytes().replace(b"GCOL", b"GONE"))
-    with pytest.raises(LogError, match="damaged: env_args cannot be read$"):
+    with pytest.raises(LogError, match=f"damaged: {problem}$"):
         read_log(path)
 
 
