@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from noisemodel import runfile
 from noisemodel.files import beyond, limit
-from noisemodel.runfile import OnDemand, either_way, pieces, rows_at_once
+from noisemodel.runfile import OnDemand, either_way, one_line, pieces, rows_at_once
 from noisemodel.types import Array, Mask, Real, RunError, RunFileError
 
 SAMPLED = (
@@ -26,21 +26,20 @@ SAMPLED = (
 )
 """The fields of a run that hold a row or a value for each sample; ``stages`` hold such fields."""
 
+# The fields of a run that a classifier takes signals of.
 MOTION = ("velocity", "velocity_desired", "effort", "base_velocity")
-"""The fields of a run that a classifier takes signals of."""
 
 ROBOT_FILES = (".urdf", ".xml", ".mjcf")  # how the names of files that describe robots end
+# How far a time step may lie from the median step, as a share of it (run file, version 1).
 UNIFORM = 1e-3
-"""How far a time step may lie from the median step, as a share of it (run file, version 1)."""
-
 SHORTEST, LONGEST = 1e-9, 1e9  # steps of time that a run may have, in [s]
 LATEST = 9e9  # largest time, in [s]: 285 years, what nanoseconds in 64 bits can count
 LARGEST = 1e15  # signals are smaller: squares of much larger ones overflow, and no robot has such
 
 WINDOW, ORDER = 7, 3
 METHOD = f"Savitzky-Golay, window {WINDOW}, order {ORDER}"
+# The joint velocities and the positions that each can be differentiated from.
 SOURCES = {"velocity": "position", "velocity_desired": "position_desired"}
-"""The joint velocities and the positions that each can be differentiated from."""
 
 EDGE = 10  # samples at the lower rate that the filter of `decimated` reaches to either side
 
@@ -51,62 +50,43 @@ class NotUniformError(RunError):
 
 @dataclass(frozen=True, order=True)
 class Block:
-    """A stretch of time with a label, which is opaque to the noise model.
+    """A stretch of time with a label, which is opaque to the noise model."""
 
-    Attributes:
-        start: Time of its first sample, in [s].
-        stop: Time of its end, in [s].
-        label: The class that an annotator or a simulator gave it.
-    """
-
-    start: float
-    stop: float
-    label: str
+    start: float  # time of its first sample, in [s]
+    stop: float  # time of its end, in [s]
+    label: str  # the class that an annotator or a simulator gave it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run:
     """One recording of one robot, in SI units; optional signals are None or empty.
 
-    Attributes:
-        time: Uniform to 1e-3 of its step, shape (samples,), in [s].
-        velocity: Joint velocities, shape (samples, joints), in [rad/s] or [m/s].
-        joint_names: Names of the joints, in any order.
-        position: Joint positions, shape (samples, joints), in [rad] or [m].
-        velocity_desired: Desired joint velocities, shape (samples, desired).
-        position_desired: Desired joint positions, shape (samples, desired).
-        desired_joint_names: Names of the desired joints; ``joint_names`` unless given.
-        stages: Velocities at named stages of the control flow, each (samples, joints).
-        effort: Joint torques or forces, shape (samples, joints), in [N m] or [N]; of some logs
-            motor currents, in [A].
-        valid: False in gaps, where all values are 0, shape (samples,); all true unless given.
-        base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (samples, 7).
-        base_velocity: Linear, then angular velocity of the base in its own axes,
-            shape (samples, 6), in [m/s] and [rad/s].
-        robot: Name of a listed robot or of one of MuJoCo Menagerie, or path of a URDF or an MJCF.
-        blocks: Annotated stretches, sorted, not overlapping.
-        meta: What else is known: scenario, seed, software version, source…
-
     Raises:
         RunError: If shapes do not fit, a value is not finite, time is not uniform,
             names repeat, or blocks overlap.
     """
 
-    time: Array
-    velocity: Real
-    joint_names: tuple[str, ...]
-    position: Real | None = None
-    velocity_desired: Real | None = None
-    position_desired: Real | None = None
-    desired_joint_names: tuple[str, ...] = ()
+    time: Array  # uniform to 1e-3 of its step, shape (samples,), in [s]
+    velocity: Real  # of the joints, shape (samples, joints), in [rad/s] or [m/s]
+    joint_names: tuple[str, ...]  # in any order
+    position: Real | None = None  # of the joints, shape (samples, joints), in [rad] or [m]
+    velocity_desired: Real | None = None  # shape (samples, desired)
+    position_desired: Real | None = None  # shape (samples, desired)
+    desired_joint_names: tuple[str, ...] = ()  # `joint_names` unless given
+    # Velocities at named stages of the control flow, each (samples, joints).
     stages: Mapping[str, Real] = field(default_factory=dict)
+    # Torques or forces, shape (samples, joints), in [N m] or [N]; of some logs currents, in [A].
     effort: Real | None = None
+    # False in gaps, where all values are 0, shape (samples,); all true unless given.
     valid: Mask | None = None
+    # x, y, z and quaternion x, y, z, w of a floating base, shape (samples, 7).
     base_pose: Real | None = None
+    # Linear, then angular velocity of the base in its own axes, shape (samples, 6).
     base_velocity: Real | None = None
+    # Name of a listed robot or of one of MuJoCo Menagerie, or path of a URDF or an MJCF.
     robot: str | None = None
-    blocks: tuple[Block, ...] = ()
-    meta: Mapping[str, Any] = field(default_factory=dict)
+    blocks: tuple[Block, ...] = ()  # annotated stretches, sorted, not overlapping
+    meta: Mapping[str, Any] = field(default_factory=dict)  # scenario, seed, software version…
 
     def __post_init__(self) -> None:
         """Fill in defaults and check everything once."""
@@ -186,18 +166,10 @@ class Run:
         )
 
     def cut(self, start: float, stop: float) -> "Run":
-        """The part of the run with ``start <= time < stop``, and all that belongs to it.
+        """The part of the run with ``start <= time < stop``, in [s], and all that belongs to it.
 
-        Args:
-            start: Time of the first sample or before it, in [s]; -inf for the beginning.
-            stop: Time after the last sample, in [s]; inf for the end.
-
-        Returns:
-            A run with the same times and names and the same meta. Blocks that reach out of the part
-            are clipped: to its first sample and to ``stop``.
-
-        Raises:
-            RunError: If the part has fewer than two samples, or gaps alone.
+        Times, names and meta stay. Blocks that reach out of the part are clipped: to its first
+        sample and to ``stop``. A part of fewer than two samples, or of gaps alone, is a RunError.
         """
         first, last = np.searchsorted(self.time, (start, stop)).tolist()
         if last - first < 2:
@@ -213,15 +185,7 @@ class Run:
         return part(self, first, last, blocks=tuple(b for b in clipped if b.start < b.stop))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the run as a run file, whole or not at all.
-
-        Args:
-            path: The file to write, by convention ``*.npz``.
-            overwrite: Whether a file that exists may be replaced.
-
-        Raises:
-            OutputError: If the file exists or cannot be written.
-        """
+        """Write the run as a run file, whole or not at all; an OutputError if that fails."""
         path = Path(path)
         arrays: dict[str, Any] = {
             "format": runfile.FORMAT,
@@ -246,13 +210,13 @@ class Run:
     def load(cls, path: str | Path, *, on_demand: bool = False) -> Self:
         """Read a run file; velocities that are missing are differentiated from positions.
 
+        What was differentiated is listed under ``differentiated`` in the ``meta`` of the run.
+
         Args:
             path: A ``run.npz``, version 1. A robot that it names by a relative path is
                 looked for beside the file.
             on_demand: Whether signals of 64 MB or more stay in the file. Their rows are read where
                 they are sliced; whatever else is done with them reads them whole.
-
-        What was differentiated is listed under ``differentiated`` in the ``meta`` of the run.
 
         Raises:
             RunFileError: If the file is no run file, or holds a run that is wrong.
@@ -325,13 +289,9 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
     """What makes a `Run` of the arrays of a run file in a folder."""
     sampled = (name for name in arrays if "samples" in runfile.ARRAYS.get(name, ("", ()))[1])
     signals = {name: arrays[name] for name in sampled}
-    if "time" not in signals:
-        raise RunError(f"array 'time' is missing; the file has {', '.join(arrays) or 'nothing'}")
-    if "velocity" not in signals and "position" not in signals:
-        raise RunError(
-            "array 'velocity' is missing, and 'position' to differentiate too;"
-            f" the file has {', '.join(arrays)}"
-        )
+    if "time" not in signals or not {"velocity", "position"} & set(signals):
+        has = ", ".join(arrays) or "nothing"
+        raise RunError(f"it has {has}, expected 'time', and 'velocity' or 'position'")
     check_time(signals["time"])
     if "valid" in signals:
         check_valid(signals["valid"], len(signals["time"]))
@@ -367,17 +327,11 @@ def _meta(text: str) -> dict[str, Any]:
     """The JSON object that a run file has as meta."""
     try:
         meta = json.loads(text)
+        json.dumps(meta, ensure_ascii=False).encode()  # half of a surrogate pair cannot be written
     except (ValueError, RecursionError) as error:
-        reason = "nested too deeply" if isinstance(error, RecursionError) else error
-        raise RunError(f"meta: not JSON ({reason})") from error
-    if not isinstance(meta, dict):
-        raise RunError("meta: expected a JSON object")
-    try:
-        json.dumps(meta, ensure_ascii=False).encode()
-    except ValueError as error:  # half of a surrogate pair
-        raise RunError("meta: holds text that cannot be written as UTF-8") from error
-    if not isinstance(meta.get("differentiated", {}), dict):
-        raise RunError("meta: expected a JSON object as differentiated")
+        raise RunError(f"meta: no JSON that can be kept ({one_line(error)})") from error
+    if not isinstance(meta, dict) or not isinstance(meta.get("differentiated", {}), dict):
+        raise RunError("meta: expected a JSON object, and one as differentiated")
     return meta
 
 
@@ -635,27 +589,20 @@ def resample(
 
 
 def decimated(run: Run, rate: float) -> Run:
-    """The run at a lower rate: its velocities, low-pass filtered and decimated.
+    """The run at a lower rate, in [Hz]: its velocities, low-pass filtered and decimated.
 
-    The noise of a run at a lower rate is computed after this: it is not the decimated noise.
-
-    Args:
-        run: The run.
-        rate: The lower sample rate, in [Hz].
-
-    Returns:
-        A run with its velocities alone (measured, desired, base, stages), its names, blocks and
-        meta. Samples that the filter took partly from a gap are marked as not valid.
+    The noise of a run at a lower rate is computed after this: it is not the decimated noise. The
+    result has the velocities alone (measured, desired, base, stages), names, blocks and meta.
+    Samples that the filter took partly from a gap are marked as not valid.
 
     Raises:
         RunError: If ``rate`` is above the run's, or leaves fewer than two samples.
     """
     ratio = Fraction(rate / run.rate).limit_denominator(1000)  # jitter of 0.1 % is none
-    if not 0 < ratio <= 1:
-        raise RunError(f"a run of {run.rate:g} Hz cannot be decimated to {rate:g} Hz")
     samples = int(len(run.time) * ratio)
-    if samples < 2:
-        raise RunError(f"{run.duration:.3g} s of motion are too short for {rate:g} Hz")
+    if ratio > 1 or samples < 2:
+        about = f"a run of {run.duration:.3g} s at {run.rate:g} Hz"
+        raise RunError(f"{about} cannot be decimated to {rate:g} Hz")
     if ratio == 1:
         return run
 

@@ -53,14 +53,11 @@ STAGE_ARRAY = ("f", ("samples", "joints"))
 KIND_WORDS = {"f": "numbers", "b": "booleans", "U": "text"}
 
 COMPRESSIBLE = 0.8  # arrays are compressed if that leaves less than this share of their size
-STRETCH, STRETCHES = 4096, 16
-"""Bytes of a stretch on which compression is tried, and how many there are."""
+STRETCH, STRETCHES = 4096, 16  # bytes of a stretch on which compression is tried, and their number
 
-LARGE = 2**26  # bytes from which an array can stay in the file
+LARGE = 2**26  # bytes from which an array is not compressed, and can stay in the file
 AT_ONCE = 2**23  # bytes of an array that are read at once
-MAX_UNPACKED = "NOISE_MAX_UNPACKED"
-"""Environment variable with another limit than ``UNPACKED``, in bytes."""
-
+MAX_UNPACKED = "NOISE_MAX_UNPACKED"  # environment variable with another limit than ``UNPACKED``
 UNPACKED = 512 * 2**20  # bytes that any compressed file may unpack to
 RATIO = 20  # a large file may unpack to so many times its size; the numbers of logs hardly shrink
 
@@ -73,7 +70,6 @@ not read, or state a wrong size."""
 
 TEXT = 64 * 2**20  # most bytes of a text that is read at once
 PIECE = 2**20  # bytes that are unpacked at once
-MARKS = 256  # places of a packed array from which it can be unpacked again, each of about 45 KB
 # NumPy's; zipfile has others, which unpack a few bytes to gigabytes at once.
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
@@ -105,7 +101,7 @@ def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
                     " anything else belongs into meta",
                 )
         arrays = read_npz(path, on_demand=LARGE if on_demand else inf)
-        found = {name: _plain(path, name, _reading(path, each)) for name, each in arrays.items()}
+        found = {name: _plain(path, name, each) for name, each in arrays.items()}
     except ObjectArrayError as error:
         kind = KIND_WORDS[ARRAYS.get(error.name, STAGE_ARRAY)[0]]
         raise RunFileError(
@@ -128,20 +124,6 @@ def _unread(path: Path, error: OSError | ArchiveError) -> RunFileError:
     return RunFileError(path, f"not a run file: {error}{csv}")
 
 
-def _reading(path: Path, array: Any) -> Any:
-    """An array that raises RunFileError where it is read from the file."""
-    if not isinstance(array, OnDemand):
-        return array
-
-    def rows(first: int, stop: int) -> NDArray[Any]:
-        try:
-            return array.read(first, stop)
-        except (OSError, ArchiveError) as error:
-            raise _unread(path, error) from error
-
-    return OnDemand(array.shape, array.dtype, rows)
-
-
 def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
     wanted, axes = ARRAYS.get(name, STAGE_ARRAY)
     if array.ndim != len(axes):
@@ -161,13 +143,13 @@ def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
     """Write the arrays of a run file whole or not at all: as ``np.savez_compressed``, but faster.
 
     Compression hardly makes the noise of a log smaller, and to undo it takes most of the time of
-    loading: what it would not make smaller by a fifth is left as it is, and the quickest will do.
+    loading: what it would not make smaller by a fifth is left as it is, as are large arrays.
     """
     with replacing(path, overwrite=overwrite) as temporary:
         try:
             with zipfile.ZipFile(temporary, "w", compresslevel=1) as packed:
                 for name, array in arrays.items():
-                    shrinks = _shrinks(array)
+                    shrinks = getattr(array, "nbytes", 0) < LARGE and _shrinks(array)
                     packed.compression = zipfile.ZIP_DEFLATED if shrinks else zipfile.ZIP_STORED
                     with packed.open(f"{name}.npy", "w", force_zip64=True) as member:  # dated 1980
                         npy.write_array(member, np.asanyarray(array), allow_pickle=False)
@@ -218,18 +200,13 @@ class OnDemand(NDArrayOperatorsMixin):
         return found[:, *others] if others else found
 
     def _rows(self, rows: NDArray[Any]) -> NDArray[Any]:
-        """Rows by their indices, the file being read once if these rise."""
+        """Rows by their indices; the file is read piece by piece."""
         found = np.empty((len(rows), *self.shape[1:]), self.dtype)
         rows = np.where(rows < 0, rows + len(self), rows)
-        first = 0
-        while first < len(rows):
-            ahead = rows[first:] - rows[first]
-            outside = (ahead < 0) | (ahead >= rows_at_once(self))
-            chosen = ahead[: int(outside.argmax()) if outside.any() else None]
-            low = int(rows[first])
-            piece = self.read(low, low + int(chosen.max()) + 1)[chosen]
-            found[first : first + len(piece)] = piece
-            first += len(piece)
+        for piece in pieces(self):
+            inside = (rows >= piece.start) & (rows < piece.stop)
+            if inside.any():
+                found[inside] = self.read(piece.start, piece.stop)[rows[inside] - piece.start]
         return found
 
     def astype(self, dtype: Any, **_: Any) -> "OnDemand":
@@ -284,8 +261,8 @@ def read_npz(
 ) -> dict[str, NDArray[Any]]:
     """Read the arrays of an .npz file with these names, all unless given.
 
-    Arrays of more than ``on_demand`` bytes stay in the file, unless they have one axis or are
-    stored column by column. They raise ArchiveError or OSError where they are read.
+    Arrays of more than ``on_demand`` bytes stay in the file, unless they have one axis, are stored
+    column by column or are compressed. They raise RunFileError where they are read.
     """
     found: dict[str, Any] = {}
     with _opened(path) as archive:
@@ -293,9 +270,8 @@ def read_npz(
             name = member.filename.removesuffix(".npy")
             if names is None or name in names:
                 with archive.open(member) as stream:
-                    kept = (
-                        _kept(path, stream, name, member) if member.file_size > on_demand else None
-                    )
+                    large = member.file_size > on_demand
+                    kept = _kept(path, stream, name, member) if large else None
                     whole = kept is None
                     found[name] = read_array(stream, name, member.file_size) if whole else kept
     return found
@@ -346,7 +322,7 @@ def _kept(path: Path, stream: IO[bytes], name: str, info: zipfile.ZipInfo) -> On
     """An array that stays in the file; None, and nothing is read, where that does not pay."""
     shape, fortran, dtype = _header(stream, name, info.file_size)
     begin = stream.tell()
-    if len(shape) < 2 or fortran:
+    if len(shape) < 2 or fortran or info.compress_type != zipfile.ZIP_STORED:
         stream.seek(0)
         return None
     member = _Member(path, name, info)
@@ -354,17 +330,19 @@ def _kept(path: Path, stream: IO[bytes], name: str, info: zipfile.ZipInfo) -> On
     row = dtype.itemsize * prod(shape[1:])
 
     def rows(first: int, stop: int) -> NDArray[Any]:
-        content = member.read(begin + first * row, begin + stop * row)
+        try:
+            content = member.read(begin + first * row, begin + stop * row)
+        except (OSError, ArchiveError) as error:
+            raise _unread(path, error) from error
         return content.view(dtype).reshape(stop - first, *shape[1:])
 
     return OnDemand(shape, dtype, rows)
 
 
 class _Member:
-    """The bytes of a member of an archive, from any place; the file is opened for each piece.
+    """The bytes of a member of an archive that is not compressed, from any place.
 
-    What is packed is unpacked from the last mark before the piece: a state of the decompressor,
-    kept every so many bytes. The checksum is compared once the member was read in order.
+    The file is opened for each piece. The checksum is compared once the member was read in order.
     """
 
     def __init__(self, path: Path, name: str, info: zipfile.ZipInfo) -> None:
@@ -374,10 +352,6 @@ class _Member:
             file.seek(info.header_offset)
             lengths = struct.unpack("<26xHH", file.read(30))
         self._begin = info.header_offset + 30 + sum(lengths)
-        self._apart = max(PIECE, info.file_size // MARKS)
-        # Places of the unpacked and the packed member, and the decompressor's state there.
-        self._marks = [(0, 0, zlib.decompressobj(-zlib.MAX_WBITS))]
-        self._last = self._marks[0]
         self._lock = Lock()
         self._sum, self._summed = 0, 0
 
@@ -387,15 +361,8 @@ class _Member:
         with self._lock, self._path.open("rb") as file:
             if _identity(file) != self._known:
                 raise ArchiveError("was changed while it was read")
-            if self._info.compress_type == zipfile.ZIP_STORED:
-                file.seek(self._begin + start)
-                count = file.readinto(content.data)
-            else:
-                try:
-                    count = self._unpack(file, start, content)
-                except DAMAGE as error:
-                    raise ArchiveError(f"damaged: {one_line(error)}") from error
-            if count < len(content):
+            file.seek(self._begin + start)
+            if file.readinto(content.data) < len(content):
                 raise ArchiveError(f"damaged: {self._name} is cut off")
             if start == self._summed:
                 self._sum = zlib.crc32(content.data, self._sum)
@@ -403,31 +370,6 @@ class _Member:
                 if stop == self._info.file_size and self._sum != self._info.CRC:
                     raise ArchiveError(f"damaged: wrong checksum of {self._name}")
         return content
-
-    def _unpack(self, file: IO[bytes], start: int, content: NDArray[np.uint8]) -> int:
-        """Unpack what begins at a place, and count the bytes."""
-        before = [mark for mark in (*self._marks, self._last) if mark[0] <= start]
-        place, packed, state = max(before, key=lambda mark: mark[0])
-        state = state.copy()
-        file.seek(self._begin + packed)
-        stop, waiting = start + len(content), b""
-        while place < stop and not state.eof:
-            if not waiting:
-                left = self._info.compress_size - packed
-                waiting = file.read(max(0, min(PIECE, left)))
-            some = state.decompress(waiting, min(PIECE, stop - place))
-            if not some and not waiting:
-                break
-            packed += len(waiting) - len(state.unconsumed_tail)
-            waiting = state.unconsumed_tail
-            low, high = max(place, start), place + len(some)
-            if high > low:
-                content[low - start : high - start] = np.frombuffer(some, np.uint8)[low - place :]
-            place = high
-            if place >= self._marks[-1][0] + self._apart:
-                self._marks.append((place, packed, state.copy()))
-        self._last = place, packed, state
-        return max(0, place - start)
 
 
 def _identity(file: IO[bytes]) -> tuple[int, ...]:

@@ -2,7 +2,7 @@
 
 import re
 from contextlib import nullcontext
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pinocchio as pin
@@ -55,17 +55,13 @@ def test_stamps_of_a_day_in_unix_time_are_uniform():
     assert run(time=1.8e9 + np.arange(100) / 10_000).rate == pytest.approx(10_000, rel=3e-3)
 
 
-def test_blocks_are_sorted():
+def test_a_run_sorts_its_blocks_and_cannot_be_changed_in_place():
     late, early = Block(0.05, 0.1, "impact"), Block(0.0, 0.05, "ok")
     assert run(blocks=(late, early)).blocks == (early, late)
-
-
-def test_a_run_cannot_be_changed_in_place():
     with pytest.raises(AttributeError):
         run().robot = "talos"
     with pytest.raises(TypeError):
         run().meta["seed"] = 1
-    assert replace(run(), robot="talos").robot == "talos"
 
 
 def spoilt(value, row=3, column=1):
@@ -74,29 +70,14 @@ def spoilt(value, row=3, column=1):
     return velocity
 
 
-def shifted(row, by):
-    time = TIME.copy()
-    time[row:] += by
-    return time
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"time": TIME[:1], "velocity": np.ones((1, 2))}, "with at least 2 samples"),
         ({"time": TIME[:, None]}, r"time: shape \(100, 1\), expected \(samples,\)"),
-        ({"time": shifted(7, np.nan)}, "time: nan in row 7"),
-        ({"time": shifted(7, np.inf)}, "time: inf in row 7"),
-        ({"time": shifted(7, -0.001)}, r"stands still in row 7 \(0.006 s, then 0.006 s\)"),
-        ({"time": shifted(7, -0.002)}, r"runs backwards in row 7 \(0.006 s, then 0.005 s\)"),
-        ({"time": shifted(7, 0.001)}, "not uniform, the step to row 7 is 0.002 s where the median"),
         ({"time": TIME.astype(np.float32) + np.float32(1e3)}, "float32 is too coarse"),
         ({"velocity": np.ones((100, 3))}, r"velocity: shape \(100, 3\), expected \(100, 2\)"),
-        ({"velocity": np.ones((99, 2))}, r"velocity: shape \(99, 2\), expected \(100, 2\)"),
-        ({"velocity": np.ones(100)}, r"velocity: shape \(100,\), expected \(100, 2\)"),
-        ({"velocity": np.ones((100, 2), dtype=object)}, "velocity: holds object, expected float"),
         ({"velocity": spoilt(np.nan)}, "velocity: nan in row 3, column 1; mark gaps with valid"),
-        ({"velocity": spoilt(-np.inf)}, "velocity: -inf in row 3, column 1"),
         ({"position": np.ones((100, 1))}, r"position: shape \(100, 1\), expected \(100, 2\)"),
         ({"effort": spoilt(np.nan)}, "effort: nan in row 3, column 1"),
         ({"velocity_desired": np.ones((100, 1))}, r"velocity_desired: shape \(100, 1\)"),
@@ -112,8 +93,6 @@ def shifted(row, by):
         ({"joint_names": ("a", "")}, "joint_names: '' is no name"),
         ({"desired_joint_names": ("c", "c")}, "desired_joint_names: c named twice"),
         ({"blocks": (Block(0.05, 0.02, "ok"),)}, "block 'ok': starts at 0.05 s, stops at 0.02 s"),
-        ({"blocks": (Block(np.nan, 0.05, "ok"),)}, "block 'ok': starts at nan s"),
-        ({"blocks": (Block(0.0, 0.102, "ok"),)}, "block 'ok': 0 s to 0.102 s lies outside"),
     ],
 )
 def test_signals_that_do_not_fit_are_refused(changes, message):
@@ -291,13 +270,7 @@ def test_the_first_row_of_a_time_that_is_wrong_is_named(time, message):
 
 
 @pytest.mark.parametrize(
-    ("step", "message"),
-    [
-        (1e-9, ""),
-        (0.9e-9, "9e-10"),
-        (1e9, ""),
-        (1e9 + 1, "1e+09"),
-    ],
+    ("step", "message"), [(1e-9, ""), (0.9e-9, "9e-10"), (1e9, ""), (1e9 + 1, "1e+09")]
 )
 def test_steps_of_time_are_from_a_nanosecond_to_1e9_seconds(step, message):
     whole = f"time: the median step is {message} s, expected 1e-09 s to 1e+09 s"
@@ -345,12 +318,9 @@ def test_names_that_repeat_are_all_named(monkeypatch):
     ("shape", "turned"),
     [
         ((2, 5), True),
-        ((7, 5), True),
         ((2, 4), False),
-        ((5, 5), False),
         ((5, 3), False),
         ((5,), False),
-        ((1, 5, 1), False),
         ((2, 2, 5), False),
         ((2, 5, 2), False),
     ],
@@ -497,26 +467,16 @@ def test_all_velocities_are_decimated_and_nothing_else_is_kept():
     assert (slow.blocks, dict(slow.meta), slow.robot) == (run.blocks, {"seed": 1}, "panda")
 
 
-def test_the_same_rate_changes_nothing():
-    run = run_of(20.0)
-    assert decimated(run, 10_000.0) is run
-
-
-def test_a_rate_is_never_raised():
-    with pytest.raises(RunError, match="a run of 1000 Hz cannot be decimated to 2000 Hz"):
-        decimated(run_of(20.0, rate=1000), 2000.0)
-
-
-@pytest.mark.parametrize("rate", [0.0, -1000.0])
-def test_a_lower_rate_is_above_zero(rate):
-    with pytest.raises(RunError, match=f"^a run of 10000 Hz cannot be decimated to {rate:g} Hz$"):
-        decimated(run_of(20.0), rate)
-
-
-def test_two_samples_are_left_at_least():
-    assert len(decimated(run_of(20.0, seconds=0.002), 1000.0).time) == 2
-    with pytest.raises(RunError, match=r"^0.0019 s of motion are too short for 1000 Hz$"):
-        decimated(run_of(20.0, seconds=0.0019), 1000.0)
+@pytest.mark.parametrize(
+    ("seconds", "rate"), [(3.0, 20_000.0), (3.0, 0.0), (3.0, -1000.0), (0.0019, 1000.0)]
+)
+def test_a_rate_is_never_raised_and_two_samples_are_left_at_least(seconds, rate):
+    text = f"a run of {seconds:g} s at 10000 Hz cannot be decimated to {rate:g} Hz"
+    with refused(text):
+        decimated(run_of(20.0, seconds=seconds), rate)
+    least = run_of(20.0, seconds=0.002)
+    assert len(decimated(least, 1000.0).time) == 2
+    assert decimated(least, 10_000.0) is least
 
 
 @pytest.mark.parametrize("gap", [0, 7, 150, 2995, 2999])

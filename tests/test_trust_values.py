@@ -155,20 +155,10 @@ def test_a_mapping_that_is_hostile_is_one_line(tmp_path, text):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("fields", "problem"),
-    [
-        ({"meta": "[" * 100_000}, "meta: not JSON .nested too deeply"),
-        ({"meta": "1" * 5000}, "meta: not JSON"),
-        ({"meta": '{"source": "\\ud800"}'}, "meta: holds text that cannot be written as UTF-8"),
-        ({"meta": '{"differentiated": 3}'}, "meta: expected a JSON object as differentiated"),
-        ({"joint_names": ["\ud800"]}, "joint_names: '\\\\ud800' is no name"),
-    ],
-)
-def test_text_of_a_run_that_is_hostile_is_one_line(tmp_path, fields, problem):
-    arrays = {name: np.array(value) for name, value in fields.items()}
-    np.savez(tmp_path / "run.npz", time=TIME, velocity=np.ones((40, 1)), **arrays)
-    with pytest.raises(RunError, match=problem) as caught:
+def test_a_name_of_a_joint_that_is_hostile_is_one_line(tmp_path):
+    arrays = {"velocity": np.ones((40, 1)), "joint_names": np.array(["\ud800"])}
+    np.savez(tmp_path / "run.npz", time=TIME, **arrays)
+    with pytest.raises(RunError, match="joint_names: '\\\\ud800' is no name") as caught:
         Run.load(tmp_path / "run.npz")
     assert "\n" not in str(caught.value)
 
