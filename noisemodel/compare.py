@@ -50,7 +50,7 @@ DYNAMICS_DB = 100.0  # what lies further below a signal's loudest line counts as
 GROUP = 3  # fewest robots that the table gives a median of
 NAME = 26  # width of a robot's name in print
 SECONDS = 6.0
-RATE = 4000.0  # sample rate of the excitation unless another is given, in [Hz]
+RATE = 4000.0  # sample rate of the excitation, in [Hz]
 NOMINAL_SPEED = {"prismatic": 0.3}  # of the slow sines, in [m/s]; of joints that turn it is 1 rad/s
 BASE_SPEED = 0.1  # speed of a floating base, in [m/s] and [rad/s]
 SINES, SINES_HZ = 3, (0.1, 0.8)
@@ -75,52 +75,34 @@ Progress: TypeAlias = Callable[..., "Iterable[Comparison | LeftOut]"]
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """How kinds of noise estimates differ on one robot and its motion.
+    """How kinds of noise estimates differ on one robot and its motion."""
 
-    Attributes:
-        name: The robot, or the run file.
-        floating_base: Whether the robot's base moves freely.
-        joints: How many joints the motion has.
-        time: Of the samples, shape (samples,), in [s].
-        rate: Samples per second, in [Hz].
-        events: What should stand out: the run's blocks that are not "ok".
-        kinds: The kinds.
-        links: Names of the links.
-        links_with_surface: How many links have a surface.
-        pressure: Estimated pressure by each kind, scaled to a root mean square of 1,
-            shape (kinds, samples).
-        correlation: Of the envelopes of each two kinds, shape (kinds, kinds); nan where an
-            envelope does not change.
-        distance: Log-spectral distance of each two kinds: root mean square of the difference
-            of their spectra over time and frequency, shape (kinds, kinds), in [dB].
-        frequency: Shape (frequency,), in [Hz].
-        distance_by_frequency: The same over time alone, shape (kinds, kinds, frequency).
-        contrast: Mean square of the pressure above 10 Hz in each event, over that outside of all
-            events, shape (kinds, events), in [dB].
-        shares: Share of each link in the energy, shape (kinds, links).
-        terms: Share of A, B and C of each link in the energy that "paper" gives the whole robot,
-            (A + B + C)² being (A + B + C) A + (A + B + C) B + (A + B + C) C, shape (links, 3).
-        remarks: What the comparison leaves out, a sentence each.
-    """
-
-    name: str
+    name: str  # the robot, or the run file
     floating_base: bool
-    joints: int
-    time: Array
-    rate: float
-    events: tuple[Block, ...]
+    joints: int  # how many joints the motion has
+    time: Array  # of the samples, shape (samples,), in [s]
+    rate: float  # samples per second, in [Hz]
+    events: tuple[Block, ...]  # what should stand out: the run's blocks that are not "ok"
     kinds: tuple[str, ...]
-    links: tuple[str, ...]
+    links: tuple[str, ...]  # names
     links_with_surface: int
+    # Estimated by each kind, scaled to a root mean square of 1, shape (kinds, samples).
     pressure: Array
+    # Of the envelopes of each two kinds, (kinds, kinds); nan where an envelope does not change.
     correlation: Array
+    # Log-spectral distance of each two kinds: root mean square of the difference of their spectra
+    # over time and frequency, shape (kinds, kinds), in [dB].
     distance: Array
-    frequency: Array
-    distance_by_frequency: Array
+    frequency: Array  # shape (frequency,), in [Hz]
+    distance_by_frequency: Array  # over time alone, shape (kinds, kinds, frequency)
+    # Mean square of the pressure above 10 Hz in each event, over that outside of all events,
+    # shape (kinds, events), in [dB].
     contrast: Array
-    shares: Array
+    shares: Array  # of each link in the energy, shape (kinds, links)
+    # Share of A, B and C of each link in the energy that "paper" gives the whole robot,
+    # (A + B + C)² being (A + B + C) A + (A + B + C) B + (A + B + C) C, shape (links, 3).
     terms: Array
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  # what the comparison leaves out, a sentence each
 
     @property
     def reference(self) -> int:
@@ -187,15 +169,10 @@ class Comparison:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A robot or a run that could not be compared.
+    """A robot or a run that could not be compared."""
 
-    Attributes:
-        name: The robot, or the run file.
-        reason: Why not, in one line.
-    """
-
-    name: str
-    reason: str
+    name: str  # the robot, or the run file
+    reason: str  # why not, in one line
 
     def __str__(self) -> str:
         return f"{self.name}: left out: {self.reason}"
@@ -206,14 +183,10 @@ class Comparisons:
     """Kinds of noise estimates compared on many robots, all on the same kinds.
 
     It has a length, an iterator and indices, all over ``robots``, and prints as a table.
-
-    Attributes:
-        robots: What could be compared, in the order of the robots.
-        left_out: What could not, and why.
     """
 
-    robots: tuple[Comparison, ...]
-    left_out: tuple[LeftOut, ...] = ()
+    robots: tuple[Comparison, ...]  # what could be compared, in the order of the robots
+    left_out: tuple[LeftOut, ...] = ()  # what could not, and why
 
     def __len__(self) -> int:
         return len(self.robots)
@@ -230,18 +203,10 @@ class Comparisons:
         return tuple(dict.fromkeys(event.label for one in self for event in one.events))
 
     def to_arrow(self) -> "pyarrow.Table":
-        """Tabulate a row for each robot and kind.
+        """Tabulate a row for each robot and kind; nan where a number does not exist.
 
-        Returns:
-            A table with the columns ``name``, ``floating_base``, ``joints``, ``links``,
-            ``links_with_surface``, ``rate_hz``, ``share_A``, ``share_B`` and ``share_C`` of the
-            paper's terms in its power, ``kind``, the ``reference`` that the kind is compared with,
-            ``correlation``, ``distance_db`` and its parts ``distance_<band>_db`` by frequency,
-            ``contrast_<label>_db`` of the events with each label, ``loudest_share`` and
-            ``loudest_link``; nan where a number does not exist.
-
-        Raises:
-            NoiseModelError: If every robot was left out.
+        Columns are named after the fields of `Comparison`, and their units. If every robot was left
+        out, it is a NoiseModelError.
         """
         import pyarrow
 
@@ -377,15 +342,6 @@ def contrasts(pressure: Array, time: Array, rate: float, events: Sequence[Block]
         return decibel(energy / power[:, rest].mean(axis=1, keepdims=True))
 
 
-def check_length(samples: int, rate: float) -> None:
-    """Refuse a motion that is shorter than one spectrum."""
-    window = round(WINDOW * rate)
-    if window < 4 or samples < window:
-        raise NoiseModelError(
-            f"{samples} samples at {rate:g} Hz, expected {WINDOW:g} s at least and 40 Hz"
-        )
-
-
 # The estimates of one motion, each kind evaluated once.
 
 
@@ -430,7 +386,7 @@ def _estimates(
 # The motion of each robot.
 
 
-def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
+def excitation(robot: Robot, *, seed: int = 0) -> Run:
     """Motion of any robot without a simulator: slow sines, ripple, two shakes, a jerk.
 
     Every joint follows three slow sines with a small ripple at all frequencies above, as of real
@@ -442,25 +398,19 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
     - ``jerk``: the speed of all joints jumps within one sample, and the jump decays.
 
     Positions keep to the limits of the robot: the motion of a joint with a small range or speed is
-    scaled down. Joints that mimic another one follow it; the base's pose stays at the origin. The
-    Nyquist frequency of ``rate``, in [Hz], has to be above the shakes.
+    scaled down. Joints that mimic another one follow it; the base's pose stays at the origin.
     """
-    if not 2.0 * SHAKE_HZ[1] < rate < np.inf:
-        raise NoiseModelError(
-            f"the excitation at {rate:g} Hz, expected above {2.0 * SHAKE_HZ[1]:g} Hz: its shakes"
-            f" have up to {SHAKE_HZ[1]:g} Hz"
-        )
     random = np.random.default_rng(seed)
-    time = np.arange(round(SECONDS * rate)) / rate
+    time = np.arange(round(SECONDS * RATE)) / RATE
     kinds = {joint.name: joint.kind for joint in robot.joints}
     speed = np.array([NOMINAL_SPEED.get(kinds[name], 1.0) for name in robot.joint_names])
-    velocity = _motion(time, len(speed), random, rate) * speed
+    velocity = _motion(time, len(speed), random) * speed
     limits = limits_of(robot)
     bounds = [limits[name] for name in robot.joint_names]
     ranges = np.array([each.upper - each.lower for each in bounds])
     centre = np.array([each.centre for each in bounds])
     fastest = np.array([each.velocity for each in bounds])
-    position = np.cumsum(velocity, axis=0) / rate
+    position = np.cumsum(velocity, axis=0) / RATE
     low, high = position.min(axis=0), position.max(axis=0)
     scale = np.minimum(1.0, USABLE * ranges / (high - low))
     scale = np.minimum(scale, USABLE * fastest / abs(velocity).max(axis=0))
@@ -472,11 +422,11 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
         burst = np.sin(np.pi * place) ** 2 * np.sin(2.0 * np.pi * hertz * time)  # a Hann envelope
         velocity[:, robot.joint_names.index(joint)] += SHAKE * burst
         blocks.append(Block(start, stop, label))
-    base = BASE_SPEED * _motion(time, 6, random, rate) if robot.floating_base else None
+    base = BASE_SPEED * _motion(time, 6, random) if robot.floating_base else None
     return Run(
         time=time,
         velocity=velocity,
-        position=centre + np.cumsum(velocity, axis=0) / rate - scale * (low + high) / 2,
+        position=centre + np.cumsum(velocity, axis=0) / RATE - scale * (low + high) / 2,
         base_velocity=base,
         joint_names=robot.joint_names,
         robot=robot.name if is_name(robot.name) else str(robot.path),
@@ -504,7 +454,7 @@ def ends(robot: Robot) -> tuple[str, ...]:
     return tuple(dict.fromkeys(robot.joints[index - 1].name for index in (near, far)))
 
 
-def _motion(time: Array, axes: int, random: "np.random.Generator", rate: float) -> Array:
+def _motion(time: Array, axes: int, random: "np.random.Generator") -> Array:
     """Slow sines, ripple and jerk of each axis at a nominal speed of 1, shape (samples, axes)."""
     # Sines that are spread evenly over octaves, with a mean square of 1
     hertz = np.exp(random.uniform(np.log(SINES_HZ[0]), np.log(SINES_HZ[1]), (SINES, axes)))
@@ -512,7 +462,7 @@ def _motion(time: Array, axes: int, random: "np.random.Generator", rate: float) 
     sines = np.sin(2.0 * np.pi * time[:, None, None] * hertz + phase).sum(axis=1)
     sines = sines * float(np.sqrt(2.0 / SINES))
     # Pink noise with a mean square of 1
-    hertz = np.fft.rfftfreq(len(time), 1.0 / rate)
+    hertz = np.fft.rfftfreq(len(time), 1.0 / RATE)
     white = np.fft.rfft(random.standard_normal((len(time), axes)), axis=0)
     slope = np.where(hertz < RIPPLE_HZ, 0.0, 1.0 / np.sqrt(np.maximum(hertz, RIPPLE_HZ)))
     pink = np.fft.irfft(white * slope[:, None], n=len(time), axis=0)
@@ -654,14 +604,16 @@ def _attempt(
 def _compare(
     name: str, robot: Robot, run: Run, remarks: tuple[str, ...], kinds: Sequence[str], geometry: str
 ) -> Comparison:
-    rate = run.rate
-    check_length(len(run.time), rate)
+    rate, window = run.rate, round(WINDOW * run.rate)
+    if window < 4 or len(run.time) < window:
+        raise NoiseModelError(
+            f"{len(run.time)} samples at {rate:g} Hz, expected {WINDOW:g} s at least and 40 Hz"
+        )
     surface = Surface.of(robot, geometry)
     if not surface.area.any():
         raise GeometryError(f"no link has a surface by geometry {geometry!r}")
     pressure, power, energy, terms = _estimates(robot, surface, *robot.configuration(run), kinds)
     events = tuple(block for block in run.blocks if block.label != "ok")
-    window = round(WINDOW * rate)
     squares = spectral_distances([log_spectra(np.sqrt(each), window) for each in power])
     rms = np.sqrt(np.mean(pressure**2, axis=1, keepdims=True))
     return Comparison(

@@ -3,6 +3,7 @@
 from array import array
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from math import inf
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeAlias
@@ -20,15 +21,13 @@ from noisemodel.run import (
     resample,
     with_velocities,
 )
-from noisemodel.types import Array, Mask, RunError, UnknownJointError, hint
+from noisemodel.types import Array, Mask, RunError, UnknownJointError
 
 Values: TypeAlias = ArrayLike | Mapping[str, float]
 
 WIDTHS = {"base_pose": 7, "base_velocity": 6, "time": 1}
 GAP = 5.0  # length of a step, in median ones, above which it is a gap
-NEAR = (
-    0.05  # largest relative difference of the stamps' rate from the recorder's, which replaces it
-)
+NEAR = 0.05  # share by which the rate of the stamps may differ from the recorder's, to count as it
 
 
 class Recorder:
@@ -43,13 +42,8 @@ class Recorder:
         rate: Samples per second, in [Hz].
         path: Where ``with`` saves the run when it ends, also if it ends by an error.
         joint_names: The joints whose values are pushed, in order; the robot's unless given.
-        desired_joint_names: Those of desired values; ``joint_names`` unless given.
+        desired_joint_names: The joints of desired values; ``joint_names`` unless given.
         meta: What else is known, for the run.
-
-    Raises:
-        RunError: If a run cannot have this rate.
-        RobotError: If the robot cannot be read.
-        UnknownJointError: If it lacks one of the joints.
 
     Example:
         >>> recorder = Recorder(None, 100, joint_names=["elbow"])
@@ -103,7 +97,7 @@ class Recorder:
         base_velocity: ArrayLike | None = None,
         time: float | None = None,
     ) -> None:
-        """Add a sample.
+        """Add a sample; a RunError if it does not fit those before.
 
         Args:
             position: A number for each joint, or by the joint's name, in [rad] or [m].
@@ -114,10 +108,6 @@ class Recorder:
             base_pose: x, y, z and the quaternion x, y, z, w of a floating base.
             base_velocity: Linear, then angular velocity of the base in its own axes.
             time: Stamp of the sample, in [s]; the samples are at the recorder's rate without.
-
-        Raises:
-            RunError: If a signal has another width than the robot has joints, names a joint that
-                is not known, is new, or is missing; or if time does not rise.
         """
         given: dict[str, Values | None] = {
             "position": position,
@@ -136,17 +126,13 @@ class Recorder:
         self._count += 1
 
     def run(self) -> Run:
-        """Run of the samples so far.
+        """Run of the samples so far, which are two or more, and not gaps alone.
 
         Stamps that jitter are resampled to the recorder's rate (to their own, if that is another
         by more than 5 %), with ``valid`` False where samples are missing.
-
-        Raises:
-            RunError: If there are fewer than two samples, or all of them are gaps.
         """
         if self._count < 2:
-            samples = f"{self._count or 'no'} sample{'' if self._count == 1 else 's'}"
-            raise RunError(f"the recorder has {samples}, a run needs at least 2: push some first")
+            raise RunError(f"the recorder has {self._count} samples, a run needs at least 2")
         signals = {
             name: np.array(each).reshape(self._count, -1) for name, each in self._values.items()
         }
@@ -171,12 +157,7 @@ class Recorder:
         return Run(**fields, **names, robot=self._robot, meta=meta)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the run of the samples so far, for ``inspector view`` and the like.
-
-        Raises:
-            RunError: As ``run``.
-            OutputError: If the file exists or cannot be written.
-        """
+        """Write the run of the samples so far, see `Run.save`."""
         self.run().save(path, overwrite=overwrite)
 
     def __enter__(self) -> Self:
@@ -202,12 +183,10 @@ class Recorder:
         names = known = self._desired if name.endswith("_desired") else known
         if isinstance(values, Mapping):
             names = known or tuple(values)
-            if unknown := [joint for joint in values if joint not in names]:
-                close, listed = hint(unknown[0], names), ", ".join(names)
-                raise RunError(f"{name}: no joint {unknown[0]!r}{close}; expected {listed}")
-            if missing := [joint for joint in names if joint not in values]:
+            if values.keys() != set(names):
                 raise RunError(
-                    f"{name}: missing for {', '.join(missing)}; joint_names=… names fewer"
+                    f"{name}: joints {', '.join(values)}, expected {', '.join(names)};"
+                    " joint_names=… names others"
                 )
             values = [values[joint] for joint in names]
         try:
@@ -216,13 +195,8 @@ class Recorder:
             raise RunError(f"{name}: {values!r}, expected a number for each joint") from error
         width = WIDTHS.get(name, len(names))
         if row.ndim != 1 or (width and len(row) != width):
-            what = f"({', '.join(names[:10])}{', …' if len(names) > 10 else ''})" if names else ""
-            how = "; joint_names=… names others" if names and row.ndim == 1 else ""
-            raise RunError(
-                f"{name}: shape {row.shape}, expected ({width or 'joints'},) {what}".rstrip() + how
-            )
-        if name == "time" and not np.isfinite(row[0]):
-            raise RunError(f"time: {row[0]} in sample {self._count + 1}")
+            listed = f" ({', '.join(names)}); joint_names=… names others" if names else ""
+            raise RunError(f"{name}: shape {row.shape}, expected ({width or 'joints'},){listed}")
         if not known and name not in WIDTHS:
             self._joints = names or tuple(f"joint{number + 1}" for number in range(len(row)))
             self._desired = self._desired or self._joints
@@ -234,15 +208,13 @@ class Recorder:
         if self._count == 0 and not {"position", "velocity"} & set(rows):
             has = ", ".join(rows) or "nothing"
             raise RunError(f"velocity: missing, and position too; the sample has {has}")
-        if self._count:
-            for name in sorted(self._values.keys() ^ rows.keys()):
-                how = "missing" if name in self._values else "new"
-                raise RunError(f"{name}: {how} in sample {sample}; push it each time or never")
-        if self._count and "time" in rows:
-            before, now = self._values["time"][-1], rows["time"][0]
-            if now <= before:
-                how = "stands still" if now == before else "runs backwards"
-                raise RunError(f"time: {how} in sample {sample} ({before:.9g} s, then {now:.9g} s)")
+        for name in sorted(self._values.keys() ^ rows.keys()) if self._count else ():
+            how = "missing" if name in self._values else "new"
+            raise RunError(f"{name}: {how} in sample {sample}; push it each time or never")
+        if "time" in rows:
+            before, now = self._values.get("time", [-inf])[-1], rows["time"][0]
+            if not before < now < inf:
+                raise RunError(f"time: {now:.9g} s in sample {sample}, after {before:.9g} s")
 
     def _uniform(
         self, stamps: Array, valid: Mask, signals: dict[str, Array], meta: dict[str, Any]

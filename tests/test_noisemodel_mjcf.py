@@ -471,7 +471,7 @@ MJCF = """<mujoco><compiler angle="radian" eulerseq="XYZ"/>
 @pytest.mark.parametrize("kind", nm.KINDS)
 def test_the_same_robot_as_urdf_and_as_mjcf_is_equally_loud(tmp_path, kind):
     write_stl(tmp_path / "part.stl")
-    run = excitation(Robot.load(written(tmp_path, URDF, "r.urdf")), rate=500.0)
+    run = excitation(Robot.load(written(tmp_path, URDF, "r.urdf")))
     paths = [tmp_path / "r.urdf", written(tmp_path, MJCF, "r.xml")]
     twists, noise = [], []
     for path in paths:
@@ -689,7 +689,7 @@ def test_a_urdf_may_be_called_xml(tmp_path):
 
 def test_a_run_names_an_mjcf_relative_to_its_own_folder(tmp_path):
     path = written(tmp_path, LEGS, "models/legs.xml")
-    run = excitation(Robot.load(path), rate=500.0)
+    run = excitation(Robot.load(path))
     replace(run, robot=os.path.relpath(path)).save(tmp_path / "run.npz")
     with np.load(tmp_path / "run.npz") as arrays:
         assert str(arrays["robot"]) == "models/legs.xml"

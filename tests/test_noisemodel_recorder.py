@@ -6,7 +6,13 @@ import pytest
 import noisemodel as nm
 from noisemodel import OutputError, RunError, UnknownJointError
 
+OTHERS = "(a, b); joint_names=… names others"
+BOTH = {"velocity": np.zeros(2)}
 PANDA = [f"panda_joint{number}" for number in range(1, 8)]
+
+
+def whole(text):
+    return pytest.raises(RunError, match=f"^{re.escape(text)}$")
 
 
 def pushed(recorder, samples=300, rate=100):
@@ -44,10 +50,12 @@ def test_values_by_name_are_put_in_the_recorders_order():
     run = recorder.run()
     assert np.array_equal(run.velocity, [[1.0, 2.0]] * 3)
     assert np.array_equal(run.velocity_desired, [[3.0]] * 3)
-    with pytest.raises(RunError, match=r"velocity: no joint 'c'; expected a, b"):
-        recorder.push(velocity={"a": 1.0, "c": 1.0}, velocity_desired={"b": 3.0})
-    with pytest.raises(RunError, match=r"velocity: missing for a; joint_names=… names fewer"):
-        recorder.push(velocity={"b": 1.0}, velocity_desired={"b": 3.0})
+    for wrong in ({"a": 1.0, "c": 1.0}, {"b": 1.0}, {"a": 1.0, "b": 1.0, "c": 1.0}):
+        named = ", ".join(wrong)
+        with whole(f"velocity: joints {named}, expected a, b; joint_names=… names others"):
+            recorder.push(velocity=wrong, velocity_desired={"b": 3.0})
+    with whole("velocity_desired: joints a, expected b; joint_names=… names others"):
+        recorder.push(velocity={"a": 1.0, "b": 1.0}, velocity_desired={"a": 3.0})
 
 
 def test_missing_velocities_are_differentiated_from_positions():
@@ -62,26 +70,25 @@ def test_missing_velocities_are_differentiated_from_positions():
 @pytest.mark.parametrize(
     ("sample", "message"),
     [
-        ({"velocity": np.zeros(9)}, r"velocity: shape \(9,\), expected \(2,\) \(a, b\); joint_na"),
-        ({"velocity": np.zeros((1, 2))}, r"velocity: shape \(1, 2\), expected \(2,\) \(a, b\)$"),
-        ({"velocity": 0.3}, r"velocity: shape \(\), expected \(2,\)"),
-        ({"velocity": ["x", "y"]}, r"velocity: \['x', 'y'\], expected a number for each joint"),
+        ({"velocity": np.zeros(9)}, f"velocity: shape (9,), expected (2,) {OTHERS}"),
+        ({"velocity": np.zeros((1, 2))}, f"velocity: shape (1, 2), expected (2,) {OTHERS}"),
+        ({"velocity": 0.3}, f"velocity: shape (), expected (2,) {OTHERS}"),
+        ({"velocity": ["x", "y"]}, "velocity: ['x', 'y'], expected a number for each joint"),
+        (BOTH | {"base_pose": np.zeros(6)}, "base_pose: shape (6,), expected (7,)"),
+        (BOTH | {"base_velocity": np.zeros((2, 6))}, "base_velocity: shape (2, 6), expected (6,)"),
         (
-            {"velocity": np.zeros(2), "base_pose": np.zeros(6)},
-            r"base_pose: shape \(6,\), expected \(7,\)",
-        ),
-        (
-            {"velocity": np.zeros(2), "base_velocity": np.zeros(7)},
-            r"base_velocity: shape \(7,\), expected \(6,\)",
+            BOTH | {"velocity_desired": 1.0},
+            "velocity_desired: shape (), expected (1,) (c); joint_names=… names others",
         ),
         ({"effort": np.zeros(2)}, "velocity: missing, and position too; the sample has effort"),
         ({}, "velocity: missing, and position too; the sample has nothing"),
-        ({"velocity": np.zeros(2), "time": np.nan}, "time: nan in sample 1"),
+        (BOTH | {"time": np.nan}, "time: nan s in sample 1, after -inf s"),
+        (BOTH | {"time": np.inf}, "time: inf s in sample 1, after -inf s"),
     ],
 )
 def test_a_wrong_sample_is_an_error_that_names_the_signal(sample, message):
-    recorder = nm.Recorder(None, 100, joint_names=["a", "b"])
-    with pytest.raises(RunError, match=message):
+    recorder = nm.Recorder(None, 100, joint_names=["a", "b"], desired_joint_names=["c"])
+    with whole(message):
         recorder.push(**sample)
     assert len(recorder) == 0
 
@@ -97,19 +104,18 @@ def test_signals_may_not_come_and_go():
     assert len(recorder.run().time) == 5
 
 
-def test_time_has_to_rise():
+@pytest.mark.parametrize("now", [0.1, 0.2, np.nan, np.inf])
+def test_time_has_to_rise(now):
     recorder = nm.Recorder(None, 100)
     recorder.push(velocity=[1.0], time=0.2)
-    with pytest.raises(RunError, match=r"time: runs backwards in sample 2 \(0.2 s, then 0.1 s\)"):
-        recorder.push(velocity=[1.0], time=0.1)
-    with pytest.raises(RunError, match=r"time: stands still in sample 2"):
-        recorder.push(velocity=[1.0], time=0.2)
+    with whole(f"time: {now:g} s in sample 2, after 0.2 s"):
+        recorder.push(velocity=[1.0], time=now)
 
 
-@pytest.mark.parametrize(("samples", "message"), [(0, "no samples"), (1, "1 sample")])
-def test_too_few_samples_are_no_run(tmp_path, samples, message):
+@pytest.mark.parametrize("samples", [0, 1])
+def test_too_few_samples_are_no_run(tmp_path, samples):
     recorder = pushed(nm.Recorder(None, 100), samples)
-    with pytest.raises(RunError, match=f"the recorder has {message}, a run needs at least 2"):
+    with whole(f"the recorder has {samples} samples, a run needs at least 2"):
         recorder.save(tmp_path / "run.npz")
     assert not (tmp_path / "run.npz").exists()
 
@@ -139,21 +145,22 @@ def test_a_loop_that_is_interrupted_leaves_what_it_had(tmp_path):
     assert len(nm.Run.load(tmp_path / "a.npz").time) == 10
     with pytest.raises(KeyboardInterrupt):
         failing(tmp_path / "b.npz", 0)
-    with pytest.raises(RunError, match="no samples"), nm.Recorder(None, 100, path="c.npz"):
+    with pytest.raises(RunError, match="0 samples"), nm.Recorder(None, 100, path="c.npz"):
         pass
     with nm.Recorder(None, 100) as recorder:
         pushed(recorder, 10)
 
 
 def test_a_robot_names_the_joints_and_joints_are_checked():
-    recorder = nm.Recorder("panda", 100)
-    message = r"velocity: shape \(7,\), expected \(9,\) \(panda_joint1, .*\); joint_names=… names"
-    with pytest.raises(RunError, match=message):
-        recorder.push(velocity=np.zeros(7))
     with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'"):
         nm.Recorder("panda", 100, joint_names=["elbow"])
-    with pytest.raises(RunError, match=r"rate: 0 Hz, expected 1e-09 Hz to 1e\+09 Hz"):
-        nm.Recorder(None, 0)
+    with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'"):
+        nm.Recorder("panda", 100, joint_names=PANDA, desired_joint_names=[PANDA[0], "elbow"])
+    recorder = nm.Recorder("panda", 100, joint_names=PANDA[:2], desired_joint_names=PANDA[4:5])
+    for _ in range(2):
+        recorder.push(velocity=[0, 0], velocity_desired=[0])
+    run = recorder.run()
+    assert (run.joint_names, run.desired_joint_names) == (tuple(PANDA[:2]), (PANDA[4],))
 
 
 def test_a_loaded_robot_is_named_as_it_was_loaded(tmp_path):
@@ -293,33 +300,10 @@ def test_a_sample_that_is_not_finite_is_a_gap_in_all_signals_and_the_base_does_n
     assert run.base_pose[1:3].tolist() == [[1, 2, 3, 1, 0, 0, 0], [0, 0, 0, 0, 0, 0, 1]]
 
 
-def whole(text):
-    return pytest.raises(RunError, match=f"^{re.escape(text)}$")
-
-
 @pytest.mark.parametrize("rate", [0.0, -1.0, 5e-324, 1e300, np.nan, np.inf])
 def test_a_rate_is_one_that_a_run_may_have(rate):
     with whole(f"rate: {rate:g} Hz, expected 1e-09 Hz to 1e+09 Hz"):
         nm.Recorder(None, rate)
-
-
-@pytest.mark.parametrize(("joints", "named"), [(10, 10), (11, 10)])
-def test_a_sample_of_another_width_names_ten_joints(joints, named):
-    names = [f"j{number}" for number in range(joints)]
-    recorder = nm.Recorder(None, 100, joint_names=names, desired_joint_names=names[:3])
-    known = ", ".join(names[:named]) + (", …" if joints > named else "")
-    with whole(f"effort: shape (2,), expected ({joints},) ({known}); joint_names=… names others"):
-        recorder.push(velocity=np.zeros(joints), effort=[1, 2])
-    with whole("velocity_desired: shape (), expected (3,) (j0, j1, j2)"):
-        recorder.push(velocity=np.zeros(joints), velocity_desired=1.0)
-    with whole("base_pose: shape (6,), expected (7,)"):
-        recorder.push(velocity=np.zeros(joints), base_pose=np.zeros(6))
-    with whole("base_velocity: shape (2, 6), expected (6,)"):
-        recorder.push(velocity=np.zeros(joints), base_velocity=np.zeros((2, 6)))
-    with whole("velocity: missing, and position too; the sample has effort, time"):
-        recorder.push(effort=np.zeros(joints), time=0.0)
-    with whole("position_desired: missing for j0, j2; joint_names=… names fewer"):
-        recorder.push(velocity=np.zeros(joints), position_desired={"j1": 0.0})
 
 
 def test_without_names_the_first_sample_names_the_joints():
@@ -330,23 +314,9 @@ def test_without_names_the_first_sample_names_the_joints():
         recorder.push(time=len(recorder) / 100, velocity={"b": 1.0, "a": 2.0}, effort=[3.0, 4.0])
     with whole("velocity: shape (3,), expected (2,) (b, a); joint_names=… names others"):
         recorder.push(time=0.5, velocity=[1, 2, 3], effort=[3.0, 4.0])
-    with whole("time: inf in sample 3"):
-        recorder.push(time=np.inf, velocity=[1, 2], effort=[3.0, 4.0])
-    with whole("time: stands still in sample 3 (0.01 s, then 0.01 s)"):
-        recorder.push(time=0.01, velocity=[1, 2], effort=[3.0, 4.0])
     run = recorder.run()
     assert run.joint_names == run.desired_joint_names == ("b", "a")
     assert run.velocity.tolist() == [[1.0, 2.0]] * 2
-
-
-def test_the_desired_joints_are_the_robots_too():
-    with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'"):
-        nm.Recorder("panda", 100, joint_names=PANDA, desired_joint_names=[PANDA[0], "elbow"])
-    recorder = nm.Recorder("panda", 100, joint_names=PANDA[:2], desired_joint_names=PANDA[4:5])
-    for _ in range(2):
-        recorder.push(velocity=[0, 0], velocity_desired=[0])
-    run = recorder.run()
-    assert (run.joint_names, run.desired_joint_names) == (tuple(PANDA[:2]), (PANDA[4],))
 
 
 def test_a_loop_that_ends_replaces_what_an_earlier_one_has_saved(tmp_path):

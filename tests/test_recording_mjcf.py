@@ -22,7 +22,7 @@ def run_file(tmp_path):
         '<body name="tip" pos="0.3 0 0">',
         '<body name="tip" pos="0.3 0 0"><geom type="mesh" mesh="part" rgba="1 0 0 1"/>',
     )
-    run = excitation(Robot.load(written(tmp_path, text, "arm.xml")), rate=1000.0)
+    run = excitation(Robot.load(written(tmp_path, text, "arm.xml")))
     path = tmp_path / "run.npz"
     run.save(path)
     return path
