@@ -163,31 +163,18 @@ def _joint(model: Any, index: int) -> Joint:
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot with its kinematics.
+    """A robot with its kinematics."""
 
-    Attributes:
-        name: Its name in the list, or its file's.
-        path: The URDF or MJCF that it was read from.
-        package_roots: Folders that ``package://`` addresses are searched in.
-        model: Pinocchio's model; mimic joints are joints of their own in it.
-        joints: All joints after the universe, in Pinocchio's order.
-        nq: Length of a configuration.
-        nv: Length of a velocity.
-        floating_base: Whether the base moves freely.
-        mimics: The joints that follow another one; empty where they are independent.
-        mjcf: What an MJCF describes; None if the robot is from a URDF.
-    """
-
-    name: str
-    path: Path
-    package_roots: tuple[Path, ...]
-    model: Any
-    joints: tuple[Joint, ...]
-    nq: int
-    nv: int
-    floating_base: bool
-    mimics: Mapping[str, Mimic]
-    mjcf: Mjcf | None = None
+    name: str  # its name in the list, or its file's
+    path: Path  # the URDF or MJCF that it was read from
+    package_roots: tuple[Path, ...]  # folders that ``package://`` addresses are searched in
+    model: Any  # Pinocchio's; mimic joints are joints of their own in it
+    joints: tuple[Joint, ...]  # all after the universe, in Pinocchio's order
+    nq: int  # length of a configuration
+    nv: int  # length of a velocity
+    floating_base: bool  # whether the base moves freely
+    mimics: Mapping[str, Mimic]  # joints that follow another one; empty if they are independent
+    mjcf: Mjcf | None = None  # what an MJCF describes; None if the robot is from a URDF
 
     @classmethod
     def load(
@@ -243,13 +230,10 @@ class Robot:
         )
 
     def configuration(self, run: Run) -> tuple[Array, Array]:
-        """Order a run's motion as Pinocchio does, joint by joint, by name.
+        """Order a run's motion as Pinocchio does, joint by joint, by name: q and v.
 
         Joints that are not in the log are assumed stationary in their neutral position, and so is a
         base of which the run has no pose. Columns of joints that follow another one are ignored.
-
-        Returns:
-            Configurations q, shape (samples, nq), and velocities v, shape (samples, nv).
 
         Raises:
             UnknownJointError: If the run names a joint that the robot does not have.
@@ -267,17 +251,10 @@ class Robot:
         return q, v
 
     def desired(self, run: Run) -> tuple[Array, Array] | None:
-        """Order a run's desired motion as Pinocchio does; its base is stationary.
+        """Order a run's desired motion as Pinocchio does, q and v; its base is stationary.
 
-        Without desired positions the joints are where they were measured.
-
-        Returns:
-            Configurations, shape (samples, nq), and velocities, shape (samples, nv); None where
-            the run has no desired velocities.
-
-        Raises:
-            UnknownJointError: If the run names a joint that the robot does not have.
-            RunError: If the run has no positions.
+        Without desired positions the joints are where they were measured. It is None where the run
+        has no desired velocities; errors are those of `configuration`.
         """
         if run.velocity_desired is None:
             return None

@@ -130,22 +130,13 @@ def _placed(
 # Integrals that are exact: area, centroid, and two quadratic forms of a link's twist.
 
 
-@dataclass(frozen=True)
-class Moments:
-    """What is exact about a surface; all is 0 where there is none, see `LinkSurface`."""
-
-    area: float
-    centroid: Array
-    mean_square: Array
-    mean_square_normal: Array
-
-
-def moments(triangles: Array) -> Moments:
-    """Integrate over triangles, shape (triangles, 3 corners, 3), in [m]."""
+def moments(triangles: Array) -> dict[str, Any]:
+    """What is exact about triangles, shape (triangles, 3 corners, 3), in [m], see `LinkSurface`."""
     triangles, areas, normals = _faces(triangles)
     area = float(areas.sum())
     if area == 0.0:
-        return Moments(0.0, np.zeros(3), np.zeros((6, 6)), np.zeros((6, 6)))
+        none = {"mean_square": np.zeros((6, 6)), "mean_square_normal": np.zeros((6, 6))}
+        return {"area": area, "centroid": np.zeros(3)} | none
     points, weights = _edge_points(triangles, areas)
     centroid = weights @ points
     second = (points * weights[:, None]).T @ points
@@ -156,7 +147,8 @@ def moments(triangles: Array) -> Moments:
     mean_square = np.block([[np.eye(3), -crossed], [crossed, inertia]])
     normals = np.repeat(normals, 3, axis=0)
     pull = np.hstack((normals, np.cross(points, normals)))  # n.(v + w x r) = pull.(v, w)
-    return Moments(area, centroid, mean_square, (pull * weights[:, None]).T @ pull)
+    forms = {"mean_square": mean_square, "mean_square_normal": (pull * weights[:, None]).T @ pull}
+    return {"area": area, "centroid": centroid} | forms
 
 
 def _faces(triangles: Array) -> tuple[Array, Array, Array]:
@@ -374,7 +366,7 @@ class LinkSurface:
 
 
 def _integrals(triangles: Array, axis: Array | None) -> dict[str, NDArray[Any]]:
-    found = asdict(moments(triangles))
+    found = moments(triangles)
     if found["area"] == 0.0:
         found |= {"lever": 0.0, "rounding": np.zeros((3, 3)), "turning": np.zeros((1, 1))}
         found |= {"points": np.zeros((0, 3)), "weights": np.zeros(0)}
@@ -395,28 +387,19 @@ def _integrals(triangles: Array, axis: Array | None) -> dict[str, NDArray[Any]]:
 class Surface:
     """The surface of every link that moves; what is fixed to the world has none.
 
-    Attributes:
-        names: The links: each is all geometry that moves with one joint, and is named after
-            that joint's child link.
-        joint: Index of each link's joint in Pinocchio, shape (links,).
-        links: The surface of each link.
+    A link is all geometry that moves with one joint, and is named after that joint's child link.
     """
 
     names: tuple[str, ...]
-    joint: NDArray[np.intp]
+    joint: NDArray[np.intp]  # index of each link's joint in Pinocchio, shape (links,)
     links: tuple[LinkSurface, ...]
 
     @classmethod
     def of(cls, robot: Robot, geometry: str = "visual") -> Self:
         """Integrate over the links of a robot; what takes long is kept for the next time.
 
-        Args:
-            robot: The robot.
-            geometry: "visual", "collision", "hull" (of each visual), or "auto": the visual, or else
-                the collision.
-
-        Raises:
-            GeometryError: If a shape or a mesh cannot be read, or has no surface.
+        ``geometry`` is "visual", "collision", "hull" (of each visual), or "auto": the visual, or
+        else the collision. A shape or mesh that cannot be read is a GeometryError.
         """
         axes = [joint.turning_axis for joint in robot.joints]
         links = tuple(map(LinkSurface.of, triangles(robot, geometry), axes))
@@ -426,19 +409,6 @@ class Surface:
     def area(self) -> Array:
         """Area of each link, shape (links,), in [m²]."""
         return np.array([link.area for link in self.links], dtype=np.float64)
-
-    @property
-    def centroid(self) -> Array:
-        """Centroid of each link in its joint's axes, shape (links, 3), in [m]."""
-        return np.array([link.centroid for link in self.links])
-
-    @property
-    def lever(self) -> Array:
-        """Mean lever arm G of each link about its joint's axis, shape (links,), in [m].
-
-        It is 0 where the joint slides and nan for a floating base, which turns about any axis.
-        """
-        return np.array([link.lever for link in self.links], dtype=np.float64)
 
     @property
     def mean_square(self) -> Array:

@@ -194,7 +194,7 @@ def test_a_revolute_joint_alone_drives_its_link_at_rate_times_lever(tmp_path):
     a, b, c = terms(robot, surface, q, v)
     assert np.allclose(a, 0, atol=1e-15)
     assert np.allclose(b, 0, atol=1e-15)
-    assert np.allclose(c, np.abs(v) * surface.lever, rtol=1e-12)
+    assert np.allclose(c, np.abs(v) * [link.lever for link in surface.links], rtol=1e-12)
     mean = surface_speed(robot, surface, q, v, "mean")
     assert np.allclose(c, mean, rtol=5e-4)
 
@@ -205,7 +205,7 @@ def test_a_mimic_joint_drives_its_link_by_its_multiple_of_the_leader(tmp_path):
     surface = Surface.of(robot)
     q, v = motion(robot)
     _, b, c = terms(robot, surface, q, v)
-    assert np.allclose(c, np.abs(v) * [1, 3] * surface.lever, rtol=1e-12)
+    assert np.allclose(c, np.abs(v) * [1, 3] * [link.lever for link in surface.links], rtol=1e-12)
     assert b[:, 1].all()
 
 
