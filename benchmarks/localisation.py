@@ -19,7 +19,6 @@ from typing import Any
 import noisemodel as nm
 from inspector.localisation.localise import Localisation, fault_links, localise
 from noiseclassifier.scenarios import ROBOTS, ScenarioError, SimulationError, simulate
-from noiseclassifier.scenarios.robots import limbs
 from noisemodel.noise import LinkNoise, link_noise
 
 SCENARIOS = (
@@ -71,16 +70,19 @@ def labelled(run: nm.Run) -> Iterator[tuple[dict[str, Any], nm.Block]]:
 
 def limb_of(robot: str, event: dict[str, Any]) -> tuple[str, ...]:
     """Joints of the limb on which an event acts; empty if it acts on more than one."""
-    parts, facts = limbs(robot), event["facts"]
-    if not parts:
-        return ROBOTS[robot].drives.joints
+    drives, effectors, facts = ROBOTS[robot].drives.joints, ROBOTS[robot].effectors, event["facts"]
+    if len(effectors) == 1:
+        return drives
     if "base." in event["cause"]:
         return ()
-    shares = facts.get("effectors", ())
-    alone = [index for index, share in enumerate(shares) if share]
+    alone = [index for index, share in enumerate(facts.get("effectors", ())) if share]
     effector = facts.get("effector", alone[0] if len(alone) == 1 else None)
-    frames = [one.frame for one in ROBOTS[robot].effectors]
-    return () if effector is None else parts[frames[effector]]
+    if effector is None:
+        return ()
+    model = nm.Robot.load(robot).model
+    carrier = model.frames[model.getFrameId(effectors[effector].frame)].parentJoint
+    way = [model.names[joint] for joint in model.supports[carrier]]
+    return tuple(name for name in way if name in drives)
 
 
 def links_of(robot: str, joints: tuple[str, ...]) -> set[str]:

@@ -28,8 +28,7 @@ from noiseclassifier.scenarios.faults import Imperfections, no_defect
 from noiseclassifier.scenarios.labels import annotate, unplanned
 from noiseclassifier.scenarios.motions import RATE, STEP, times
 from noiseclassifier.scenarios.robots import ROBOTS
-from noiseclassifier.scenarios.simulation import recorded
-from noiseclassifier.scenarios.table import SCENARIOS
+from noiseclassifier.scenarios.simulation import SCENARIOS, recorded
 from noiseclassifier.scenarios.world import reduced_model
 from noisemodel import Run, decimated
 

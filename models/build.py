@@ -26,7 +26,7 @@ from inspector.text import progress
 from inspector.training.train import ANY_RATE, evaluate, train
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
-from noiseclassifier.scenarios.dataset import Folder, Side, Task, choose, scenario_tasks, wide_tasks
+from noiseclassifier.scenarios.dataset import Folder, Side, Task, scenario_tasks, wide_tasks
 from noiseclassifier.scenarios.faults import octave
 from noiseclassifier.scenarios.labels import visible
 from noiseclassifier.scenarios.logs import kept, overlap
@@ -96,9 +96,9 @@ def main() -> None:
     tasks += wide_tasks(first=FAST, seeds=1, throughout=THROUGHOUT)
     wide = timed("simulate domains", simulate, build / "domains", tasks, given.jobs, wide=True)
     seeds = max(1, round(SEEDS * given.seeds / DOMAINS))
-    learnt = scenario_tasks(choose(HOME), seeds=seeds)
+    learnt = scenario_tasks(HOME, seeds=seeds)
     home = timed("simulate home", simulate, build / "home", learnt, given.jobs)
-    fresh = scenario_tasks(choose(TEST), first=FIRST, seeds=1)
+    fresh = scenario_tasks(TEST, first=FIRST, seeds=1)
     test = timed("simulate the test", simulate, build / "home-test", fresh, given.jobs)
     sources = [timed(f"logs at {rate:g} Hz", logs, wide, build, rate, "source") for rate in RATES]
     inputs = [*sources, home.path]
@@ -149,8 +149,8 @@ def logs(wide: Folder, build: Path, rate: float, side: Side) -> Path:
     path = build / f"{side}-{rate:g}"
     if not path.exists():
         part = path.with_suffix(".part")
-        found = dataset.logs(wide, copies=COPIES if rate >= 1000.0 else 1, rate=rate, side=side)
-        for _ in dataset.write_logs(found, part):
+        copies = COPIES if rate >= 1000.0 else 1
+        for _ in dataset.write_logs(wide, part, copies=copies, rate=rate, side=side):
             pass
         part.rename(path)
     return path

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.domains import RATES, SETTINGS, Domain, Limits, Logger, listing
+from noiseclassifier.scenarios.domains import RATES, SETTINGS, Domain, Limits, Logger
 
 FREE = Limits()
 
@@ -87,11 +87,3 @@ def test_a_part_of_the_domains_is_never_learnt_from():
     assert all(d.target == (d.control == "impedance") for d in domains())
     shares = np.mean([log.target for log in loggers(500)])
     assert 0.05 < shares < 0.4
-
-
-def test_it_prints_each_range_with_its_source():
-    lines = listing().splitlines()
-    assert len(lines) == 1 + len(SETTINGS)
-    row = next(line for line in lines if line.startswith("gear"))
-    assert row.split()[:3] == ["gear", "30", "160"]
-    assert "real Panda" in row

@@ -10,18 +10,17 @@ from simulated import simulated
 
 from noiseclassifier.scenarios.dataset import Folder, Task
 from noiseclassifier.scenarios.domains import Logger
-from noiseclassifier.scenarios.errors import DatasetError
 from noiseclassifier.scenarios.faults import Imperfections
 from noiseclassifier.scenarios.logs import logged, visible
-from noiseclassifier.scenarios.motions import PUSH
+from noiseclassifier.scenarios.motions import PUSH, DatasetError
 from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.simulation import (
+    FAULTS,
     GOOD,
     WIDE_RECIPE,
     Start,
     _setup,
 )
-from noiseclassifier.scenarios.table import FAULTS
 from noiseclassifier.scenarios.world import configuration, real_model, reduced_model
 from noisemodel import Run
 

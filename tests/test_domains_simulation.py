@@ -15,7 +15,6 @@ from noiseclassifier.scenarios.dataset import (
     Folder,
     Task,
     described,
-    logs,
     make,
     side_of,
     statistics,
@@ -23,15 +22,15 @@ from noiseclassifier.scenarios.dataset import (
     write_logs,
 )
 from noiseclassifier.scenarios.domains import Domain, Limits, Logger
-from noiseclassifier.scenarios.errors import DivergedError
+from noiseclassifier.scenarios.motions import SimulationError
 from noiseclassifier.scenarios.robots import TARGETS, WIDE
 from noiseclassifier.scenarios.simulation import (
     GOOD,
+    THROUGHOUT,
     _changed,
     _refuse_rattling,
     faults_of,
 )
-from noiseclassifier.scenarios.table import THROUGHOUT
 from noisemodel import Block, Run
 
 simulate = partial(scenarios.simulate, wide=True)
@@ -149,7 +148,7 @@ def test_a_robot_that_rattles_without_a_fault_is_no_good_run():
     time = np.arange(20_000) / 10_000
     smooth = np.sin(2 * np.pi * 0.5 * time)[:, None] * np.ones(3)
     _refuse_rattling(smooth)
-    with pytest.raises(DivergedError, match="it rattles without a fault, at .* rad/s"):
+    with pytest.raises(SimulationError, match="it rattles without a fault, at .* rad/s"):
         _refuse_rattling(smooth + np.sin(2 * np.pi * 90 * time)[:, None])
 
 
@@ -191,8 +190,6 @@ def test_a_fault_may_be_of_every_seed_besides_those_that_are_drawn():
     [
         ({"robots": ["go2"], "always": ["push"]}, "no fault 'push' of go2"),
         ({"robots": ["pandda"]}, r"did you mean 'panda'"),
-        ({"first": 0}, "the first seed is 0, expected 10000 or more"),
-        ({"seeds": 0}, "0 seeds with 2 faults each and 0 of whole runs, expected 1 or"),
     ],
 )
 def test_bad_requests_are_refused(arguments, problem):
@@ -203,7 +200,7 @@ def test_bad_requests_are_refused(arguments, problem):
 def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypatch, tmp_path):
     def fall(robot, fault, seed, **_):
         if fault == GOOD and seed == 10_001:
-            raise scenarios.SimulationError(robot, fault, seed, 1.0, "it fell")
+            raise SimulationError(1.0, "it fell")
         time = np.arange(4000) / 2000
         still = np.zeros((4000, 1), dtype=np.float32)
         return Run(
@@ -225,7 +222,7 @@ def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypat
     assert folder.missing(wanted) == []
     text = described(statistics(folder))
     assert "4 runs, 1 of which fell" in text
-    names = [name for name, _ in write_logs(logs(folder, rate=500.0), tmp_path / "logs")]
+    names = [name for name, _ in write_logs(folder, tmp_path / "logs", rate=500.0)]
     assert names == ["ur5/good-10000", "ur5/tone-10000"]
     assert Run.load(tmp_path / "logs/ur5/tone-10000.npz").rate == pytest.approx(500.0)
 
@@ -233,7 +230,7 @@ def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypat
 def test_a_folder_without_runs_has_no_logs(tmp_path):
     folder = Folder.opened(tmp_path, wide=True)
     with pytest.raises(scenarios.DatasetError, match="holds no run; `inspector simulate domains`"):
-        next(logs(folder))
+        next(write_logs(folder, tmp_path))
 
 
 def test_targets_are_robots_domains_and_loggers_apart():
@@ -256,7 +253,7 @@ def test_robots_that_move_in_no_other_test_have_a_good_run_among_their_first_see
     for seed in range(10_000, 10_006):
         try:
             run = simulate(robot, GOOD, seed, duration=SECONDS)
-        except scenarios.SimulationError:
+        except SimulationError:
             continue
         assert np.isfinite(run.velocity).all()
         assert run.joint_names == WIDE[robot].drives.joints

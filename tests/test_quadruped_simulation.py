@@ -14,8 +14,7 @@ from noiseclassifier.scenarios.motions import Trot
 from noiseclassifier.scenarios.quadruped import plan as planned
 from noiseclassifier.scenarios.quadruped import scene, stand
 from noiseclassifier.scenarios.robots import WIDE
-from noiseclassifier.scenarios.simulation import Start, _trial
-from noiseclassifier.scenarios.table import SCENARIOS
+from noiseclassifier.scenarios.simulation import SCENARIOS, Start, _trial
 from noiseclassifier.scenarios.world import reduced_model, sensors_of
 
 QUADRUPED = {

@@ -8,7 +8,6 @@ import pytest
 
 from noiseclassifier.scenarios.arm import KINDS, ReachPlan, Tool, plan
 from noiseclassifier.scenarios.domains import arm_motion
-from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import SLOW, Defect, Faults, no_defect
 from noiseclassifier.scenarios.labels import deviation
 from noiseclassifier.scenarios.motions import (
@@ -23,8 +22,7 @@ from noiseclassifier.scenarios.motions import (
     minimum_jerk,
 )
 from noiseclassifier.scenarios.robots import WIDE, Arm
-from noiseclassifier.scenarios.simulation import Start, Trial, _trial
-from noiseclassifier.scenarios.table import FAULTS, ON_DRIVES, suited
+from noiseclassifier.scenarios.simulation import FAULTS, ON_DRIVES, Start, Trial, _trial, suited
 from noiseclassifier.scenarios.world import reduced_model
 
 OWN = {n: each for n, each in FAULTS["arm"].items() if n not in ON_DRIVES}
@@ -149,16 +147,6 @@ def test_an_emergency_stop_brakes_within_a_fifth_of_a_second():
     for stop in one.stops:
         halted = speed[round((stop + 0.21) / TICK) : round((stop + 0.45) / TICK)]
         assert halted.max(initial=0.0) < 1e-3
-
-
-def test_an_unknown_kind_of_motion_is_refused():
-    with pytest.raises(ScenarioError, match=r"kind 'dance' is unknown; there are minimum"):
-        reach(kind="dance")
-
-
-def test_an_arm_without_a_table_cannot_pick():
-    with pytest.raises(ScenarioError, match=r"so101 has no table to pick from"):
-        plan(SO101, Picks(), RNG(0), 3.0)
 
 
 def follows(one: Trial, arm: Arm) -> None:

@@ -12,7 +12,7 @@ from noiseclassifier.scenarios.drives import DomainDrives, Drives
 from noiseclassifier.scenarios.faults import NO_DRIVE_FAULT, DriveFault, Imperfections
 from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, Event, Plan
 from noiseclassifier.scenarios.robots import WIDE, Arm, Drivetrain
-from noiseclassifier.scenarios.table import ON_DRIVES
+from noiseclassifier.scenarios.simulation import ON_DRIVES
 from noiseclassifier.scenarios.world import real_model
 
 PANDA = WIDE["panda"]

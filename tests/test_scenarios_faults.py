@@ -12,7 +12,7 @@ from noiseclassifier.scenarios.humanoid import plan as humanoid_plan
 from noiseclassifier.scenarios.motions import Picks, Trot, Walk
 from noiseclassifier.scenarios.quadruped import plan as quadruped_plan
 from noiseclassifier.scenarios.robots import WIDE
-from noiseclassifier.scenarios.table import FAULTS
+from noiseclassifier.scenarios.simulation import FAULTS
 
 TIME = np.arange(70_000) * 1e-4
 TALOS, G1, GO2, SOLO12, ANYMAL = (WIDE[name] for name in ("talos", "g1", "go2", "solo12", "anymal"))

@@ -5,7 +5,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.motions import Box, Sole, Tip
 from noiseclassifier.scenarios.world import (
     box_changes,
@@ -199,16 +198,3 @@ def test_boxes_appear_and_vanish():
     assert (built.geom_contype[late], built.geom_contype[built.geom("box0").id]) == (0, 2)
     set_collision(built, late, present=True)
     assert built.geom_contype[late] == 2
-
-
-def test_an_effector_without_its_frame_is_refused_with_the_known_frames():
-    model = pin.buildModelFromXML(ODD)
-    with pytest.raises(ScenarioError, match="no frame 'sole' for an effector; it has .*slide"):
-        build(model, **physics(model.nv), effectors=(Tip("sole", radius=0.01),))
-
-
-def test_a_body_without_mass_is_refused():
-    model = pin.buildModelFromXML(ODD)
-    model.inertias[2] = pin.Inertia.Zero()
-    with pytest.raises(ScenarioError, match="MuJoCo refuses the robot: .*slide"):
-        build(model, **physics(model.nv))

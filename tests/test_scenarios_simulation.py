@@ -12,13 +12,11 @@ import pytest
 from simulated import simulated
 
 from noiseclassifier import scenarios
-from noiseclassifier.scenarios import dataset, simulation
-from noiseclassifier.scenarios.dataset import Folder, Task
+from noiseclassifier.scenarios import simulation
 from noiseclassifier.scenarios.faults import multisine, obstacles
 from noiseclassifier.scenarios.labels import deviation
 from noiseclassifier.scenarios.motions import Picks
-from noiseclassifier.scenarios.simulation import digest
-from noiseclassifier.scenarios.table import Case
+from noiseclassifier.scenarios.simulation import Case
 from noisemodel import Run
 
 SEEDS = (5, 10)
@@ -217,9 +215,8 @@ def test_a_run_that_diverges_is_refused(monkeypatch, tmp_path):
     with pytest.raises(
         scenarios.SimulationError,
         match=r"nervous in scenario 'straight' with seed 10 went out of control at -?\d\.\d{3} s",
-    ) as caught:
+    ):
         scenarios.simulate("nervous", "straight", 10, duration=SHORT)
-    assert caught.value.seed == 10
     assert list(tmp_path.iterdir()) == []  # MuJoCo leaves no log either
 
 
@@ -279,31 +276,3 @@ def test_the_table_has_the_papers_numbers_and_a_sentence_for_each_scenario():
             assert ". " not in text
         assert line.cases
         assert "ok" in line.labels
-
-
-def test_a_run_that_a_data_set_keeps_is_reproduced_whole_and_bit_for_bit(tmp_path, monkeypatch):
-    whole = simulated("panda", "obstacle-toe", 1, duration=SHORT)
-    folder, task = Folder.opened(tmp_path, duration=SHORT, rate=1000.0), Task("panda", "7", 1)
-    monkeypatch.setattr(dataset, "simulate", lambda *_, **__: whole)
-    monkeypatch.setattr(simulation, "simulate", lambda *_, **__: whole)
-    kept = folder.simulate(task)
-    assert (kept.rate, kept.effort, kept.stages) == (pytest.approx(1000.0), None, {})
-    assert digest(scenarios.reproduce(kept)) == digest(whole) == kept.meta["sha256"]
-    made = {**kept.meta, "sha256": "0" * 64, "recipe": 1, "versions": {"mujoco": "1.2.3"}}
-    with pytest.raises(
-        scenarios.ScenarioError,
-        match=r"panda/obstacle-toe-001 cannot be reproduced.* with recipe 1 \(mujoco 1\.2\.3\),"
-        r" here is recipe \d+ \(mujoco \d.*numpy",
-    ):
-        scenarios.reproduce(replace(kept, meta=made))
-
-
-def test_any_bit_of_a_run_changes_its_digest():
-    run = simulated("panda", "obstacle-toe", 1, duration=SHORT)
-    known = {digest(run), digest(replace(run, blocks=run.blocks[:1]))}
-    for name in ("velocity", "position_desired", "effort"):
-        changed = getattr(run, name).copy()
-        changed[7, 0] = np.nextafter(changed[7, 0], np.float32(9))
-        known.add(digest(replace(run, **{name: changed})))
-    assert len(known) == 5
-    assert digest(replace(run, meta={})) in known

@@ -4,8 +4,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from noiseclassifier.scenarios.errors import ScenarioError
-from noiseclassifier.scenarios.motions import Sole
 from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.world import WholeBody, reduced_model
 
@@ -106,17 +104,3 @@ def test_the_torques_of_a_robot_that_stands_leave_nothing_for_its_base(robot):
     residual = borne + np.concatenate((np.zeros(6), torque)) - gravity
     np.testing.assert_allclose(residual, 0, atol=1e-8)
     assert torque[3] == pytest.approx(torque[9], rel=0.05)  # one knee as the other
-
-
-def test_too_many_joints_are_refused():
-    model = pin.buildSampleModelHumanoidRandom()
-    with pytest.raises(
-        ScenarioError, match="1 effectors make 12 equations, the robot has .*; lock all"
-    ):
-        WholeBody(model, [Sole("rleg6_body", (0.1, 0.05))], pin.neutral(model))
-
-
-def test_a_missing_frame_is_named():
-    model = reduced_model(TALOS)
-    with pytest.raises(ScenarioError, match="no frame 'paw' to stand on; it has .*sole"):
-        WholeBody(model, [Sole("paw", (0.1, 0.05))], pin.neutral(model))

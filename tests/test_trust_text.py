@@ -154,13 +154,6 @@ def test_settings_of_a_data_set_that_are_none_are_one_line(tmp_path, settings):
     assert "\n" not in str(caught.value)
 
 
-def test_times_of_a_data_set_that_are_no_text_are_one_line(tmp_path):
-    folder = Folder.opened(tmp_path / "set")
-    (tmp_path / "set" / "times.csv").write_bytes(b"\xff\xfe")
-    with pytest.raises(DatasetError, match=r"times\.csv: cannot be read \(not text in UTF-8\)"):
-        folder.times()
-
-
 @pytest.mark.parametrize("name", ["a" * 10_000, "[" * 100_000, "q" + "9" * 5000, "a_" * 50_000])
 def test_a_long_name_is_that_of_no_signal_and_decided_at_once(name):
     assert column_signal(name) is None

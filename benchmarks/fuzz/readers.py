@@ -49,7 +49,7 @@ from inspector.reference.store import Reference, of_runs, save
 from inspector.training import tune
 from noiseclassifier import noisytest
 from noiseclassifier.scenarios import ScenarioError
-from noiseclassifier.scenarios.dataset import Folder, Task
+from noiseclassifier.scenarios.dataset import Folder
 from noiseclassifier.scenarios.simulation import SHORTEST
 from noisemodel import meshes, mjcf, runfile
 from noisemodel.surface import triangles
@@ -340,8 +340,7 @@ def _noisytest(folder: Path) -> Path:
 
 
 def _dataset(folder: Path) -> Path:
-    Folder.opened(folder / "set", duration=SHORTEST).save_time(Task("panda", "straight", 0), 1.0)
-    return folder / "set" / "dataset.json"
+    return Folder.opened(folder / "set", duration=SHORTEST).path / "dataset.json"
 
 
 def _mesh(name: str, content: str | bytes) -> Callable[[Path], Path]:
@@ -691,7 +690,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         "dataset.json": Reader(
             "text",
             _dataset,
-            lambda path: Folder.opened(path.parent, duration=SHORTEST).times(),
+            lambda path: Folder.opened(path.parent, duration=SHORTEST),
             (*SIMULATE, "-o", "{parent}"),
         ),
     }

@@ -41,16 +41,15 @@ app = typer.Typer(
 List = Annotated[bool, option("Print what there is, simulate nothing.", "--list")]
 To = Annotated[Path, option("The folder to write.", "--output", "-o")]
 Jobs = Annotated[int, option("Parallel runs.", "--jobs", "-j", min=1)]
-Seconds = Annotated[float | None, option("In seconds; by default the motion's.")]
+Seconds = Annotated[float | None, option("In seconds; by default the motion's.", min=3.0)]
 Names = Annotated[str, option("Names of robots, talos,go2,panda; by default all.")]
-First = Annotated[int, option("The first random seed.")]
 
 
 @app.command(epilog="Example: inspector simulate run talos --scenario 7 --seed 1 -o run.npz")
 def run(
     robot: Annotated[str, argument("A robot that --list prints.")] = "",
     scenario: Annotated[str, option("Name or number of a scenario.")] = "straight",
-    seed: Annotated[int, option("Random seed, at least 0.")] = 0,
+    seed: Annotated[int, option("Random seed.", min=0)] = 0,
     duration: Seconds = None,
     output: Annotated[Path, option("The file.", "--output", "-o")] = Path("run.npz"),
     list_: List = False,
@@ -79,31 +78,30 @@ def run(
 def dataset(
     robots: Annotated[str, option("Names of robots: talos,go2,panda.")],
     output: To,
-    seeds: Annotated[int, option("Seeds per robot and scenario.")] = 8,
-    first_seed: First = 0,
+    seeds: Annotated[int, option("Seeds per robot and scenario.", min=1)] = 8,
+    first_seed: Annotated[int, option("The first random seed.", min=0)] = 0,
     scenarios: Annotated[str, option("Names or numbers; by default all.")] = "",
     only: Annotated[Literal["ok"] | None, option("Only scenarios without a failure.")] = None,
-    rate: Annotated[float, option("At which runs are kept, in Hz.")] = 10_000.0,
+    rate: Annotated[
+        float, option("At which runs are kept, in Hz.", min=1.0, max=10_000.0)
+    ] = 10_000.0,
     duration: Seconds = None,
     jobs: Jobs = 1,
     dask: Dask = "",
-    overwrite: Annotated[bool, option("Replace damaged files; others stay.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Simulate a data set; resumes if killed: only missing runs are made."""
     from noiseclassifier.scenarios.dataset import (
         Folder,
-        choose,
         described,
         scenario_tasks,
         statistics,
     )
 
     where = jobs_or_dask(jobs, dask)
-    choice = choose(_listed(robots), _listed(scenarios), healthy=only is not None)
-    tasks = scenario_tasks(choice, first=first_seed, seeds=seeds)
+    names, numbers = _listed(robots), _listed(scenarios)
+    tasks = scenario_tasks(names, numbers, healthy=only is not None, first=first_seed, seeds=seeds)
     folder = Folder.opened(output, duration=duration, rate=rate)
-    folder.clear(overwrite=overwrite)
     _make(folder, folder.missing(tasks), where)
     found = statistics(folder)
     typer.echo(json.dumps(found, indent=2) if as_json else f"{output}: {described(found)}")
@@ -113,23 +111,24 @@ def dataset(
 def domains(
     output: To = Path(),
     robots: Names = "",
-    seeds: Annotated[int, option("Seeds per robot; each draws a domain.")] = 8,
-    first_seed: First = 10_000,
-    faults: Annotated[int, option("Faulty runs per robot and seed.")] = 2,
+    seeds: Annotated[int, option("Seeds per robot; each draws a domain.", min=1)] = 8,
+    first_seed: Annotated[int, option("The first random seed.", min=10_000)] = 10_000,
+    faults: Annotated[int, option("Faulty runs per robot and seed.", min=0)] = 2,
     always: Annotated[str, option("Faults of every robot that can have them.")] = "",
-    throughout: Annotated[int, option("Faults of whole runs, per robot and seed.")] = 0,
+    throughout: Annotated[
+        int, option("Faults of whole runs, per robot and seed.", min=0, max=6)
+    ] = 0,
     jobs: Jobs = 1,
     list_: List = False,
 ) -> None:
     """Simulate wide domains: many robots, drives, controllers, motions; resumes if killed."""
     from noiseclassifier.scenarios.dataset import Folder, described, statistics, wide_tasks
-    from noiseclassifier.scenarios.domains import listing
     from noiseclassifier.scenarios.robots import TARGETS, WIDE
 
     if list_ or output == Path():
         sources = [robot for robot in WIDE if robot not in TARGETS]
         typer.echo(f"{len(sources)} robots to learn from: {', '.join(sources)}")
-        typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}\n\n{listing()}")
+        typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}")
         return
     chosen = wide_tasks(
         _listed(robots),
@@ -157,13 +156,12 @@ def logs(
 ) -> None:
     """Write logs of wide domains: ripple, sensing and sampling, with labels decided anew."""
     from noiseclassifier.scenarios.dataset import Folder, write_logs
-    from noiseclassifier.scenarios.dataset import logs as logs_of
 
     if not data.is_dir():
         raise typer.BadParameter(f"{data}: there is no such folder")
     folder = Folder.opened(data, wide=True, any_recipe=True)
     rates, labelled, lost = Counter[float](), 0, 0
-    for _, run in write_logs(logs_of(folder, copies=copies, rate=rate, side=side), output):
+    for _, run in write_logs(folder, output, copies=copies, rate=rate, side=side):
         rates[run.rate] += 1
         labelled += sum(event["labelled"] > 0 for event in run.meta["events"])
         lost += sum(not event["labelled"] for event in run.meta["events"])

@@ -1,9 +1,8 @@
 """Labelled runs of simulated robots, with and without defects."""
 
-from noiseclassifier.scenarios.errors import DatasetError, ScenarioError, SimulationError
+from noiseclassifier.scenarios.motions import DatasetError, ScenarioError, SimulationError
 from noiseclassifier.scenarios.robots import ROBOTS
-from noiseclassifier.scenarios.simulation import reproduce, simulate
-from noiseclassifier.scenarios.table import SCENARIOS, Scenario
+from noiseclassifier.scenarios.simulation import SCENARIOS, Scenario, simulate
 
 __all__ = [
     "ROBOTS",
@@ -12,6 +11,5 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "SimulationError",
-    "reproduce",
     "simulate",
 ]

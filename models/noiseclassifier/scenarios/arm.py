@@ -9,7 +9,6 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
-from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Faults, Imperfections
 from noiseclassifier.scenarios.loop import Control, Reference, Scene, force
 from noiseclassifier.scenarios.motions import (
@@ -20,6 +19,7 @@ from noiseclassifier.scenarios.motions import (
     Picks,
     Plan,
     Reach,
+    ScenarioError,
     Tip,
     Units,
     bump,
@@ -147,10 +147,6 @@ Movement: TypeAlias = Callable[[float], Array]
 
 def reach(arm: Arm, motion: Reach, rng: np.random.Generator, duration: float) -> ReachPlan:
     """Plan of movements, one after the other."""
-    if motion.kind not in KINDS:
-        raise ScenarioError(
-            f"motion of kind {motion.kind!r} is unknown; there are {', '.join(KINDS)}"
-        )
     ability = Ability.of(arm)
     moving, stopping, loading = rng.spawn(3)
     parts = [np.tile(ability.rest, (round(motion.stand / TICK), 1))]
@@ -409,8 +405,6 @@ class Segment:
 
 def pick(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> PickPlan:
     """Plan of picks, one after the other."""
-    if arm.reach is None:
-        raise ScenarioError(f"{arm.name} has no table to pick from")
     table, area = arm.table, arm.reach
     x, y, z = Tool(arm).place(np.array(arm.rest)).tolist()
     segments = [Segment(0.2, (x, y, z), 0.0)]

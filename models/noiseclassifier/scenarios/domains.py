@@ -228,18 +228,6 @@ LIMITS = {family: Limits(**each) for family, each in _TABLE["limits"].items()}
 WALKS = {name: Walk(**each) for name, each in (_TABLE["mild"] | _TABLE["wild"]).items()}
 
 
-def listing() -> str:
-    """All settings with their ends, as a table."""
-    rows = [("setting", "mild", "wild", "unit", "what", "source")]
-    for name, each in SETTINGS.items():
-        mild, wild = (f"{end:g}" for end in each["ends"])
-        rows.append((name, mild, wild, each.get("unit", ""), each["text"], each["source"]))
-    return "\n".join(
-        f"{name:16}{mild:>8}{wild:>8} {unit:6}{text:50}{source}"
-        for name, mild, wild, unit, text, source in rows
-    )
-
-
 PICKS = 0.35  # share of motions that are picks
 SLOWEST = 0.05  # lowest peak speed of a joint in a movement, in [rad/s]
 FASTEST = (0.5, 2.5)  # highest peak speed, mild and wild, in [rad/s]

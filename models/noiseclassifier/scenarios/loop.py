@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 
 from noiseclassifier.scenarios.drives import Drives
-from noiseclassifier.scenarios.errors import DivergedError
 from noiseclassifier.scenarios.labels import APART, IMPACT
 from noiseclassifier.scenarios.motions import (
     STEP,
@@ -23,6 +22,7 @@ from noiseclassifier.scenarios.motions import (
     Load,
     Payload,
     Push,
+    SimulationError,
     minimum_jerk,
 )
 from noiseclassifier.scenarios.world import set_collision
@@ -255,7 +255,7 @@ class Scene:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Recording:
     """The recorded signals, before rounding; of a fixed base, the last two have no columns."""
 
     position: Array  # as the drives report it, shape (samples, joints), in [rad]
@@ -275,9 +275,9 @@ class Motion:
         base = [7, 6] if floating else [0, 0]
         return cls(*(np.zeros((samples, width)) for width in [*[joints] * 7, effectors, *base]))
 
-    def since(self, sample: int) -> "Motion":
+    def since(self, sample: int) -> "Recording":
         """The signals from a sample on."""
-        return Motion(*(getattr(self, field.name)[sample:] for field in fields(self)))
+        return Recording(*(getattr(self, field.name)[sample:] for field in fields(self)))
 
 
 def _between(before: Reference, after: Reference) -> tuple[Array, Array, Array]:
@@ -294,7 +294,7 @@ def record(
     encoder_error: Array,
     sensor_error: Array,
     overlay: Array | None = None,
-) -> Motion:
+) -> Recording:
     """Simulate a robot, with errors of encoders and sensors of shapes (samples or ticks, values).
 
     The overlay is added to the reference of the drives: heights of the effectors and their rates,
@@ -305,7 +305,7 @@ def record(
     data.qpos[:] = scene.start
     samples, joints = encoder_error.shape
     base = model.nq - joints
-    motion = Motion.empty(samples, joints, scene.effectors, floating=base > 0)
+    motion = Recording.empty(samples, joints, scene.effectors, floating=base > 0)
     joint_position, joint_velocity = data.qpos[-joints:], data.qvel[-joints:]
     base_pose, base_velocity = data.qpos[:base], data.qvel[:-joints]
     effector_force, sensed = data.sensordata[: scene.effectors], data.sensordata
@@ -342,7 +342,7 @@ def record(
         time = (tick + 1 - scene.settling) * TICK
         fastest = np.abs(joint_velocity).max()
         if not fastest < FASTEST:  # also true of NaN
-            raise DivergedError(time, f"a joint moved at {fastest:.3g} rad/s")
+            raise SimulationError(time, f"a joint moved at {fastest:.3g} rad/s")
         if scene.fallen(sensors):
-            raise DivergedError(time, "it fell")
+            raise SimulationError(time, "it fell")
     return motion.since(scene.settling * STEPS)

@@ -1,7 +1,8 @@
-"""What plans are made of: clocks, paths, shapes, contacts, loads, motions as data; and plans."""
+"""What plans are made of: clocks, paths, shapes, contacts, loads, motions as data; and errors."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from typing import Any, Self, TypeAlias
 
 import numpy as np
@@ -13,6 +14,33 @@ STEPS = 10  # samples per tick
 STEP = TICK / STEPS  # time between two samples, in [s]
 RATE = round(1 / STEP)  # samples per second, in [Hz]
 Signal: TypeAlias = Callable[[Array], Array]  # from times, in [s], to values, shape (times, ...)
+
+
+class ScenarioError(ValueError):
+    """The base of every error that `scenarios` expects."""
+
+
+class DatasetError(ScenarioError):
+    """A data set that cannot be made, or a file of one that cannot be read."""
+
+
+class SimulationError(ScenarioError):
+    """A run that diverged, or in which the robot fell, at a time in [s]."""
+
+    def __init__(self, time: float, problem: str, run: str = "the robot") -> None:
+        self.time, self.problem = time, problem
+        super().__init__(
+            f"{run} went out of control at {time:.3f} s ({problem});"
+            " such a run is not used, take another seed"
+        )
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> ScenarioError:
+    """The error for a name that is not known, with the closest one as a hint."""
+    known = list(known)
+    close = get_close_matches(name, known, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return ScenarioError(f"{what}{hint}; there are {', '.join(known)}")
 
 
 def times(count: int, step: float) -> Array:

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Faults, Imperfections
 from noiseclassifier.scenarios.loop import Reference, Scene
 from noiseclassifier.scenarios.motions import (
@@ -56,16 +55,17 @@ class Gait:
 
 
 TROT = Gait((0, 1, 1, 0), 0.62, level=True)  # diagonal pairs
+STAND = "stand"  # name of the gait without steps
 GAITS: Mapping[str, Gait] = MappingProxyType(
     {
         "trot": TROT,
         "walk": Gait((1, 3, 0, 2), 0.8, period=1.8),
         "pace": Gait((0, 1, 0, 1), 0.62, period=0.9),
-        "bound": Gait((0, 0, 1, 1), 0.62, period=0.9),
+        STAND: TROT,  # without a step
     }
 )
 """By name: "walk" is the lateral sequence, one foot at a time: rear left, front left, rear right,
-front right; a "pace" is by sides; a "bound" is front and rear in turn."""
+front right; a "pace" is by sides."""
 
 
 @dataclass(frozen=True)
@@ -311,7 +311,6 @@ def _stand(name: str, rest: tuple[float, ...], feet: tuple[Tip, ...], model: Any
 
 
 REST = 0.5  # time of standing before and after the trot, in [s]
-STAND = "stand"  # name of the gait without steps
 CYCLES = 2.5  # least time from one pause to the next, in periods; a short run has fewer pauses
 
 
@@ -334,7 +333,7 @@ def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: flo
     """Plan of a gait from rest to rest."""
     standing = stand(robot)
     shapes, steering, bending = rng.spawn(3)
-    gait = _gait(motion.gait)
+    gait = GAITS[motion.gait]
     height = robot.height * float(shapes.uniform(*motion.height))
     period = gait.period * robot.period * float(shapes.uniform(*motion.period))
     bouts = [
@@ -388,14 +387,6 @@ def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: flo
         size=size,
         weight=weight,
     )
-
-
-def _gait(name: str) -> Gait:
-    if name == STAND:
-        return TROT
-    if name not in GAITS:
-        raise ScenarioError(f"no gait {name!r}; there are {', '.join((*GAITS, STAND))}")
-    return GAITS[name]
 
 
 def _bouts(

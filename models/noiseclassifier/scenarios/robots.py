@@ -3,14 +3,12 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from math import pi, sqrt
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
 from noiseclassifier.scenarios.motions import Effector, Sole, Tip, Units, multiplied
-from noisemodel import Robot
 
 LEGS = 12  # how many of a humanoid's drives, the first ones, are in its legs
 UPPER = {
@@ -330,18 +328,3 @@ ROBOTS: Mapping[str, Simulated] = MappingProxyType(
 """The robots of the scenarios, by name."""
 TARGETS = ("xarm7", "tiago_no_hand", "a1", "hyq", "talos")
 """Robots that are never trained on, by choice or by licence (docs/robots.md)."""
-
-
-@lru_cache(maxsize=8)
-def limbs(name: str) -> Mapping[str, tuple[str, ...]]:
-    """Driven joints from the base to each effector of a robot."""
-    robot, model = ROBOTS[name], Robot.load(name).model
-    if len(robot.effectors) == 1:
-        return {}
-    carriers = {each.frame: model.getFrameId(each.frame) for each in robot.effectors}
-    ways = {
-        frame: [model.names[joint] for joint in model.supports[model.frames[carrier].parentJoint]]
-        for frame, carrier in carriers.items()
-    }
-    moved = robot.drives.joints
-    return {frame: tuple(name for name in way if name in moved) for frame, way in ways.items()}

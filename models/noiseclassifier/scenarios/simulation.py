@@ -1,28 +1,44 @@
-"""Labelled runs, from a robot, a scenario or a fault of wide domains, and a seed."""
+"""The scenarios and faults of table.toml, and labelled runs of a robot with one of them."""
 
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import import_module
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 import numpy as np
 
+from noiseclassifier.scenarios import faults
 from noiseclassifier.scenarios.domains import LIMITS, MOTIONS, Domain
 from noiseclassifier.scenarios.drives import LOAD_SHARE, DomainDrives, Drives
-from noiseclassifier.scenarios.errors import DivergedError, ScenarioError, SimulationError, unknown
-from noiseclassifier.scenarios.faults import Defect, Faults, Imperfections, no_defect
+from noiseclassifier.scenarios.faults import Defect, Faults, Imperfections, Rng, no_defect
 from noiseclassifier.scenarios.labels import RULE, annotate, unplanned
-from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, Event, Plan, multiplied, times
-from noiseclassifier.scenarios.robots import ROBOTS, WIDE, Simulated
-from noiseclassifier.scenarios.table import FAULTS, SCENARIOS, THROUGHOUT, Scenario, suited
+from noiseclassifier.scenarios.motions import (
+    RATE,
+    STEP,
+    STEPS,
+    Event,
+    Motion,
+    Picks,
+    Plan,
+    Reach,
+    ScenarioError,
+    SimulationError,
+    Stand,
+    Trot,
+    Walk,
+    multiplied,
+    times,
+    unknown,
+)
+from noiseclassifier.scenarios.robots import ROBOTS, WIDE, Simulated, settings
 from noisemodel import Run, decimated
 from noisemodel.types import Array
 
 if TYPE_CHECKING:
-    from noiseclassifier.scenarios.loop import Motion, Scene
+    from noiseclassifier.scenarios.loop import Recording, Scene
 
 RECIPE, WIDE_RECIPE, FIRST_WIDE_RECIPE = 3, 3, 2
 """Versions of the simulations; they increase whenever a seed gives another run than before.
@@ -43,6 +59,119 @@ SAME = 0.1  # contacts of a run and of its twin are the same if they start so cl
 RATTLE = 0.15
 """Share of a fault-free motion above ``FAST`` from which on its drives rattle: no good run."""
 FAST, AUDIBLE = 40.0, 0.3  # lowest frequency of rattling, in [Hz], and its least level, in [rad/s]
+
+
+# The table.
+
+BANDS: tuple[tuple[int, int], ...] = (
+    (20, 30), (30, 40), (40, 50), (50, 60), (60, 100), (100, 150), (150, 250), (250, 350),
+    (900, 1000),
+)  # fmt: skip
+"""The paper's bands of oscillation, in [Hz]."""
+KINDS = {"humanoid": Walk, "quadruped": Trot, "arm": Picks}  # of motions in scenarios, by family
+_EACH = "each-band"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scenario for one family of robots."""
+
+    motion: Motion
+    defect: Defect = no_defect
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One line of the table."""
+
+    number: int
+    name: str
+    description: str
+    labels: tuple[str, ...]
+    cases: Mapping[str, Case]
+
+    @property
+    def healthy(self) -> bool:
+        """Whether it has no failure."""
+        return self.labels == ("ok",)
+
+
+def _defect(given: Mapping[str, Any], band: tuple[int, int]) -> Defect:
+    """A kind of fault with its settings, of which some are in units of the robot."""
+    own = dict(given)
+    kind, units = getattr(faults, own.pop("kind")), own.pop("units", {})
+    if "bands" in own:
+        own["bands"] = BANDS if own["bands"] == "all" else (band,)
+
+    def scaled(rng: Rng, plan: Plan) -> Faults:
+        sizes = {
+            name: multiplied(own[name], getattr(plan.units, unit)) for name, unit in units.items()
+        }
+        found: Faults = kind(rng, plan, **own | sizes)
+        return found
+
+    return scaled if units else partial(kind, **own)
+
+
+def _defects(table: Mapping[str, Any]) -> dict[str, Defect]:
+    return {own: _defect(each, band) for name, each in table.items() for own, band in _named(name)}
+
+
+def _named(name: str) -> Iterator[tuple[str, tuple[int, int]]]:
+    """A name, or one for each of the paper's bands."""
+    for low, high in BANDS if _EACH in name else BANDS[:1]:
+        yield name.replace(_EACH, f"{low}-{high}"), (low, high)
+
+
+def _scenarios(given: Mapping[str, Any]) -> Iterator[Scenario]:
+    for number, (name, band) in enumerate(_named(given["name"]), start=given["number"]):
+        cases = {
+            family: Case(
+                KINDS[family](**each.get("motion", {})),
+                _defect(each["fault"], band) if "fault" in each else no_defect,
+                each.get("description", ""),
+            )
+            for family, each in given.items()
+            if family in KINDS
+        }
+        description = given["description"].replace(_EACH, "{} to {}".format(*band))
+        labels = ("ok", *given.get("labels", "").split())
+        yield Scenario(number, name, description, labels, MappingProxyType(cases))
+
+
+_TABLE = settings("table.toml")
+SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
+    {line.name: line for given in _TABLE["scenario"] for line in _scenarios(given)}
+)
+"""All scenarios, by name."""
+ON_DRIVES, THROUGHOUT = _defects(_TABLE["drives"]), _defects(_TABLE["throughout"])
+"""Faults of drives of every family, for a while and from the first sample to the last, by name."""
+FAULTS: Mapping[str, Mapping[str, Defect]] = MappingProxyType(
+    {family: ON_DRIVES | _defects(own) for family, own in _TABLE["wide"].items()}
+)
+"""Faults of wide domains by family and name: of drives and commands, and the family's own."""
+
+
+def suited(family: str, motion: Any) -> tuple[str, ...]:
+    """Names of the faults of a family that can act in a motion."""
+    idle: tuple[str, ...] = ()
+    on_contact = ("obstacle", "giving-way", "force-gain", "force-jump")
+    if isinstance(motion, Reach):
+        idle = on_contact
+    elif isinstance(motion, Picks):
+        idle = ("joint-stop", *(on_contact if motion.way == "directions" else ()))
+    elif isinstance(motion, Trot) and motion.gait == "stand":
+        steps = ("underfoot", "step_down")
+        idle = tuple(name for name, own in _TABLE["wide"][family].items() if own["kind"] in steps)
+    elif isinstance(motion, Stand):
+        idle = ("edge", *(name for name in FAULTS[family] if name.startswith("obstacle")))
+    elif family == "humanoid" and not motion.walk.drop:
+        idle = ("edge",)
+    return tuple(name for name in FAULTS[family] if name not in idle)
+
+
+# One run.
 
 
 @dataclass(frozen=True)
@@ -77,7 +206,7 @@ class Setup:
 class Trial:
     """One simulated run without labels."""
 
-    motion: "Motion"
+    motion: "Recording"
     events: tuple[Event, ...]
     contacts: tuple[Event, ...]
     faults: Faults
@@ -116,8 +245,9 @@ def simulate(
     try:
         twin = _twin(start, duration)
         trial = twin if defect is no_defect else _trial(start, defect, duration)
-    except DivergedError as error:
-        raise SimulationError(robot, name, seed, error.time, error.problem) from error
+    except SimulationError as error:
+        run = f"{robot} in scenario {name!r} with seed {seed}"
+        raise SimulationError(error.time, error.problem, run) from error
     events = (*trial.events, *trial.contacts)
     if wide:  # soft legs scuff
         events = () if trial is twin else (*trial.events, *_further(trial, twin))
@@ -131,7 +261,7 @@ def simulate(
         "defect": dict(trial.faults.facts),
         "events": [trace.record() for trace in traces],
         "labelling": asdict(RULE),
-        **(_facts_of_domain if wide else _facts_of_scenario)(start, name, trial),
+        **_facts(start, name, trial),
     }
     facts = {"robot": robot, "blocks": blocks, "meta": meta}
     if not wide:
@@ -144,8 +274,13 @@ Found = tuple[Start, str, Defect, float]  # start, name of the scenario, defect,
 
 
 def _in_scenarios(robot: str, scenario: str, seed: int, duration: float | None) -> Found:
-    entry, simulated = look_up(robot, scenario)
-    case = entry.cases[simulated.family]
+    entry, family = scenario_of(scenario), robot_of(robot).family
+    if family not in entry.cases:
+        own = [name for name, other in SCENARIOS.items() if family in other.cases]
+        raise ScenarioError(
+            f"scenario {entry.name!r} does not exist for {robot!r}; it has {', '.join(own)}"
+        )
+    case = entry.cases[family]
     duration = case.motion.duration if duration is None else duration
     if seed < 0:
         raise ScenarioError(f"seed {seed}: expected an integer of at least 0")
@@ -167,18 +302,16 @@ def _in_wide_domains(robot: str, fault: str, seed: int, duration: float | None) 
     return Start(robot, seed), fault, defect, DURATION if duration is None else duration
 
 
-def _facts_of_scenario(start: Start, name: str, trial: Trial) -> dict[str, Any]:
-    return {
-        "number": SCENARIOS[name].number,
-        "recipe": RECIPE,
-        "motion": asdict(start.motion),
-        "imperfections": asdict(trial.imperfections),
-    }
-
-
-def _facts_of_domain(start: Start, name: str, trial: Trial) -> dict[str, Any]:
+def _facts(start: Start, name: str, trial: Trial) -> dict[str, Any]:
+    """What differs between the metadata of scenarios and of wide domains."""
     domain = trial.setup.domain
-    assert domain is not None
+    if domain is None:
+        return {
+            "number": SCENARIOS[name].number,
+            "recipe": RECIPE,
+            "motion": asdict(start.motion),
+            "imperfections": asdict(trial.imperfections),
+        }
     return {
         "simulator": "mujoco",
         "recipe": f"domains {WIDE_RECIPE if name in THROUGHOUT else FIRST_WIDE_RECIPE}",
@@ -214,17 +347,6 @@ def scenario_of(name: str) -> Scenario:
     return entry
 
 
-def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:
-    """A scenario and a robot that has it."""
-    simulated, entry = robot_of(robot), scenario_of(str(scenario))
-    if simulated.family not in entry.cases:
-        own = [name for name, other in SCENARIOS.items() if simulated.family in other.cases]
-        raise ScenarioError(
-            f"scenario {entry.name!r} does not exist for {robot!r}; it has {', '.join(own)}"
-        )
-    return entry, simulated
-
-
 def software() -> dict[str, str]:
     """Versions of the software on which a simulated run depends, by name."""
     try:
@@ -258,7 +380,7 @@ def _refuse_rattling(velocity: Array) -> None:
         float(np.sqrt(np.median(np.square(signal).sum(axis=1)))) for signal in (fast, velocity)
     )
     if level > max(AUDIBLE, RATTLE * whole):
-        raise DivergedError(0.0, f"it rattles without a fault, at {level:.2g} rad/s")
+        raise SimulationError(0.0, f"it rattles without a fault, at {level:.2g} rad/s")
 
 
 def _trial(start: Start, defect: Defect, duration: float) -> Trial:
@@ -337,7 +459,7 @@ def recorded(
     faults: Faults,
     imperfections: Imperfections,
     rng: np.random.Generator,
-) -> "Motion":
+) -> "Recording":
     """Record a scene with given drives and the errors of its sensors."""
     from noiseclassifier.scenarios.loop import record
     from noiseclassifier.scenarios.world import sensors_of
@@ -379,7 +501,7 @@ def _single(signal: Any) -> Any:
     return signal.astype(np.float32)
 
 
-def _whole(motion: "Motion", simulated: Simulated, **facts: Any) -> Run:
+def _whole(motion: "Recording", simulated: Simulated, **facts: Any) -> Run:
     """A recording as a run, with the joints that are held away from 0, in single precision."""
     held = {joint: angle for joint, angle in simulated.held.items() if angle}
     still = np.zeros((len(motion.velocity), len(held)))
@@ -408,7 +530,7 @@ def _whole(motion: "Motion", simulated: Simulated, **facts: Any) -> Run:
     )
 
 
-def kept(motion: "Motion", rate: float, **facts: Any) -> Run:
+def kept(motion: "Recording", rate: float, **facts: Any) -> Run:
     """What is kept of a recording: positions, velocities, torques, single precision, at a rate."""
     others = {
         "planned": motion.planned,
@@ -427,50 +549,3 @@ def kept(motion: "Motion", rate: float, **facts: Any) -> Run:
     single = {name: _single(stage) for name, stage in run.stages.items()}
     single |= {name: _single(getattr(run, name)) for name in ("velocity", "velocity_desired")}
     return replace(run, stages={"planned": single.pop("planned")}, **single)
-
-
-def digest(run: Run) -> str:
-    """SHA-256 of the arrays of a run: names, shapes, every bit of every signal, and the blocks."""
-    arrays = {
-        "time": run.time,
-        "velocity": run.velocity,
-        "position": run.position,
-        "velocity_desired": run.velocity_desired,
-        "position_desired": run.position_desired,
-        "effort": run.effort,
-        "base_pose": run.base_pose,
-        "base_velocity": run.base_velocity,
-        **run.stages,
-        "block_start": np.array([block.start for block in run.blocks], dtype=np.float64),
-        "block_stop": np.array([block.stop for block in run.blocks], dtype=np.float64),
-        "block_label": np.array([block.label for block in run.blocks], dtype=str),
-    }
-    hashed = hashlib.sha256(repr((run.joint_names, run.desired_joint_names)).encode())
-    for name, array in arrays.items():
-        if array is not None:
-            hashed.update(f"{name}{array.dtype.str}{array.shape}".encode())
-            hashed.update(np.ascontiguousarray(array).tobytes())
-    return hashed.hexdigest()
-
-
-def reproduce(run: Run) -> Run:
-    """The full run, at 10 kHz and with all signals, of one that a data set keeps.
-
-    Raises:
-        ScenarioError: If the software here does not make it bit for bit.
-    """
-    recipe = run.meta
-    robot, scenario, seed = str(run.robot), str(recipe["scenario"]), int(recipe["seed"])
-    again = simulate(robot, scenario, seed, duration=recipe["duration"])
-    if digest(again) != recipe["sha256"]:
-        raise ScenarioError(
-            f"{robot}/{scenario}-{seed:03d} cannot be reproduced: it was made with"
-            f" {_versions(recipe)}, here is {_versions(again.meta)};"
-            " install the versions that it was made with"
-        )
-    return again
-
-
-def _versions(meta: Mapping[str, Any]) -> str:
-    versions = ", ".join(f"{name} {number}" for name, number in meta.get("versions", {}).items())
-    return f"recipe {meta.get('recipe')} ({versions})"

@@ -9,11 +9,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import solve_banded
 
-from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Imperfections
 from noiseclassifier.scenarios.motions import STEP, TICK, Box, Effector, Sole
 from noiseclassifier.scenarios.robots import Simulated
-from noisemodel import Robot, RobotError
+from noisemodel import Robot
 from noisemodel.robot import Joint, table_of
 from noisemodel.types import Array
 
@@ -38,11 +37,6 @@ def _reduced(
     name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], ...], scale: float
 ) -> Any:
     model = Robot.load(name).model
-    lacking = {*moved, *dict(held)} - set(model.names)
-    if lacking:
-        raise ScenarioError(
-            f"{name} has no joint {', '.join(sorted(lacking))}; it has {', '.join(model.names[1:])}"
-        )
     posture = pin.neutral(model)
     for joint, position in held:
         posture[model.joints[model.getJointId(joint)].idx_q] = position
@@ -58,10 +52,6 @@ def _reduced(
         if fixed:
             raise
         reduced = model
-    if tuple(reduced.names)[-len(moved) :] != moved:
-        raise ScenarioError(
-            f"{name}: the drives are to be in the order of the URDF, {', '.join(reduced.names[1:])}"
-        )
     return reduced if scale == 1.0 else _scaled(reduced, scale)
 
 
@@ -118,7 +108,7 @@ def build(
     spec.option.impratio = 10  # firm friction: tools do not creep
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must show
     spec.compiler.degree = False
-    joints = _joints(model)
+    joints = table_of(model)
     bodies = _add_bodies(spec, model, joints, armature, damping, friction)
     surface = {"friction": [GRIP, 0.01, 0.001], "solref": [contact, 1.0]}
     for effector in effectors:
@@ -135,24 +125,7 @@ def build(
             conaffinity=ROBOT,
             **surface,
         )
-    try:
-        return spec.compile()
-    except ValueError as error:
-        problem = " ".join(str(error).split())
-        raise ScenarioError(f"MuJoCo refuses the robot: {problem}") from error
-
-
-def _joints(model: Any) -> tuple[Joint, ...]:
-    try:
-        joints = table_of(model)
-    except RobotError as error:
-        raise ScenarioError(str(error)) from error
-    for joint in joints:
-        if joint.kind not in TYPES and not (joint.kind == "floating" and joint is joints[0]):
-            raise ScenarioError(
-                f"joint {joint.name!r} is {joint.kind}; {', '.join(TYPES)} joints can be simulated"
-            )
-    return joints
+    return spec.compile()
 
 
 def _add_bodies(
@@ -196,7 +169,7 @@ def _add_effector(
     bodies: Sequence[Any], model: Any, effector: Effector, surface: dict[str, Any]
 ) -> None:
     """Add the geom of an effector, and a site that encloses all of its contacts."""
-    frame = model.frames[_frame(model, effector, "for an effector")]
+    frame = model.frames[model.getFrameId(effector.frame)]
     geoms, middle = mujoco.mjtGeom, np.zeros(3)
     around, enclosing, further = geoms.mjGEOM_SPHERE, [], {}
     if isinstance(effector, Sole):
@@ -233,14 +206,6 @@ def _add_effector(
         quat=turn,
         size=enclosing,
     )
-
-
-def _frame(model: Any, effector: Effector, what: str) -> int:
-    """Index of the frame of an effector."""
-    if not model.existFrame(effector.frame):
-        known = ", ".join(frame.name for frame in model.frames)
-        raise ScenarioError(f"the robot has no frame {effector.frame!r} {what}; it has {known}")
-    return int(model.getFrameId(effector.frame))
 
 
 def _quaternion(rotation: Array) -> list[float]:
@@ -346,12 +311,7 @@ class WholeBody:
         ends = np.cumsum(widths).tolist()
         self._rows = [slice(end - width, end) for width, end in zip(widths, ends, strict=True)]
         self._heights = [rows.start + 2 for rows in self._rows]
-        equations = ends[-1] + 6 + upper
-        if equations != model.nv:
-            raise ScenarioError(
-                f"{len(widths)} effectors make {equations} equations, the robot has {model.nv}"
-                " unknowns; lock all joints that are not in its legs"
-            )
+        equations = ends[-1] + 6 + upper  # as many as the model has unknowns
         self._centre, self._base = slice(ends[-1], ends[-1] + 3), slice(ends[-1] + 3, ends[-1] + 6)
         self._upper = slice(ends[-1] + 6, equations)
         self._jacobian = np.zeros((equations, equations))
@@ -432,7 +392,7 @@ class WholeBody:
 
 def _add_point(model: Any, effector: Effector) -> int:
     """Add the point of an effector as a frame; its index."""
-    parent = _frame(model, effector, "to stand on")
+    parent = model.getFrameId(effector.frame)
     frame = model.frames[parent]
     pose = frame.placement * pin.SE3(np.eye(3), np.array(effector.point))
     kind = pin.FrameType.OP_FRAME
