@@ -6,11 +6,10 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import cache, wraps
+from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -18,96 +17,76 @@ from typer.core import TyperCommand, TyperGroup
 from inspector.errors import EXIT, OUTPUT_LOST, OptionError, Status
 from inspector.text import printable
 
-
-class Entry(NamedTuple):
-    """A command of `inspector`: what its help says first, and what it says last."""
-
-    panel: str
-    summary: str
-    example: str
-
-
-COMMANDS = {
-    "view": Entry("Inspect", "Show a run, or several side by side.", "view run.npz -o run.png"),
-    "noise": Entry("Inspect", "Print noise levels by joint and link.", "noise run.npz --csv n.csv"),
-    "listen": Entry("Inspect", "Write the noise of runs as sound.", "listen a.npz b.npz -o n.wav"),
-    "live": Entry(
-        "Inspect",
-        "Show samples from standard input as they arrive.",
-        "live --rate 1000 --robot panda < samples.csv",
-    ),
-    "robots": Entry("Inspect", "List the robots that are available by name.", "robots"),
-    "classify": Entry(
-        "Check", "Classify runs and print verdicts.", "classify run.npz --format junit"
-    ),
-    "diff": Entry(
-        "Check",
-        "Compare runs with a reference: better, same or worse.",
-        "diff reference/ candidate/ --report changes/",
-    ),
-    "accept": Entry(
-        "Check", "Accept good runs: what is normal.", 'accept runs/ --reason "first release"'
-    ),
-    "audit": Entry(
-        "Check", "Print what logs can show: rates, quantisation, failure classes.", "audit run.npz"
-    ),
-    "smoothness": Entry(
-        "Check",
-        "Rank episodes of policies and demonstrations by smoothness.",
-        "smoothness episodes/ --picture smoothness.png",
-    ),
-    "merge": Entry(
-        "Check",
-        "Join the results of several jobs into one.",
-        "merge one.json two.json --report noise/",
-    ),
-    "history": Entry(
-        "Check",
-        "Show the results of many commits, and where they changed.",
-        "history results/ -o history.html",
-    ),
-    "import": Entry(
-        "Import and export", "Convert logs of robots to run files.", "import log.csv -o run.npz"
-    ),
-    "export": Entry(
-        "Import and export",
-        "Write noise, labels and scores for other tools.",
-        "export run.npz -o run.mcap",
-    ),
-    "train": Entry(
-        "Train",
-        "Train a model on annotated runs.",
-        "train data/ --part training --rate 1000 -o model.npz",
-    ),
-    "tune": Entry(
-        "Train",
-        "Tune a profile's settings by grid search; resumes if killed.",
-        "tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl",
-    ),
-    "evaluate": Entry(
-        "Train",
-        "Evaluate a model on annotated runs that it was not trained on.",
-        "evaluate model.npz data/ --part test",
-    ),
-    "simulate": Entry(
-        "Simulate", "Simulate runs with annotated failures.", "simulate run talos --scenario 7"
-    ),
-    "config": Entry("Help", "Print the settings in force.", "config"),
-    "help": Entry("Help", "Print the help of a command or a topic: logs.", "help logs"),
+PANELS = {
+    "Inspect": {
+        "view": "Show a run, or several side by side.",
+        "noise": "Print noise levels by joint and link.",
+        "listen": "Write the noise of runs as sound.",
+        "live": "Show samples from standard input as they arrive.",
+        "robots": "List the robots that are available by name.",
+    },
+    "Check": {
+        "classify": "Classify runs and print verdicts.",
+        "diff": "Compare runs with a reference: better, same or worse.",
+        "accept": "Accept good runs: what is normal.",
+        "audit": "Print what logs can show: rates, quantisation, failure classes.",
+        "smoothness": "Rank episodes of policies and demonstrations by smoothness.",
+        "merge": "Join the results of several jobs into one.",
+        "history": "Show the results of many commits, and where they changed.",
+    },
+    "Import and export": {
+        "import": "Convert logs of robots to run files.",
+        "export": "Write noise, labels and scores for other tools.",
+    },
+    "Train": {
+        "train": "Train a model on annotated runs.",
+        "tune": "Tune a profile's settings by grid search; resumes if killed.",
+        "evaluate": "Evaluate a model on annotated runs that it was not trained on.",
+    },
+    "Simulate": {"simulate": "Simulate runs with annotated failures."},
+    "Help": {
+        "config": "Print the settings in force.",
+        "help": "Print the help of a command or a topic: logs.",
+    },
 }
+"""The commands, each with what the help says of it."""
 MODULES = {
-    "Inspect": "inspector.commands.inspect",
-    "Check": "inspector.commands.check",
-    "Import and export": "inspector.commands.convert",
-    "Train": "inspector.commands.train",
-    "Simulate": "inspector.commands.simulate",
-    "Help": "inspector.cli",
+    name: module
+    for panel, module in {
+        "Inspect": "inspector.commands.inspect",
+        "Check": "inspector.commands.check",
+        "Import and export": "inspector.commands.convert",
+        "Train": "inspector.commands.train",
+        "Simulate": "inspector.commands.simulate",
+        "Help": "inspector.cli",
+    }.items()
+    for name in PANELS[panel]
 }
-"""The module of the commands of each panel."""
-READ_LOGS = {"view", "noise", "listen", "classify", "accept", "audit", "smoothness"} | {
-    "import",
-    "export",
+EXAMPLES = {
+    "view": "view run.npz -o run.png",
+    "noise": "noise run.npz --csv n.csv",
+    "listen": "listen a.npz b.npz -o n.wav",
+    "live": "live --rate 1000 --robot panda < samples.csv",
+    "robots": "robots",
+    "classify": "classify run.npz --format junit",
+    "diff": "diff reference/ candidate/ --report changes/",
+    "accept": 'accept runs/ --reason "first release"',
+    "audit": "audit run.npz",
+    "smoothness": "smoothness episodes/ --picture smoothness.png",
+    "merge": "merge one.json two.json --report noise/",
+    "history": "history results/ -o history.html",
+    "import": "import log.csv -o run.npz",
+    "export": "export run.npz -o run.mcap",
+    "train": "train data/ --part training --rate 1000 -o model.npz",
+    "tune": "tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl",
+    "evaluate": "evaluate model.npz data/ --part test",
+    "simulate": "simulate run talos --scenario 7",
+    "config": "config",
+    "help": "help logs",
 }
+READ_LOGS = frozenset(
+    ("view", "noise", "listen", "classify", "accept", "audit", "smoothness", "import", "export")
+)
 """Commands that take the options on reading logs."""
 RENAMED = {
     "adapt": "accept",
@@ -139,11 +118,11 @@ Options
 
 `inspector COMMAND -h` explains a command, `inspector help logs` reading logs."""
 LOGS = "How logs are read (--robot, --rate, --map, ...): `inspector help logs`."
-OUTPUTS = {"output", "save", "csv", "picture", "report", "labels_to", "save_mapping", "resume"} | {
-    "train"
-}
+OUTPUTS = frozenset(
+    ("output", "save", "csv", "picture", "report", "labels_to", "save_mapping", "resume", "train")
+)
 """Names of options that are written; all other paths are read."""
-UNSET = OUTPUTS | {"overwrite", "write", "ctx", "localise", "in_ci", "help"}
+UNSET = OUTPUTS | {"overwrite", "write", "in_ci", "help"}
 """Names of parameters that no file of settings sets."""
 
 INTERRUPTED = 130
@@ -155,51 +134,38 @@ UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.E
 # --- commands
 
 
-class LogCommand(TyperCommand):
-    """A command that opens logs: it also takes `shared.log_options`, as a Reading in `ctx.obj`."""
+class _Command(TyperCommand):
+    """A command that replaces nothing that it reads; one that opens logs has a Reading (obj)."""
 
     def __init__(self, *args: Any, params: list[Any], help: str, **settings: Any) -> None:  # noqa: A002
-        from inspector.commands.shared import log_options
+        self.added = []
+        if settings["name"] in READ_LOGS:
+            from inspector.commands.shared import log_options
 
-        own = {each.name for each in params}  # a command's own option of that name stands
-        self.reading = _converted(log_options, "logs")
-        self.added = [each for each in self.reading.params if each.name not in own]
-        if settings["name"] != "import":
-            help = f"{help}\n\n{LOGS}"  # noqa: A001
-            for each in self.added:
-                each.hidden = True
+            self.reading = _converted(log_options, "logs")
+            self.added = self.reading.params
+            if settings["name"] != "import":
+                help = f"{help}\n\n{LOGS}"  # noqa: A001
+                for each in self.added:
+                    each.hidden = True
         super().__init__(*args, params=[*params, *self.added], help=help, **settings)
 
     def invoke(self, ctx: Any) -> Any:
-        """Turn these options into a Reading, and run the command."""
-        from noisemodel.files import reading
-
-        given = {each.name: ctx.params.pop(each.name) for each in self.added}
-        ctx.obj = self.reading.callback(**given)
-        files = (given.get(name) for name in ("robot", "mapping", "desired"))
-        with reading(Path(each) for each in files if each):
-            return super().invoke(ctx)
-
-
-def _protected(command: Callable[..., None]) -> Callable[..., None]:
-    """A command whose outputs never replace what it reads: all paths but those in `OUTPUTS`."""
-
-    @wraps(command)
-    def run(**given: Any) -> None:
+        """Run the command; no output in `OUTPUTS` may be one of its other files."""
         from noisemodel.files import reading, refuse_read
 
-        read: list[Path] = []
-        written: list[Path] = []
-        for name, value in given.items():
+        files: dict[bool, list[Path]] = {True: [], False: []}
+        for name, value in ctx.params.items():
             paths = value if isinstance(value, list) else [value]
-            chosen = written if name in OUTPUTS else read
-            chosen += [each for each in paths if isinstance(each, Path)]
-        with reading(read):
-            for path in written:
+            if name == "robot" and isinstance(value, str):
+                paths = [Path(value)]
+            files[name in OUTPUTS] += [each for each in paths if isinstance(each, Path)]
+        if self.added:
+            ctx.obj = self.reading.callback(**{x.name: ctx.params.pop(x.name) for x in self.added})
+        with reading(files[False]):
+            for path in files[True]:
                 refuse_read(path)
-            command(**given)
-
-    return run
+            return super().invoke(ctx)
 
 
 def _converted(function: Callable[..., Any], name: str, **settings: Any) -> Any:
@@ -212,15 +178,14 @@ def _converted(function: Callable[..., Any], name: str, **settings: Any) -> Any:
 @cache
 def _command(name: str) -> Any:
     """Import a command."""
-    module = import_module(MODULES[COMMANDS[name].panel])
-    example = f"Example: inspector {COMMANDS[name].example}"
+    module = import_module(MODULES[name])
+    example = f"Example: inspector {EXAMPLES[name]}"
     if name == "simulate":
         group = typer.main.get_command(module.app)
         group.name, group.epilog = name, example
         return group
     found = getattr(module, name, None) or getattr(module, f"{name}_")  # import_, help_
-    cls = LogCommand if name in READ_LOGS else TyperCommand
-    return _converted(_protected(found), name, cls=cls, epilog=example)
+    return _converted(found, name, cls=_Command, epilog=example)
 
 
 class _Commands(Mapping[str, Any]):
@@ -232,10 +197,10 @@ class _Commands(Mapping[str, Any]):
         return _command(name)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(COMMANDS)
+        return iter(MODULES)
 
     def __len__(self) -> int:
-        return len(COMMANDS)
+        return len(MODULES)
 
 
 class _Group(TyperGroup):
@@ -248,9 +213,8 @@ class _Group(TyperGroup):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print a line for each command, by panels."""
         lines = ["Usage: inspector [OPTIONS] COMMAND [ARGS]...", "", ABOUT]
-        for panel in MODULES:
-            own = {name: each for name, each in COMMANDS.items() if each.panel == panel}
-            lines += ["", panel, *(f"  {name:11} {each.summary}" for name, each in own.items())]
+        for panel, own in PANELS.items():
+            lines += ["", panel, *(f"  {name:11} {summary}" for name, summary in own.items())]
         formatter.write("\n".join([*lines, "", END, ""]))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -258,11 +222,11 @@ class _Group(TyperGroup):
         name, command, rest = super().resolve_command(ctx, args)
         takes_none = name in ("config", "help", "robots") or {"-h", "--help"} & set(rest)
         if name and not takes_none and (found := find_settings()) is not None:
-            ctx.default_map = {name: found.of(name, self.commands)}
+            ctx.default_map = {name: settings_of(name, *found)}
         return name, command, rest
 
     def invoke(self, ctx: Any) -> Any:
-        """Run a command; what it says of a wrong value begins with the value."""
+        """Run a command; its end has an exit status of its own."""
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
@@ -336,92 +300,84 @@ def help_(
 
 FILES = ("inspector.toml", "pyproject.toml")
 TABLE = "noise-inspector"
+MOST_BYTES = 2**20
 SHARED = frozenset(("model", "jobs"))
 """Settings of all commands, besides those on reading logs."""
 PATHS = {"mapping", "desired", "model", "reference", "candidate", "runs", "package-root"}
 """Settings that are paths, which are meant from the folder of the file."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of a project: `[tool.noise-inspector]` in pyproject.toml, or inspector.toml.
+def find_settings() -> tuple[Path, dict[str, Any]] | None:
+    """The nearest file of settings with its content, up to the top of the repository.
 
     Keys are the long names of options, without dashes before them. Options on reading logs, `model`
     and `jobs` stand at the top and hold for all commands that have them; a table such as
     ``[tool.noise-inspector.classify]`` is for one command, with its arguments (``runs``). The
     command line wins. Nothing that is written can be set here: a file must not replace others.
     """
-
-    path: Path
-    shared: Mapping[str, Any]
-    own: Mapping[str, Mapping[str, Any]]
-
-    def of(self, name: str, commands: Mapping[str, Any]) -> dict[str, Any]:
-        """The settings of a command, by the names of its parameters; refuses unknown ones."""
-        given = commands[name].params
-        own = {each.opts[0].lstrip("-"): each.name for each in given if each.name not in UNSET}
-        shared = SHARED | {each.opts[0].lstrip("-") for each in commands["import"].added}
-        tables = (("", self.shared, shared), (f" [{name}]", self.own.get(name, {}), own))
-        for where, table, known in tables:
-            if unknown := next((key for key in table if key not in known), None):
-                from noisemodel.types import hint
-
-                told = f"no setting {unknown!r}{hint(unknown, sorted(known))}"
-                raise OptionError(f"{self.path}:{where} {told}")
-        # In commands that open no log, options of these names mean something else.
-        applied = shared if name in READ_LOGS or name == "live" else SHARED
-        values = {key: value for key, value in self.shared.items() if key in applied}
-        values |= self.own.get(name, {})
-        return {own[key]: self._meant(key, value) for key, value in values.items() if key in own}
-
-    def _meant(self, key: str, value: Any) -> Any:
-        """A value, a path from the folder of the file."""
-        if isinstance(value, list):
-            return [self._meant(key, each) for each in value]
-        of_robot = key == "robot" and str(value).endswith((".urdf", ".xml"))
-        if not isinstance(value, str) or not (key in PATHS or of_robot):
-            return value
-        there = self.path.parent / value
-        return str(there) if there.exists() or key != "model" else value
-
-
-def find_settings() -> Settings | None:
-    """Read the nearest file of settings, from the working folder up to the repository's top."""
     start = Path.cwd().absolute()
     for folder in (start, *start.parents):
-        for name in FILES:
-            if (folder / name).exists() and (found := _read_settings(folder / name)) is not None:
-                return found
+        for path in (folder / name for name in FILES):
+            if path.is_file() and (content := _read_settings(path)) is not None:
+                return path, content
         if (folder / ".git").exists():
             break
     return None
 
 
-def _read_settings(path: Path) -> Settings | None:
-    """The settings of a file; None of a pyproject.toml without any."""
+def _read_settings(path: Path) -> dict[str, Any] | None:
+    """The settings of a file; None of a pyproject.toml without any, or that is wrong elsewhere."""
     import tomllib
 
+    with path.open("rb") as stream:
+        data = stream.read(MOST_BYTES + 1)
     try:
-        if not path.is_file() or path.stat().st_size > 2**20:
-            raise ValueError("no file of less than 1 MB")
-        content: Any = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        start = b""
-        if path.is_file():
-            with path.open("rb") as stream:
-                start = stream.read(2**20)
-        if path.name == FILES[0] or f"[tool.{TABLE}".encode() in start:
+        if len(data) > MOST_BYTES:
+            raise ValueError("more than 1 MB")
+        content: Any = tomllib.loads(data.decode())
+    except (ValueError, RecursionError) as error:
+        if path.name == FILES[0] or f"[tool.{TABLE}".encode() in data:
             raise OptionError(f"{path}: cannot be read ({error})") from error
-        return None  # a file of others, wrong in ways that are none of ours
+        return None
     if path.name == FILES[1]:
         tools = content.get("tool")
         content = tools.get(TABLE) if isinstance(tools, dict) else None
-        if content is None:
-            return None
-    if not isinstance(content, dict):
+    if content is not None and not isinstance(content, dict):
         raise OptionError(f"{path}: [tool.{TABLE}] is no table")
-    own = {key: value for key, value in content.items() if isinstance(value, dict)}
-    return Settings(path, {k: v for k, v in content.items() if k not in own}, own)
+    return content
+
+
+def settings_of(name: str, path: Path, content: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a command, by the names of its parameters; refuses unknown ones."""
+    own = {
+        each.opts[0].lstrip("-"): each.name
+        for each in _command(name).params
+        if each.name not in UNSET
+    }
+    shared = SHARED | {each.opts[0].lstrip("-") for each in _command("import").added}
+    top = {key: value for key, value in content.items() if not isinstance(value, dict)}
+    table = content.get(name) if name not in top else None
+    for where, given, known in (("", top, shared), (f" [{name}]", table or {}, own)):
+        if unknown := next((key for key in given if key not in known), None):
+            from noisemodel.types import hint
+
+            told = f"no setting {unknown!r}{hint(unknown, sorted(known))}"
+            raise OptionError(f"{path}:{where} {told}")
+    # In commands that open no log, options of these names mean something else.
+    applied = shared if name in READ_LOGS or name == "live" else SHARED
+    values = {key: value for key, value in top.items() if key in applied} | (table or {})
+    return {own[key]: _meant(path, key, value) for key, value in values.items() if key in own}
+
+
+def _meant(path: Path, key: str, value: Any) -> Any:
+    """A value of a file of settings: a path from its folder."""
+    if isinstance(value, list):
+        return [_meant(path, key, each) for each in value]
+    of_robot = key == "robot" and str(value).endswith((".urdf", ".xml"))
+    if not isinstance(value, str) or not (key in PATHS or of_robot):
+        return value
+    there = path.parent / value
+    return str(there) if there.exists() or key != "model" else value
 
 
 def config(ctx: typer.Context) -> None:
@@ -435,14 +391,16 @@ def config(ctx: typer.Context) -> None:
     if found is None:
         typer.echo("no settings: no inspector.toml, no [tool.noise-inspector] in pyproject.toml")
         return
-    commands = _Commands()
-    for name in found.own:
-        if name not in COMMANDS:
-            raise OptionError(f"{found.path}: no command {name!r}")
-    for name in commands:
-        found.of(name, commands)  # refuses what is not known
-    typer.echo(f"{found.path}:")
-    for table, settings in {"": found.shared, **found.own}.items():
+    path, content = found
+    tables = {name: each for name, each in content.items() if isinstance(each, dict)}
+    for name in tables:
+        if name not in MODULES:
+            raise OptionError(f"{path}: no command {name!r}")
+    for name in MODULES:
+        settings_of(name, path, content)  # refuses what is not known
+    typer.echo(f"{path}:")
+    top = {key: value for key, value in content.items() if key not in tables}
+    for table, settings in {"": top, **tables}.items():
         for key, value in settings.items():
             line = f"{table + '.' if table else ''}{key} = {value!r}"
             typer.echo("  " + line.replace("'", '"'))
@@ -467,7 +425,14 @@ def main() -> None:
     if odd is not None:
         typer.echo(f"inspector: {printable(odd)}: has control characters", err=True)
         sys.exit(2)
-    status = _run(output)
+    status = 0
+    try:
+        app()
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else 0
+    except Exception as error:
+        if output is None or error is not output.lost:
+            status = _failed(error)
     if output is not None:
         with suppress(OSError):
             sys.stdout.flush()
@@ -510,19 +475,6 @@ def _standard_output() -> _StandardOutput | None:
         io.BufferedWriter(watched), encoding=plain.encoding, errors=plain.errors
     )
     return watched
-
-
-def _run(output: _StandardOutput | None) -> int:
-    """Run the command line; the exit status."""
-    try:
-        app()
-    except SystemExit as end:
-        return end.code if isinstance(end.code, int) else 0
-    except Exception as error:
-        if output is not None and error is output.lost:
-            return 0  # `main` says it
-        return _failed(error)
-    return 0
 
 
 def _failed(error: Exception) -> int:

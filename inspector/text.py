@@ -60,14 +60,14 @@ def program_version() -> str:
 def progress(items: Iterable[T], what: str, *, total: int) -> Iterator[T]:
     """Items as they come, with a progress bar on a terminal, or a line every 10 s elsewhere."""
     if total < 2:
-        yield from items
-    elif sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import track
+        return iter(items)
+    if not sys.stderr.isatty():
+        return _lines(items, what, total)
+    from rich.console import Console
+    from rich.progress import track
 
-        yield from track(items, what, total=total, console=Console(stderr=True), transient=True)
-    else:
-        yield from _lines(items, what, total)
+    console = Console(stderr=True)
+    return iter(track(items, what, total=total, console=console, transient=True))
 
 
 def _lines(items: Iterable[T], what: str, total: int) -> Iterator[T]:

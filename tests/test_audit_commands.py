@@ -85,7 +85,7 @@ def test_a_row_that_cannot_be_read_is_named_with_its_file_once(tmp_path, command
 
 
 def test_view_prints_a_summary_of_the_audit(episode, tmp_path):
-    status, out, _ = call("view", episode, "--save", tmp_path / "run.rrd")
+    status, out, _ = call("view", episode, "-o", tmp_path / "run.rrd")
     assert status == 0
     assert out.count("logged at 30 Hz") == 2  # in the headline, and why there are no labels
     assert "cannot be observed" not in out

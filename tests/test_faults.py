@@ -26,7 +26,7 @@ pytestmark = [
 
 ROOT = Path(__file__).parents[1]
 FILES = {
-    "view": ("view", "run.npz", "--save", "out/run.rrd"),
+    "view": ("view", "run.npz", "-o", "out/run.rrd"),
     "report": ("view", "run.npz", "-o", "out/run.html"),
     "export csv": ("export", "run.npz", "-o", "out/run.csv"),
     "export mcap": ("export", "run.npz", "-o", "out/run.mcap"),

@@ -148,7 +148,7 @@ def test_a_wayland_display_that_is_dead_does_not_hide_an_x_display_that_lives(mo
 
 def test_a_rate_below_every_model_shows_everything_but_the_lanes(tmp_path):
     run = run_without_robot(tmp_path / "slow.npz", rate=50.0, seconds=20.0)
-    status, out, _ = inspector("view", run, "--save", tmp_path / "slow.rrd")
+    status, out, _ = inspector("view", run, "-o", tmp_path / "slow.rrd")
     assert status == 0
     assert "cannot-tell: logged at 50 Hz" in out
     assert "No labels: logged at 50 Hz" in out
@@ -347,17 +347,8 @@ def test_classifying_imports_neither_scikit_learn_nor_scipy_signal_nor_rerun():
     assert not modules & {"sklearn", "scipy.signal", "rerun", "pinocchio", "mujoco"}
 
 
-@pytest.mark.parametrize(
-    ("options", "problem"),
-    [
-        (("--min-score", "1.5"), "1.5: all scores are probabilities, at most 1"),
-        (("--min-score", "0"), "0: all scores are above 0 anyway"),
-        (("--min-score", "0.8", "--unknown", "ignore"), "0.8: all scores are above 0.83 anyway"),
-    ],
-)
-def test_a_score_that_can_never_matter_is_refused(options, problem):
-    status, _, err = inspector("classify", demo_run(), *options)
-    assert status == 2
-    assert problem in " ".join(err.replace("│", " ").split())
+def test_a_score_that_no_finding_can_have_is_refused():
+    status, _, err = inspector("classify", demo_run(), "--min-score", "1.5")
+    assert (status, "'--min-score'" in err) == (2, True)
     assert inspector("classify", demo_run(), "--min-score", "0.99")[0] == 0
     assert inspector("classify", demo_run(), "--min-score", "0.9")[0] == 1

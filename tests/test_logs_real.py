@@ -28,7 +28,7 @@ def test_a_real_robots_log_is_imported_viewed_and_classified(tmp_path, monkeypat
     assert (run.rate, len(run.joint_names), run.robot) == (1000.0, 7, "panda")
     assert run.duration == pytest.approx(21.0, abs=0.01)
 
-    status, _, err = call("view", "run.npz", "--save", "run.rrd")
+    status, _, err = call("view", "run.npz", "-o", "run.rrd")
     assert status == 0, err
     found = set(RrdReader(tmp_path / "run.rrd").store().schema().entity_paths())
     assert {"/class/found/ok", "/noise/simplified", "/robot/motion/panda_joint7"} <= found

@@ -126,7 +126,7 @@ def test_runs_that_cannot_be_read_are_named_and_the_others_are_shown(tmp_path):
     good = [run_file(tmp_path, name) for name in "ab"]
     (tmp_path / "torn.npz").write_bytes(good[0].read_bytes()[:500])
     saved = tmp_path / "out.rrd"
-    status, out, err = call("view", *good, tmp_path / "torn.npz", "gone.npz", "--save", saved)
+    status, out, err = call("view", *good, tmp_path / "torn.npz", "gone.npz", "-o", saved)
     assert status == 3
     assert err.count("\n") == 2
     assert f"inspector: {tmp_path / 'torn.npz'}: " in err
@@ -135,16 +135,16 @@ def test_runs_that_cannot_be_read_are_named_and_the_others_are_shown(tmp_path):
     assert "b: " in out
     assert "/curves/001" in entities(saved)
     alone = tmp_path / "alone.rrd"
-    status, out, err = call("view", good[0], tmp_path / "torn.npz", "--save", alone)
+    status, out, err = call("view", good[0], tmp_path / "torn.npz", "-o", alone)
     assert status == 3
     assert err.startswith(f"inspector: {tmp_path / 'torn.npz'}: ")
     assert f"{good[0]}: " in out
     assert "→" not in out
     assert alone.exists()
-    status, _, err = call("view", "x.npz", "y.npz", "--save", tmp_path / "none.rrd")
+    status, _, err = call("view", "x.npz", "y.npz", "-o", tmp_path / "none.rrd")
     assert status == 3
     assert "none of 2 runs can be read" in err
-    status, _, err = call("view", "x.npz", "y.npz", "z.npz", "--save", tmp_path / "none.rrd")
+    status, _, err = call("view", "x.npz", "y.npz", "z.npz", "-o", tmp_path / "none.rrd")
     assert status == 3
     assert "none of 3 runs can be read" in err
     assert not (tmp_path / "none.rrd").exists()
@@ -153,13 +153,13 @@ def test_runs_that_cannot_be_read_are_named_and_the_others_are_shown(tmp_path):
 @pytest.mark.parametrize(
     ("runs", "options", "text"),
     [
-        (3, ["--align", "auto"], "--align auto takes two runs"),
+        (3, ["--align", "auto"], "--align takes two runs or more, --align auto two"),
         (3, ["--terms"], "--terms takes one run"),
-        (1, ["--align", "start"], "--align takes two runs or more"),
+        (1, ["--align", "start"], "--align takes two runs or more, --align auto two"),
     ],
 )
 def test_options_that_do_not_fit_the_number_of_runs_are_wrong_usage(tmp_path, runs, options, text):
     path = run_file(tmp_path, "a")
-    status, _, err = call("view", *[path] * runs, *options, "--save", tmp_path / "out.rrd")
+    status, _, err = call("view", *[path] * runs, *options, "-o", tmp_path / "out.rrd")
     assert status == 2
     assert text in " ".join(err.replace("│", " ").split())

@@ -77,7 +77,7 @@ def test_every_command_ends_with_5_if_the_reader_of_standard_output_is_gone(argu
 def test_a_recording_that_is_lost_keeps_the_one_that_it_would_replace(tmp_path):
     target = tmp_path / "out.rrd"
     target.write_text("before")
-    done = run("view", demo_run(), "--save", target, "--overwrite", limit=300_000)
+    done = run("view", demo_run(), "-o", target, "--overwrite", limit=300_000)
     assert (done.returncode, target.read_text()) == (5, "before")
     assert done.stderr == f"inspector: {target}: {TOO_LARGE}\n"
 
@@ -186,6 +186,6 @@ def test_an_end_that_is_no_finding_has_not_its_exit_status(monkeypatch, error, s
     def ends(*_, **__):
         raise error
 
-    monkeypatch.setattr("inspector.library.load_library", ends)
+    monkeypatch.setattr("inspector.commands.check.load_library", ends)
     found, _, err = call("classify", demo_run())
     assert (found, said in err, "Aborted" in err) == (status, True, False)

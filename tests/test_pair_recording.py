@@ -369,7 +369,7 @@ def test_different_joints_are_shown_each_and_the_shared_ones_compared(tmp_path):
 def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(tmp_path):
     panda(robot=None).save(tmp_path / "a.npz")
     panda(2.0, robot=None).save(tmp_path / "b.npz")
-    save = ("--save", tmp_path / "ab.rrd")
+    save = ("-o", tmp_path / "ab.rrd")
     runs = (tmp_path / "a.npz", tmp_path / "b.npz")
     status, out, _ = inspector("view", *runs, *save)
     assert status == 0
@@ -394,7 +394,7 @@ def test_runs_that_share_no_time_end_with_one_line(tmp_path):
     run.save(tmp_path / "a.npz")
     panda(robot=None, blocks=(), time=run.time + 9).save(tmp_path / "b.npz")
     runs = (tmp_path / "a.npz", tmp_path / "b.npz")
-    status, _, err = inspector("view", *runs, "--align", "none", "--save", tmp_path / "ab.rrd")
+    status, _, err = inspector("view", *runs, "--align", "none", "-o", tmp_path / "ab.rrd")
     assert status == 3
     assert err.count("\n") == 1
     assert "they share no time; `--align start`" in err

@@ -45,7 +45,7 @@ def drawn(recording):
 
 def test_a_recording_has_the_meshes_of_a_robot_of_an_mjcf(run_file, tmp_path):
     saved = tmp_path / "run.rrd"
-    inspector("view", run_file, "--save", saved)
+    inspector("view", run_file, "-o", saved)
     paths = drawn(saved)
     assert len(paths) == 5  # a ball on each of four bodies, and the mesh in another colour
     assert sum("/tip/" in path for path in paths) == 2

@@ -90,7 +90,7 @@ def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monk
     ("arguments", "text"),
     [
         (["view", demo_run(), "-o", "s.jpg"], "s.jpg: name a .rrd, .png or .html file"),
-        (["view", demo_run(), demo_run(), "-o", "v.png"], ".png takes one run; several are"),
+        (["view", demo_run(), demo_run(), "-o", "v.png"], ".png takes one run"),
         (["view", demo_run(), "-o", "v.rrd", "--at", "1"], "--at and --size take -o FILE.png"),
         (["view", demo_run(), "-o", "s.png", "--at", "100"], "--at 100: the run lasts from 0.00 s"),
         (["view", demo_run(), "-o", "s.png", "--at", "-1"], "--at -1: the run lasts from 0.00 s"),

@@ -10,7 +10,7 @@ import pytest
 from commandline import call
 from generalmodel import run_at
 
-from inspector.cli import COMMANDS
+from inspector.cli import MODULES
 from inspector.library import model_files
 from inspector.report.formats import as_json
 from noisemodel import OutputError
@@ -121,7 +121,7 @@ def test_accepting_keeps_runs_in_the_folder_of_the_reference(place):
 
 def test_each_command_that_reads_and_writes_is_in_the_table():
     others = WITHOUT | {"config", "history"}
-    assert {command for command, *_ in TABLE} == set(COMMANDS) - others
+    assert {command for command, *_ in TABLE} == set(MODULES) - others
 
 
 def test_a_file_that_is_read_is_known_by_links_and_in_folders_that_are_logs(tmp_path):

@@ -129,7 +129,7 @@ def test_joints_that_a_run_file_does_not_name_are_those_of_its_robot_in_order(tm
         position=run.position,
         robot="panda",
     )
-    status, out, err = call("view", tmp_path / "run.npz", "--save", tmp_path / "run.rrd")
+    status, out, err = call("view", tmp_path / "run.npz", "-o", tmp_path / "run.rrd")
     assert status == 0, err
     assert "Joints are not named: taken for panda_joint1 to panda_joint7." in out
     assert "assumed stationary: panda_finger_joint1, panda_finger_joint2" in out

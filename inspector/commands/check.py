@@ -1,12 +1,13 @@
 """Commands that check runs: `classify`, `diff`, `accept`, `audit`, `smoothness` and more."""
 
 import os
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from datetime import date
 from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, NoReturn
 
 import typer
 
@@ -23,35 +24,42 @@ from inspector.commands.shared import (
     Write,
     argument,
     end,
-    files_of,
     finite,
     jobs_or_dask,
     option,
+    outputs_of,
+    prepare,
     say_assumed,
-    tried,
     written,
 )
 from inspector.errors import EXIT, InspectorError, Status, Unknown
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
-
-    from inspector.library import Library
-    from inspector.reference.difference import Difference
-    from inspector.verdict import Verdict
+from inspector.export.labels import label_paths, write_findings
+from inspector.library import Library, load_library
+from inspector.logs.read import left_out, sources
+from inspector.reference import store
+from inspector.reference.difference import Difference, difference
+from inspector.reference.difference import Gate as DifferenceGate
+from inspector.reference.verdicts import Gate, References, classes_found
+from inspector.report import html
+from inspector.report.formats import DIFF_FORMATS, FORMATS, published, text
+from inspector.report.picture import over_reference, require
+from inspector.text import progress
+from inspector.verdict import UNREAD, Verdict, classify_files, exit_status, read_results
+from noisemodel.files import refuse_existing, write_whole
+from noisemodel.types import hint
 
 # --- classify
 
 _gate = partial(option, rich_help_panel="What fails a run")
 
-VerdictFormats = Literal["text", "json", "junit", "github", "sarif", "markdown"]
-VerdictFormat = Annotated[VerdictFormats, option("Output format.")]
+VerdictFormat = Annotated[
+    Literal["text", "json", "junit", "github", "sarif", "markdown"], option("Output format.")
+]
 Verbose = Annotated[
     bool, option("All that was assumed, and the runs of scenarios.", "--verbose", "-v")
 ]
 LabelsTo = Annotated[Path | None, option("Write the findings to this folder, one file per run.")]
 LabelsFormat = Annotated[str, option("Format of these files: noisytest, csv or audacity.")]
-LocaliseOf06 = Annotated[bool, typer.Option("--localise", hidden=True)]
 RunsReport = Annotated[
     Path | None, option("Write index.html with a picture of each run to this folder.")
 ]
@@ -65,12 +73,11 @@ FailOnClass = Annotated[
     list[str] | None, _gate("Only findings of this class; repeatable, or a,b,c.")
 ]
 MinScore = Annotated[
-    float | None, _gate("Only findings of this score or more, 0 to 1.", callback=finite)
+    float | None, _gate("Only findings of this score or more, 0 to 1.", min=0.0, max=1.0)
 ]
 MinDuration = Annotated[float, _gate("Only findings of so many seconds.", min=0.0, callback=finite)]
 
 
-# Longer than 60 lines: 23 of them are its options.
 def classify(
     ctx: typer.Context,
     runs: Runs,
@@ -81,7 +88,6 @@ def classify(
     model: ModelFiles = None,
     labels_to: LabelsTo = None,
     labels_format: LabelsFormat = "audacity",
-    localise: LocaliseOf06 = True,
     write: Write = None,
     report: RunsReport = None,
     report_url: ReportUrl = "",
@@ -100,67 +106,41 @@ def classify(
     Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost, 70 bug.
     With several runs it is the highest-priority one: 70 > 5 > 3 > 1 > 4 > 0.
     """
-    from inspector.library import load_library
-    from inspector.logs.read import left_out, sources
-    from inspector.reference.verdicts import Gate, References
-    from inspector.report.formats import FORMATS, published, text
-    from inspector.text import progress
-    from inspector.verdict import classify_files, exit_status
-
-    del localise  # of 0.6: each finding is localised now
-    if reference is not None and no_reference:
-        raise typer.BadParameter("--reference and --no-reference exclude each other")
     library = load_library(model)
     found, others = sources(runs, ctx.obj)
-    place = {each.shown: number for number, each in enumerate(found)}
-    shown = list(place)
-    beside = References() if no_reference else References.found(shown, reference, ctx.obj)
-    files = files_of(write or [], get_args(VerdictFormats), overwrite=overwrite)
-    save_labels = _labels_writer(shown, labels_to, labels_format, overwrite=overwrite)
-    save_page, draw = _page_writer(report, overwrite=overwrite)
-    _check_score(min_score, library, unknown)
+    shown = [each.shown for each in found]
+    references = References() if no_reference else References.found(shown, reference, ctx.obj)
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
+    formats = FORMATS | {"text": partial(text, verbose=verbose)}
+    outputs = outputs_of(write, formats, overwrite=overwrite)
+    outputs |= _folders(shown, labels_to, labels_format, report, overwrite=overwrite)
 
     classified = classify_files(
         found,
         library,
         reading=ctx.obj,
         unknown=unknown,
-        draw=draw,
-        reference=beside if beside.of else None,
+        draw=None if report is None else partial(html.draw, folder=report),
+        reference=references if references.of else None,
         jobs=jobs_or_dask(jobs, dask),
         resume=resume,
     )
-    classified = progress(classified, "classify", total=len(found))
-    verdicts = [
-        replace(
-            beside.judge(each, gate, date.today()),
-            ignored=each.status is Status.BAD_INPUT and on_bad_input == "ignore",
-            picture_url=published(each.picture, report, report_url),
-        )
-        for each in sorted(classified, key=lambda each: place[each.path])
-    ]
-    verdicts += beside.absent(verdicts, [each for each in runs if each.is_dir()])
+    known = {each.path: each for each in progress(classified, "classify", total=len(found))}
+    ignore, address = (
+        on_bad_input == "ignore",
+        partial(published, folder=report, address=report_url),
+    )
+    verdicts = [_judged(known[path], references, gate, ignore, address) for path in shown]
+    verdicts += references.absent(verdicts, [each for each in runs if each.is_dir()])
 
-    if others:
-        typer.echo(f"inspector: {left_out(others)}", err=True)
     say_assumed({str(each.path): each.assumed for each in verdicts}, verbose=verbose)
-    for remark in beside.remarks(date.today()):
+    for remark in filter(None, [left_out(others), *references.remarks(date.today())]):
         typer.echo(f"inspector: {remark}", err=True)
-    lost = [line for each in verdicts for line in each.lost]
-    formats = FORMATS | {"text": partial(text, verbose=verbose)}
-    lost += written(verdicts, formats, format, files, overwrite=overwrite)
-    lost += tried(lambda: save_labels(verdicts), str(labels_to))
-    lost += tried(lambda: save_page(verdicts), str(report))
-    _name_failed(verdicts)
-    end(exit_status(verdicts), lost)
+    _end(verdicts, written(verdicts, formats[format], outputs))
 
 
-def _classes(given: "Sequence[str]", library: "Library") -> tuple[str, ...]:
+def _classes(given: Sequence[str], library: Library) -> tuple[str, ...]:
     """The classes that fail a run."""
-    from inspector.reference.verdicts import classes_found
-    from noisemodel.types import hint
-
     known = classes_found(library)
     names = [name for each in given for name in each.split(",")]
     for name in names:
@@ -172,51 +152,47 @@ def _classes(given: "Sequence[str]", library: "Library") -> tuple[str, ...]:
     return tuple(names)
 
 
-def _check_score(least: float | None, library: "Library", unknown: Unknown) -> None:
-    """Refuse a score that no finding has, or that all findings have."""
-    from noiseclassifier import General
-
-    models = library.values()
-    settings = [each.recipe if isinstance(each, General) else each.profile for each in models]
-    if least is None or any(each.estimator == "svm" for each in settings):
-        return  # whose scores have any size
-    alarm = min(each.alarm for each in settings) if unknown is Unknown.IGNORE else 0.0
-    if least > 1.0 or least <= alarm:
-        told = "are probabilities, at most 1" if least > 1.0 else f"are above {alarm:g} anyway"
-        raise typer.BadParameter(f"{least:g}: all scores {told}", param_hint="'--min-score'")
-
-
-def _labels_writer(
-    runs: "Sequence[Path]", folder: Path | None, form: str, *, overwrite: bool
-) -> "Callable[[Sequence[Verdict]], object]":
-    """What writes findings as label files, if a folder is named; its files are checked."""
-    if folder is None:
-        return len
-    from inspector.export.labels import label_paths, write_findings
-
-    targets = label_paths(runs, folder, format_name=form, overwrite=overwrite)
-    return partial(write_findings, targets=targets, format_name=form, overwrite=overwrite)
+def _folders(
+    runs: Sequence[Path], labels: Path | None, form: str, report: Path | None, *, overwrite: bool
+) -> dict[Path, Callable[[Sequence[Verdict]], object]]:
+    """What writes folders of label files, and of a page with pictures; both are made."""
+    outputs: dict[Path, Callable[[Sequence[Verdict]], object]] = {}
+    if labels:
+        targets = label_paths(runs, labels, format_name=form, overwrite=overwrite)
+        outputs[labels] = partial(write_findings, targets=targets, overwrite=overwrite)
+    if report:
+        require("a report")
+        prepare(report, html.PAGE, overwrite=overwrite)
+        outputs[report] = partial(html.write_index, folder=report)
+    return outputs
 
 
-def _page_writer(
-    folder: Path | None, *, overwrite: bool
-) -> "tuple[Callable[[Sequence[Verdict]], object], Callable[..., Path] | None]":
-    """What writes the page on all runs, and draws each, if a folder is named; it is made."""
-    if folder is None:
-        return len, None
-    from inspector.report import html
-    from inspector.report.picture import require
+def _judged(
+    verdict: Verdict,
+    references: References,
+    gate: Gate,
+    ignore: bool,
+    address: Callable[[Path | None], str],
+) -> Verdict:
+    """A verdict with what fails it today, and where its picture will be."""
+    return replace(
+        references.judge(verdict, gate, date.today()),
+        ignored=ignore and verdict.status is Status.BAD_INPUT,
+        picture_url=address(verdict.picture),
+    )
 
-    require("a report")
-    html.prepare(folder, overwrite=overwrite)
-    return partial(html.write_index, folder=folder), partial(html.draw, folder=folder)
 
-
-def _name_failed(verdicts: "Iterable[Verdict]") -> None:
+def _name_failed(verdicts: Sequence[Verdict]) -> None:
     """Print on standard error which runs could not be read."""
     for bad in verdicts:
-        if bad.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
+        if bad.status in UNREAD:
             typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.message}", err=True)
+
+
+def _end(verdicts: Sequence[Verdict], lost: Sequence[str]) -> NoReturn:
+    """Name the runs that could not be read, and end with the exit status of all."""
+    _name_failed(verdicts)
+    end(exit_status(verdicts), [*(line for each in verdicts for line in each.lost), *lost])
 
 
 # --- diff
@@ -224,36 +200,31 @@ def _name_failed(verdicts: "Iterable[Verdict]") -> None:
 RECORDING, PICTURE, NUMBERS = FILES = ("worst.rrd", "worst.png", "diff.json")
 """The files of --report."""
 
-DifferenceFormats = Literal["text", "json", "junit", "github", "markdown"]
-
-Before = Annotated[Path, argument("Runs before the change: a folder, or one.")]
-After = Annotated[Path, argument("Runs after the change: a folder, or one.")]
-DifferenceFormat = Annotated[DifferenceFormats, option("Output format.")]
-FailOn = Annotated[
-    Literal["new", "worse", "any"],
-    option("New or louder findings, scenarios that are worse, or any."),
-]
-Margin = Annotated[float, option("Least margin from which a run is louder, in dB.", min=0.0)]
-WorstReport = Annotated[
-    Path | None, option("Write recording, picture and diff.json of the worst to this folder.")
-]
-DrawRobot = Annotated[bool, option("Draw the robot in the recording.", "--robot/--no-robot")]
-
 
 def diff(
-    reference: Before,
-    candidate: After,
-    format: DifferenceFormat = "text",  # noqa: A002
-    fail_on: FailOn = "worse",
-    margin: Margin = 0.0,
-    report: WorstReport = None,
+    reference: Annotated[Path, argument("Runs before the change: a folder, or one.")],
+    candidate: Annotated[Path, argument("Runs after the change: a folder, or one.")],
+    format: Annotated[  # noqa: A002
+        Literal["text", "json", "junit", "github", "markdown"], option("Output format.")
+    ] = "text",
+    fail_on: Annotated[
+        Literal["new", "worse", "any"],
+        option("New or louder findings, scenarios that are worse, or any."),
+    ] = "worse",
+    margin: Annotated[
+        float, option("Least margin from which a run is louder, in dB.", min=0.0)
+    ] = 0.0,
+    report: Annotated[
+        Path | None,
+        option("Write recording, picture and diff.json of the worst to this folder."),
+    ] = None,
     report_url: ReportUrl = "",
     write: Write = None,
     on_bad_input: OnBadInput = "fail",
     jobs: NumberOfJobs = 1,
     dask: Dask = "",
     model: ModelFiles = None,
-    robot: DrawRobot = True,
+    robot: Annotated[bool, option("Draw the robot in the recording.", "--robot/--no-robot")] = True,
     unknown: UnknownFrames = Unknown.FINDING,
     overwrite: Overwrite = False,
 ) -> None:
@@ -264,57 +235,30 @@ def diff(
 
     Exit status: 0 as before, 1 worse, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost.
     """
-    from inspector.library import load_library
-    from inspector.reference.difference import Gate, difference
-    from inspector.report.formats import DIFF_FORMATS as FORMATS
-    from inspector.report.formats import published
-
-    files = files_of(write or [], get_args(DifferenceFormats), overwrite=overwrite)
-    if report:
-        _prepare(report, overwrite=overwrite)
+    outputs = outputs_of(write, DIFF_FORMATS, overwrite=overwrite)
     library, where = load_library(model), jobs_or_dask(jobs, dask)
+    if report:
+        require("a report")
+        prepare(report, *FILES, overwrite=overwrite)
+        worst = partial(_report, library=library, robot=robot, overwrite=overwrite)
+        outputs[report] = partial(worst, folder=report)
     found = difference(reference, candidate, library, margin=margin, unknown=unknown, jobs=where)
     _name_failed(found.failed)
-    gate = Gate(
-        new=fail_on != "worse",
-        worse=fail_on != "new",
-        failed=on_bad_input == "fail",
-    )
+    gate = DifferenceGate(fail_on != "worse", fail_on != "new", on_bad_input == "fail")
     drawn = report / PICTURE if report and any(row.worst for row in found.rows) else None
     address = published(drawn, report, report_url)
     found = replace(found, gate=gate, picture=drawn, picture_url=address)
-    lost: list[str] = []
-    if report:
-        lost += tried(lambda: _report(found, report, library, robot, overwrite), report)
-    lost += written(found, FORMATS, format, files, overwrite=overwrite)
-    end(found.exit_status, lost)
-
-
-def _prepare(folder: Path, *, overwrite: bool) -> None:
-    """Make the folder of the report, before long work is done for it."""
-    from inspector.report.picture import require
-    from noisemodel.files import refuse_existing
-
-    require("a report")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InspectorError(f"{folder}: cannot be made a folder ({error.strerror})") from error
-    for name in FILES:
-        refuse_existing(folder / name, overwrite=overwrite)
+    end(found.exit_status, written(found, DIFF_FORMATS[format], outputs))
 
 
 def _report(
-    found: "Difference", folder: Path, library: "Library", robot: bool, overwrite: bool
+    found: Difference, folder: Path, library: Library, robot: bool, overwrite: bool
 ) -> None:
     """Write the worst scenario as recording and picture, and all numbers."""
     from inspector.compare.pair import compare
     from inspector.compare.recording import write
-    from inspector.report.formats import diff_json as as_json
-    from inspector.report.picture import over_reference
-    from noisemodel.files import write_whole
 
-    write_whole(folder / NUMBERS, f"{as_json(found)}\n", overwrite=overwrite)
+    write_whole(folder / NUMBERS, f"{DIFF_FORMATS['json'](found)}\n", overwrite=overwrite)
     row = next((row for row in found.rows if row.worst is not None and row.before), None)
     if row is None or row.worst is None:
         return
@@ -352,9 +296,6 @@ def accept(
 
     The exit status is 2 with CI=true, 3 if a run cannot be read, 5 if the store cannot be written.
     """
-    from inspector.library import load_library
-    from inspector.reference import store as kept_in
-
     if os.environ.get("CI", "").lower() in ("true", "1") and not in_ci:
         raise typer.BadParameter("CI=true: a person accepts runs, after review (--in-ci overrides)")
     if not reason.strip():
@@ -362,20 +303,20 @@ def accept(
     first = runs[0]
     if not first.exists():
         raise InspectorError(f"{first}: no such file or folder")
-    beside = (first if first.is_file() else first.absolute()).parent / kept_in.FOLDER
-    store = output or kept_in.find(first) or beside
-    levels = kept_in.measured(runs, ctx.obj)
+    beside = (first if first.is_file() else first.absolute()).parent / store.FOLDER
+    folder = output or store.find(first) or beside
+    levels = store.measured(runs, ctx.obj)
     if only:
         levels = [each for each in levels if any(fnmatchcase(each.name, one) for one in only)]
     if not levels:
         raise InspectorError(f"no run is of {' or '.join(only or [])} (--only)")
     verdicts = _verdicts_on({each.run for each in levels}, runs, load_library(model), ctx.obj, jobs)
-    after, changes = kept_in.accept_into(
-        store,
+    after, changes = store.accept_into(
+        folder,
         levels,
-        wanted=kept_in.wanted_in(levels, {str(each.path): each.events for each in verdicts}),
+        wanted=store.wanted_in(levels, {str(each.path): each.events for each in verdicts}),
         reason=reason.strip(),
-        by=by or kept_in.who(),
+        by=by or store.who(),
     )
     for each in verdicts:
         for event in each.events:
@@ -384,23 +325,19 @@ def accept(
     for name, words in changes:
         typer.echo(f"{name}: {words}")
     kept = len(after.scenarios) - len({name for name, _ in changes})
-    typer.echo(f"{store / kept_in.NAME}: written; {kept} other scenarios stay as they were")
+    typer.echo(f"{folder / store.NAME}: written; {kept} other scenarios stay as they were")
 
 
 def _verdicts_on(
-    wanted: "Collection[str]", runs: "Sequence[Path]", library: "Library", reading: Any, jobs: int
-) -> "list[Verdict]":
+    wanted: Collection[str], runs: Sequence[Path], library: Library, reading: Any, jobs: int
+) -> list[Verdict]:
     """What the general model says of some of the runs, all of which can be read."""
-    from inspector.logs.read import sources
-    from inspector.text import progress
-    from inspector.verdict import classify_files
-
     found = [each for each in sources(runs, reading)[0] if str(each.shown) in wanted]
     classified = classify_files(found, library, reading=reading, jobs=jobs)
     verdicts = list(progress(classified, "accept", total=len(found)))
     say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
     for each in verdicts:
-        if each.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
+        if each.status in UNREAD:
             raise InspectorError(f"{each.path}: {each.message}; nothing is accepted")
     return verdicts
 
@@ -423,16 +360,17 @@ def audit(
       3  bad input: a file cannot be read
       4  cannot tell: a log can show no failure class
     """
-    from inspector.audit.audit import as_json, audit_all, text
-    from inspector.library import load_library
+    from inspector.audit import audit as audits
 
-    found, failed, assumed, others = audit_all(logs, load_library(model), ctx.obj)
+    found, failed, assumed, others = audits.audit_all(logs, load_library(model), ctx.obj)
     if others:
         typer.echo(f"inspector: {others}", err=True)
     if format == "json":
-        typer.echo(as_json(found, failed, assumed))
+        typer.echo(audits.as_json(found, failed, assumed))
     elif found:
-        typer.echo("\n\n".join(text(name, each, assumed[name]) for name, each in found.items()))
+        typer.echo(
+            "\n\n".join(audits.text(name, each, assumed[name]) for name, each in found.items())
+        )
     for name, message in failed.items():
         typer.echo(f"inspector: {name}: {message}", err=True)
     observable = all(each.observable for each in found.values())
@@ -470,10 +408,6 @@ def smoothness(
     The exit status is 3 if a log cannot be read; the others are ranked.
     """
     from inspector import smoothness as ranking
-    from inspector.library import load_library
-    from inspector.report.picture import require
-    from inspector.text import progress
-    from noisemodel.files import refuse_existing
 
     if picture:
         refuse_existing(picture, overwrite=overwrite)
@@ -507,11 +441,7 @@ def merge(
 
     The exit status is the one that `classify` has for all of their runs.
     """
-    from inspector.report import html
-    from inspector.report.formats import FORMATS
-    from inspector.verdict import Verdict, exit_status, read_results
-
-    files = files_of(write or [], get_args(VerdictFormats), overwrite=overwrite)
+    outputs = outputs_of(write, FORMATS, overwrite=overwrite)
     found: dict[Path, tuple[Verdict, Path]] = {}
     for path in results:
         for verdict in read_results(path):
@@ -521,13 +451,10 @@ def merge(
             found[verdict.path] = verdict, path
     merged = [verdict for verdict, _ in found.values()]
     if report is not None:
-        html.prepare(report, overwrite=overwrite)
+        prepare(report, html.PAGE, overwrite=overwrite)
         merged = [html.with_picture(each, report) for each in merged]
-    lost = written(merged, FORMATS, format, files, overwrite=overwrite)
-    if report is not None:
-        lost += tried(lambda: html.write_index(merged, report), report)
-    _name_failed(merged)
-    end(exit_status(merged), lost)
+        outputs[report] = partial(html.write_index, folder=report)
+    _end(merged, written(merged, FORMATS[format], outputs))
 
 
 def history(
@@ -545,7 +472,6 @@ def history(
     0061-3f2a1c9.json. The exit status is 3 if one cannot be read; the others are shown.
     """
     from inspector.report.history import page, read
-    from noisemodel.files import refuse_existing, write_whole
 
     if output:
         refuse_existing(output, overwrite=overwrite)

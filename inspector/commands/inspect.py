@@ -1,6 +1,5 @@
 """Commands that inspect runs: `view`, `noise`, `listen`, `live` and `robots`."""
 
-import hashlib
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from inspector.commands.shared import (
-    GEOMETRIES,
+    Geometries,
     Kind,
     Limits,
     ModelFiles,
@@ -19,7 +18,6 @@ from inspector.commands.shared import (
     PackageRoot,
     argument,
     one_at_a_time,
-    one_of,
     opened,
     option,
     say_warnings,
@@ -46,7 +44,6 @@ Shown = Annotated[
 Target = Annotated[
     Path | None, option("Write a recording .rrd, a picture .png or a .html.", "--output", "-o")
 ]
-SaveOf06 = Annotated[Path | None, typer.Option(hidden=True)]
 NoRobot = Annotated[bool, option("Do not draw the robot and the noise of its links.", "--no-robot")]
 Floor = Annotated[float | None, option("Darkest level of spectrograms, in dB re 1 rad/s.", max=0.0)]
 Terms = Annotated[bool, option("Show the terms A, B and C of the paper separately.", "--terms")]
@@ -65,19 +62,14 @@ GoodRuns = Annotated[
 
 @dataclass(frozen=True)
 class Request:
-    """What is shown of runs, and how.
-
-    Attributes:
-        links: Kind of the noise of the links; empty where no robot is drawn.
-        at: Time of a picture, in [s]; None where that is the worst finding's.
-    """
+    """What is shown of runs, and how."""
 
     reading: "Reading"
     library: "Library"
-    links: str
+    links: str  # kind of the noise of the links; empty where no robot is drawn
     floor: float | None
     terms: bool
-    at: float | None
+    at: float | None  # time of a picture, in [s]; None where that is the worst finding's
     size: str
     align: str | None
     reference: Path | None
@@ -88,7 +80,6 @@ def view(
     ctx: typer.Context,
     runs: Shown = None,
     output: Target = None,
-    save: SaveOf06 = None,
     model: ModelFiles = None,
     no_robot: NoRobot = False,
     kind: Kind = "normal",
@@ -113,13 +104,12 @@ def view(
     from inspector.recording import viewer
     from noisemodel.files import refuse_existing
 
-    paths, output = runs or [demo_run()], output or save
+    paths = runs or [demo_run()]
     one_at_a_time(ctx.obj, len(paths))
     if web and output:
         raise typer.BadParameter("name one of --web and -o")
-    if port:
-        viewer.free_port(port)
-    target = output or viewer.scratch_path(_together(paths))
+    together = f"{paths[0].stem}-and-{len(paths) - 1}" if len(paths) > 1 else paths[0].stem
+    target = output or viewer.scratch_path(paths[0].with_name(f"{together}.npz"))
     library = load_library(model)
     links, overwrite = "" if no_robot else kind, overwrite or output is None
     request = Request(ctx.obj, library, links, floor, terms, at, size, align, reference, overwrite)
@@ -137,38 +127,24 @@ def view(
         raise typer.Exit(EXIT[Status.BAD_INPUT])
 
 
-def _together(paths: list[Path]) -> Path:
-    """A name of several runs, the same for the same ones."""
-    if len(paths) == 1:
-        return paths[0]
-    others = "\n".join(str(path.resolve()) for path in paths[1:])
-    key = hashlib.sha256(others.encode()).hexdigest()[:8]
-    return paths[0].with_name(f"{paths[0].stem}-and-{len(paths) - 1}-{key}")
-
-
 def _check(paths: list[Path], target: Path, asked: Request) -> None:
     """Refuse options that do not go together, and what cannot be written."""
     suffix, several = target.suffix.lower(), len(paths) > 1
     if suffix not in SUFFIXES:
         raise typer.BadParameter(f"{target}: name a .rrd, .png or .html file", param_hint="'-o'")
-    refused = {
-        "--align takes two runs or more": asked.align and not several,
-        "--align auto takes two runs; more lie side by side from start": (
-            asked.align == "auto" and len(paths) > 2
-        ),
-        "--reference takes one run": asked.reference is not None and several,
-        "--terms takes one run": asked.terms and several,
-        "--floor takes one run": asked.floor is not None and several,
-        f"{suffix} takes one run; several are written as .rrd": (
-            suffix in (".png", ".html") and several
-        ),
-        "--at and --size take -o FILE.png": (
-            (asked.at is not None or asked.size != SIZE) and suffix != ".png"
-        ),
+    of_one = {
+        "--reference": asked.reference is not None,
+        "--terms": asked.terms,
+        "--floor": asked.floor is not None,
+        suffix: suffix in (".png", ".html"),
     }
-    for problem, is_so in refused.items():
-        if is_so:
-            raise typer.BadParameter(problem)
+    for name, given in of_one.items():
+        if given and several:
+            raise typer.BadParameter(f"{name} takes one run")
+    if asked.align and (not several or (asked.align == "auto" and len(paths) > 2)):
+        raise typer.BadParameter("--align takes two runs or more, --align auto two")
+    if suffix != ".png" and (asked.at is not None or asked.size != SIZE):
+        raise typer.BadParameter("--at and --size take -o FILE.png")
 
 
 def _picture(run: Path, output: Path, request: Request) -> None:
@@ -341,9 +317,7 @@ Compare = Annotated[
     bool, _model_option("Compare noise models on run files with positions.", "--compare")
 ]
 Robots = Annotated[str, _model_option("Compare them on robots that move: talos,go2 or all.")]
-Geometry = Annotated[
-    str, _model_option("visual, collision, hull or auto.", callback=one_of(GEOMETRIES))
-]
+Geometry = Annotated[Geometries, _model_option("Shapes: visual, collision, hull or auto.")]
 Seed = Annotated[int, _model_option("Random seed of the generated motion.", min=0)]
 SaveCompared = Annotated[Path | None, _model_option("Write a recording (.rrd).")]
 PictureCompared = Annotated[Path | None, _model_option("Write a PNG (needs the extra `report`).")]

@@ -2,15 +2,15 @@
 
 import os
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar, get_args
 
 import typer
 
-from inspector.errors import OUTPUT_LOST, Unknown, worst
+from inspector.errors import OUTPUT_LOST, InspectorError, Unknown, worst
 
 if TYPE_CHECKING:
     from inspector.logs.read import Opened, Reading
@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 # Names that the modules have as well, which would take too long to import here.
-KINDS = ("normal", "rms", "mean", "paper", "A", "B", "C")
-GEOMETRIES = ("visual", "collision", "hull", "auto")
-PARTS = ("all", "training", "test")
+Kinds = Literal["normal", "rms", "mean", "paper", "A", "B", "C"]
+Geometries = Literal["visual", "collision", "hull", "auto"]
 LIMITS = ("joints", "columns", "triangles", "bodies")
 
 ASSUMED = 100
@@ -49,17 +48,6 @@ def finite(value: float | None) -> float | None:
     return value
 
 
-def one_of(names: Collection[str]) -> Callable[[str], str]:
-    """Refuse what is none of several names."""
-
-    def checked(value: str) -> str:
-        if value not in names:
-            raise typer.BadParameter(f"{value!r} is none of {', '.join(names)}")
-        return value
-
-    return checked
-
-
 # These go to the environment, which the workers of this process have as well.
 
 
@@ -69,20 +57,18 @@ def _allow(folder: Path | None) -> Path | None:
     return folder
 
 
-def _raise_limit(gigabytes: float | None) -> float | None:
+def _raise_limit(gigabytes: float | None) -> None:
     if gigabytes is not None:
         finite(gigabytes)
         os.environ["NOISE_MAX_UNPACKED"] = str(int(gigabytes * 1e9))
-    return gigabytes
 
 
-def _raise_limits(limits: list[str] | None) -> list[str] | None:
+def _raise_limits(limits: list[str] | None) -> None:
     for each in limits or ():
         name, _, number = each.partition("=")
         if name not in LIMITS or not number.isdecimal():
             raise typer.BadParameter(f"{each!r} is none of {', '.join(f'{n}=N' for n in LIMITS)}")
         os.environ[f"NOISE_LIMIT_{name.upper()}"] = number
-    return limits
 
 
 # --- what several commands take
@@ -106,13 +92,10 @@ Dask = Annotated[
 ModelFiles = Annotated[
     list[Path] | None, option("A model file, or the name of a shipped one; repeatable.")
 ]
-Kind = Annotated[str, option(f"Extended noise, one of {', '.join(KINDS)}.", callback=one_of(KINDS))]
+Kind = Annotated[Kinds, option(f"Extended noise, one of {', '.join(get_args(Kinds))}.")]
 InPart = Annotated[
-    str,
-    option(
-        f"Which runs, one of {', '.join(PARTS)}; test are those held out as the test set.",
-        callback=one_of(PARTS),
-    ),
+    Literal["all", "training", "test"],
+    option("Which runs: all, training or test, those held out as the test set."),
 ]
 TextOrJson = Annotated[Literal["text", "json"], option("Output format.")]
 AsJson = Annotated[bool, option("Print JSON.", "--json")]
@@ -146,30 +129,6 @@ MaxUnpacked = Annotated[
 Robot = Annotated[
     str | None, _log_option('Robot name (see `inspector robots`), URDF or MJCF, or "none".')
 ]
-Rate = Annotated[float | None, _log_option("Rate of the log in [Hz], if it is known.", min=1.0)]
-Force = Annotated[
-    bool, _log_option("Take --rate even if positions and velocities contradict it.", "--force")
-]
-Map = Annotated[
-    list[str] | None,
-    _log_option("velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable.", "--map"),
-]
-Mapping_ = Annotated[Path | None, _log_option("A saved mapping (TOML).")]
-Joints = Annotated[str | None, _log_option("Names of the columns of arrays: a,b,c.")]
-Columns = Annotated[
-    str | None, _log_option("Names of a CSV's columns, without a header: time,q1,q2.")
-]
-Units = Annotated[str | None, _log_option("Unit of angles: radians, degrees or normalised.")]
-Degrees = Annotated[bool, _log_option("Angles are in degrees.", "--degrees")]
-Topic = Annotated[list[str] | None, _log_option("Read this topic of a bag; repeatable.")]
-Episode = Annotated[list[str] | None, _log_option("Read this episode of a data set; repeatable.")]
-Desired = Annotated[
-    Path | None, _log_option("Another log, with the desired motion on its own clock.")
-]
-Offset = Annotated[
-    float | None,
-    _log_option("Add to the timestamps of --desired, in seconds; else estimated."),
-]
 
 
 def log_options(
@@ -177,18 +136,36 @@ def log_options(
     package_root: PackageRoot = None,
     max_unpacked: MaxUnpacked = None,
     limit: Limits = None,
-    rate: Rate = None,
-    force: Force = False,
-    map_: Map = None,
-    mapping: Mapping_ = None,
-    joints: Joints = None,
-    columns: Columns = None,
-    units: Units = None,
-    degrees: Degrees = False,
-    topic: Topic = None,
-    episode: Episode = None,
-    desired: Desired = None,
-    offset: Offset = None,
+    rate: Annotated[
+        float | None, _log_option("Rate of the log in [Hz], if it is known.", min=1.0)
+    ] = None,
+    force: Annotated[
+        bool, _log_option("Take --rate even if positions and velocities contradict it.", "--force")
+    ] = False,
+    map_: Annotated[
+        list[str] | None,
+        _log_option("velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable.", "--map"),
+    ] = None,
+    mapping: Annotated[Path | None, _log_option("A saved mapping (TOML).")] = None,
+    joints: Annotated[str | None, _log_option("Names of the columns of arrays: a,b,c.")] = None,
+    columns: Annotated[
+        str | None, _log_option("Names of a CSV's columns, without a header: time,q1,q2.")
+    ] = None,
+    units: Annotated[
+        str | None, _log_option("Unit of angles: radians, degrees or normalised.")
+    ] = None,
+    degrees: Annotated[bool, _log_option("Angles are in degrees.", "--degrees")] = False,
+    topic: Annotated[list[str] | None, _log_option("Read this topic of a bag; repeatable.")] = None,
+    episode: Annotated[
+        list[str] | None, _log_option("Read this episode of a data set; repeatable.")
+    ] = None,
+    desired: Annotated[
+        Path | None, _log_option("Another log, with the desired motion on its own clock.")
+    ] = None,
+    offset: Annotated[
+        float | None,
+        _log_option("Add to the timestamps of --desired, in seconds; else estimated."),
+    ] = None,
 ) -> Any:
     """Options on reading logs, the same in all commands that read logs, as a ``read.Reading``.
 
@@ -240,17 +217,14 @@ def say_warnings(run: "Run") -> None:
 
 def say_assumed(lines: dict[str, str], *, verbose: bool = True) -> None:
     """Print what was assumed of logs on standard error, once for those with one line."""
-    together: dict[str, list[str]] = {}
-    for name, line in lines.items():
-        if line:
-            together.setdefault(line, []).append(name)
-    for line, names in together.items():
+    for line in dict.fromkeys(filter(None, lines.values())):
+        first, *others = [name for name, own in lines.items() if own == line]
         told = line
         if len(line) > ASSUMED and not verbose:
             begin = line[: ASSUMED - 10]
             told = f"{begin.rpartition('; ')[0] or begin}; ... (-v)"
-        others = f" and {len(names) - 1} more" if len(names) > 1 else ""
-        typer.echo(f"{names[0]}{others}: {told}", err=True)
+        more = f" and {len(others)} more" if others else ""
+        typer.echo(f"{first}{more}: {told}", err=True)
 
 
 # --- where commands work, and what they write
@@ -263,61 +237,60 @@ def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
     return dask or jobs
 
 
-def files_of(given: Sequence[str], known: Collection[str], *, overwrite: bool) -> dict[Path, str]:
-    """The format of each file of `--write FORMAT=FILE`; none of them exists or is read."""
+def prepare(folder: Path, *files: str, overwrite: bool) -> None:
+    """Make the folder of a report before long work is done for it; it has none of the files."""
     from noisemodel.files import refuse_existing
 
-    files = {}
-    for each in given:
-        name, equals, path = each.partition("=")
-        problem = ""
-        if name not in known or not equals or path in ("", "-"):
-            problem = f"{each!r}: expected FORMAT=FILE, with one of {', '.join(known)}"
-        else:
-            refuse_existing(path, overwrite=overwrite)
-            if Path(path) in files:
-                problem = f"{path}: is named twice"
-        if problem:
-            raise typer.BadParameter(problem, param_hint="'--write'")
-        files[Path(path)] = name
-    return files
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InspectorError(f"{folder}: cannot be made a folder ({error.strerror})") from error
+    for name in files:
+        refuse_existing(folder / name, overwrite=overwrite)
+
+
+def outputs_of(
+    given: Sequence[str] | None, formats: Mapping[str, Callable[[Result], str]], *, overwrite: bool
+) -> dict[Path, Callable[[Result], object]]:
+    """What writes each file of `--write FORMAT=FILE`; none of them exists or is read."""
+    from noisemodel.files import refuse_existing, write_whole
+
+    outputs: dict[Path, Callable[[Result], object]] = {}
+    for each in given or ():
+        name, _, path = each.partition("=")
+        if name not in formats or path in ("", "-") or Path(path) in outputs:
+            told = f"expected FORMAT=FILE, with one of {', '.join(formats)}, each file once"
+            raise typer.BadParameter(f"{each!r}: {told}", param_hint="'--write'")
+        refuse_existing(path, overwrite=overwrite)
+
+        def write(result: Result, path: str = path, name: str = name) -> None:
+            write_whole(path, f"{formats[name](result)}\n", overwrite=overwrite)
+
+        outputs[Path(path)] = write
+    return outputs
 
 
 def written(
     result: Result,
-    formats: Mapping[str, Callable[[Result], str]],
-    printed: str,
-    files: Mapping[Path, str],
-    *,
-    overwrite: bool,
+    printed: Callable[[Result], str],
+    outputs: Mapping[Path, Callable[[Result], object]],
 ) -> list[str]:
-    """Print a result in one format, and write it to files in others; what is lost, a line each."""
-    from noisemodel.files import write_whole
-
-    def show() -> None:
-        typer.echo(formats[printed](result))
-        sys.stdout.flush()
-
-    def write(path: Path, name: str) -> None:
-        write_whole(path, f"{formats[name](result)}\n", overwrite=overwrite)
-
-    lost = tried(show, "standard output")
-    for path, name in files.items():
-        lost += tried(partial(write, path, name), path)
-    return lost
-
-
-def tried(output: Callable[[], object], name: str | Path) -> list[str]:
-    """Write an output; a sentence if it is lost."""
+    """Print a result, and write it to outputs; what is lost, a line each."""
     from noisemodel import OutputError
 
-    try:
-        output()
-    except OutputError as error:
-        return [str(error)]
-    except OSError as error:
-        return [f"{name}: cannot be written ({error.strerror or error})"]
-    return []
+    def show(result: Result) -> None:
+        typer.echo(printed(result))
+        sys.stdout.flush()
+
+    lost = []
+    for name, write in [("standard output", show), *outputs.items()]:
+        try:
+            write(result)
+        except OutputError as error:
+            lost.append(str(error))
+        except OSError as error:
+            lost.append(f"{name}: cannot be written ({error.strerror or error})")
+    return lost
 
 
 def end(status: int, lost: Sequence[str]) -> NoReturn:

@@ -108,14 +108,12 @@ def write_findings(
     verdicts: Iterable[Verdict],
     targets: Mapping[Path, Path],
     *,
-    format_name: str,
     overwrite: bool = False,
 ) -> None:
     """Write the findings of each run that was classified; one without has an empty file."""
     for verdict in verdicts:
         if verdict.status in (Status.OK, Status.FINDINGS):
-            path = targets[verdict.path]
-            write_labels(verdict.events, path, format_name=format_name, overwrite=overwrite)
+            write_labels(verdict.events, targets[verdict.path], overwrite=overwrite)
 
 
 def _problem(block: Block, earliest: float, latest: float) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from inspector.analysis import Analysis
 from inspector.colors import of_classes
-from inspector.errors import InspectorError, Status
+from inspector.errors import Status
 from inspector.export.sound import clip, worst_time
 from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
@@ -356,18 +356,6 @@ section img { background: #fff; border-radius: .2rem; }
 """
 
 
-def prepare(folder: Path, *, overwrite: bool = False) -> None:
-    """Make the folder before long work is done for it; refuse one that has a page already."""
-    try:
-        (folder / PICTURES).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InspectorError(f"{folder}: cannot be made a folder ({error.strerror})") from error
-    if (folder / PAGE).exists() and not overwrite:
-        raise InspectorError(
-            f"{folder / PAGE}: exists already; choose another folder, or overwrite it (--overwrite)"
-        )
-
-
 def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, folder: Path) -> Path:
     """Draw a run over time into the folder; the picture is named after the verdict's file."""
     from inspector.report.picture import picture
@@ -377,6 +365,7 @@ def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, fol
         analysis = seen(analysis, verdict)
     # The hash keeps runs of one name in several folders apart, in any process.
     name = re.sub(r"[^\w.-]", "_", path.stem)[:80]
+    (folder / PICTURES).mkdir(exist_ok=True)
     target = folder / PICTURES / f"{name}-{hashlib.sha256(str(path).encode()).hexdigest()[:8]}.png"
     with replacing(target, overwrite=True) as temporary:
         temporary.write_bytes(picture(analysis, beside))
@@ -388,6 +377,7 @@ def with_picture(verdict: Verdict, folder: Path) -> Verdict:
     picture = verdict.picture
     if picture is None or not picture.is_file():
         return replace(verdict, picture=None)
+    (folder / PICTURES).mkdir(exist_ok=True)
     target = folder / PICTURES / picture.name
     with replacing(target, overwrite=True) as temporary:
         temporary.write_bytes(picture.read_bytes())
