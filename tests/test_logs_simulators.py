@@ -129,8 +129,7 @@ def test_isaac_labs_quaternions_are_in_the_order_that_fits_its_angular_velocity(
     run, remarks = said(path, episode="demo_0")
     assert np.allclose(run.base_pose[:, 5], np.sin(yaw * time / 2), atol=1e-5)
     assert np.allclose(run.base_velocity[:, 5], yaw)
-    words = ", ".join(order)
-    assert f"base_pose = states/articulation/robot/root_pose ({words})" in remarks[1]
+    assert f"base_pose = states/articulation/robot/root_pose ({order})" in remarks[1]
 
 
 def robomimic(path, arms=("robot0",)):

@@ -91,7 +91,6 @@ STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
 """Names of the number that is the rate in [Hz], or the step in [s]."""
 
 MOTION = {*SIGNALS, QPOS, QVEL} - {"effort"}
-QUATERNION = {"wxyz": "w, x, y, z", "xyzw": "x, y, z, w"}
 
 JOINT_STATES = ("joint_states", "joint_state", "jointstates", "states")
 PARTS: Mapping[int, Mapping[str, int]] = {
@@ -184,33 +183,24 @@ def gathered(log: Log, options: ReadOptions) -> Log:
     for each in log.fields:
         if match := CELLS.fullmatch(each.name):
             groups.setdefault(match["array"].lower(), {})[int(match["number"])] = each
-    groups = {
-        name: columns
-        for name, columns in groups.items()
-        if not mapped & {each.name for each in columns.values()}
-    }
+    for name in [n for n, each in groups.items() if mapped & {c.name for c in each.values()}]:
+        del groups[name]
     if not {QPOS, QVEL} & set(groups):
         return log
     arrays: dict[str, NDArray[Any]] = {
         name: np.hstack([columns[number].values for number in sorted(columns)])
         for name, columns in groups.items()
     }
-    roles = {name: meaning(name) for name in arrays}
-    state, targets, remarks, measured = _state(arrays, roles, options)
+    state, targets, remarks, measured = _state(arrays, {n: meaning(n) for n in arrays}, options)
     suggested = (*state, *targets)
     columns = {id(each) for members in groups.values() for each in members.values()}
     stamps = log.fields[0].stamps
     if stamps.unit == SAMPLES:
         stamps = counted_stamps(log.path, stamps, options, *measured)
-    return replace(
-        log,
-        fields=(
-            *(replace(each, stamps=stamps) for each in log.fields if id(each) not in columns),
-            *(Field(name, each, stamps, source=log.path.name) for name, each in arrays.items()),
-        ),
-        suggested=suggested,
-        remarks=(*log.remarks, *_taken((), suggested, options), *remarks),
-    )
+    fields = [replace(each, stamps=stamps) for each in log.fields if id(each) not in columns]
+    fields += [Field(name, each, stamps, source=log.path.name) for name, each in arrays.items()]
+    remarks = [*log.remarks, *_taken((), suggested, options), *remarks]
+    return replace(log, fields=tuple(fields), suggested=suggested, remarks=tuple(remarks))
 
 
 def floats(values: NDArray[Any]) -> Real:
@@ -489,8 +479,7 @@ def _taken(
     best = {each.signal: each.rank for each in sorted(named, key=lambda each: -each.rank)}
     known = [(each.signal, each.name) for each in named if each.rank == best[each.signal]]
     for each in suggested:
-        why = QUATERNION.get(each.joint, "")
-        why = "position follows it" if each.signal == "position_desired" else why
+        why = "position follows it" if each.signal == "position_desired" else each.joint
         known.append((each.signal, f"{each.source} ({why})" if why else each.source))
     order = sorted(known, key=lambda each: SIGNALS.index(each[0]))
     if taken := [f"{signal} = {name}" for signal, name in order if signal not in targets]:
@@ -536,11 +525,12 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     arrays, run = held(path), None
 
     def listing() -> tuple[str, ...]:
-        return tuple(f"{name}  {each.dtype} {each.shape}" for name, each in held(path).items())
+        return tuple(f"{name}  {each.dtype} {each.shape}" for name, each in arrays.items())
 
     if is_matlab:
-        read = partial(log_of_variables, path, options=options)
-        return LogReader("MATLAB 5", ("",), lambda *_: read(held(path)), listing)
+        return LogReader(
+            "MATLAB 5", ("",), lambda *_: log_of_variables(path, held(path), options), listing
+        )
     if str(arrays.get("format", "")).startswith(SAMPLE):
         raise LogError(path, SAMPLE_PROBLEM)
     known = all(name in runfile.ARRAYS or name.startswith(runfile.STAGE) for name in arrays)
@@ -655,11 +645,9 @@ def _variables(path: Path) -> dict[str, NDArray[Any]]:
                 objects.append(next((text for text in texts if text.strip("\0")), "unnamed"))
             elif name and not name.startswith("__"):
                 found |= numbers
-    except struct_error as error:
-        raise LogError(path, "damaged: a variable is cut off") from error
     except (ArchiveError, OSError) as error:
         raise LogError(path, one_line(error)) from error
-    except ValueError as error:  # a shape that no array has
+    except (struct_error, ValueError) as error:  # a shape that no array has
         raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
     check_numbers(path, found, objects)
     return found

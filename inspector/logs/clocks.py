@@ -21,6 +21,7 @@ from inspector.errors import LogError
 from inspector.logs.log import SAMPLES, UNIFORM, Stamps, Track
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import TIME_UNITS, time_column, without_unit
+from inspector.text import counted
 from noisemodel import Run
 from noisemodel.run import SAMPLED, continuous_quaternions, resample
 from noisemodel.runfile import OnDemand, pieces
@@ -205,43 +206,39 @@ def _slope(steps: Real, speed: Real) -> tuple[float, float]:
     return (both / np.sqrt(own * other), both / own) if own * other > 0 else (0.0, 0.0)
 
 
-def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], dict[str, int], str]:
-    """Tracks without samples that are not later than all before, counts of these, a remark."""
+def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], str]:
+    """Tracks without samples whose stamps are not later than all before, and a remark.
+
+    Tracks that share stamps still do afterwards.
+    """
     kept: dict[int, tuple[Stamps, Mask]] = {}
-    counts = {"duplicates": 0, "backward": 0}
-    first: float | None = None
+    places: list[float] = []
     for track in {id(track.stamps): track for track in tracks}.values():
         stamps, time = track.stamps, track.stamps.time
         latest = np.maximum.accumulate(time)
         keep = np.concatenate(([True], time[1:] > latest[:-1]))
         wrong = np.flatnonzero(~keep)
+        if len(wrong) and len(wrong) >= MOST_UNORDERED * len(time):
+            first = int(wrong[0])
+            after, before = (
+                stamps.start + Decimal(str(t)) for t in (time[first], latest[first - 1])
+            )
+            how = "stands still" if after == before else "runs backwards"
+            raise track.fault(path, f"time {how}: {after} comes after {before}", first)
         if len(wrong):
-            if len(wrong) >= MOST_UNORDERED * len(time):
-                after, before = (
-                    stamps.start + Decimal(str(since))
-                    for since in (time[wrong[0]], latest[wrong[0] - 1])
-                )
-                how = "stands still" if after == before else "runs backwards"
-                raise track.fault(path, f"time {how}: {after} comes after {before}", int(wrong[0]))
-            duplicates = int(np.sum(time[wrong] == latest[wrong - 1]))
-            counts["duplicates"] += duplicates
-            counts["backward"] += len(wrong) - duplicates
-            first = float(latest[wrong[0] - 1]) if first is None else first
+            places += latest[wrong - 1].tolist()
             rows = None if stamps.rows is None else np.asarray(stamps.rows)[keep].tolist()
             stamps = replace(stamps, time=time[keep], rows=rows)
         kept[id(track.stamps)] = stamps, keep
-    if first is None:
-        return tuple(tracks), {}, ""
+    if not places:
+        return tuple(tracks), ""
     found = []
     for track in tracks:
         stamps, keep = kept[id(track.stamps)]
         missing = None if track.missing is None else track.missing[keep]
         found.append(replace(track, stamps=stamps, values=track.values[keep], missing=missing))
-    remark = (
-        f"{counts['duplicates']} duplicate and {counts['backward']} backward stamps left out,"
-        f" the first {first:.6g} s into the log"
-    )
-    return tuple(found), counts, remark
+    what = f"{counted(len(places), 'sample')} whose stamps are not later than all before left out"
+    return tuple(found), f"{what}, the first {places[0]:.6g} s into the log"
 
 
 # Signals on one uniform time base

@@ -276,11 +276,9 @@ def _suggested(table: Array) -> tuple[list[str], str]:
     best, names = CLEAR, [f"q{number}" for number in range(1, left + 1)]
     for count in range(1, left // 2 + 1):
         quantities = ("q", "dq", "tau")[: 2 if left == 2 * count else 3]
-        numbers = range(1, count + 1)
-        by_quantity = [f"{quantity}{number}" for quantity in quantities for number in numbers]
-        by_joint = [f"{quantity}{number}" for number in numbers for quantity in quantities]
-        for order in (by_quantity, by_joint):
-            named = [*order, *[""] * left][:left]
+        pairs = [(quantity, number) for quantity in quantities for number in range(1, count + 1)]
+        for order in (pairs, sorted(pairs, key=lambda pair: pair[1])):  # by quantity, by joint
+            named = [*(f"{quantity}{number}" for quantity, number in order), *[""] * left][:left]
             position, velocity = (
                 columns[:, [name.startswith(quantity) for name in named]]
                 for quantity in ("q", "dq")

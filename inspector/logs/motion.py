@@ -58,7 +58,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
     tracks = _with_two_samples(path, _in_seconds(path, found, options), remarks)
     tracks = [t for each in tracks if (t := _finite(path, each, remarks)) is not None]
     tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks)
-    increasing, unordered, order = ordered(path, tracks)
+    increasing, order = ordered(path, tracks)
     tracks = _without_frozen(increasing, remarks)
     return replace(
         log,
@@ -67,11 +67,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
         names=(*(each.name for each in log.fields), *log.not_read),
         not_read=not_read,
         remarks=(*([order] if order else []), *remarks),
-        meta={
-            **log.meta,
-            **({"units": options.units} if options.units else {}),
-            **({"stamps": unordered} if unordered else {}),
-        },
+        meta={**log.meta, **({"units": options.units} if options.units else {})},
         in_degrees=in_degrees,
     )
 
@@ -519,7 +515,13 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
     if len(time) < 2 or not valid.any():
         others = [each.stamps for each in tracks if each.stamps is not own]
         raise LogError(logs[-1].path, no_overlap(others[-1] if others else own, own))
-    meta = _meta(logs, own, own.start + Decimal(str(time[0])))
+    start = own.start + Decimal(str(time[0]))
+    meta: dict[str, Any] = {
+        **{key: value for log in logs for key, value in log.meta.items()},
+        "source": [log.path.name for log in logs],
+        "start": f"{start.normalize():f}",
+        "jitter": {"rms": own.clock.jitter_rms, "max": own.clock.jitter_max},
+    }
     meta |= {"offset": offset} if offset else {}
     urdf = logs[0].urdf if robot and not options.robot else ""
     covered, slack = float(own.time[-1]), UNIFORM / own.clock.rate
@@ -535,7 +537,7 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
     if run.duration < covered:
         extent = "both logs" if len(meta["source"]) > 1 else "all its signals"
         remarks.append(f"cut to the {run.duration:.6g} s that {extent} cover")
-    if Decimal(meta["start"]):
+    if start:
         remarks.append(f"time starts at 0; the first stamp, {meta['start']} s, is in meta")
     return Imported(run, (*remarks, *told), name, urdf)
 
@@ -589,19 +591,6 @@ def _main(log: Log, options: ReadOptions) -> Track:
             log.path, f"time jumps by {steps[jump]:.6g} s; most of the log is gaps", jump + 1
         )
     return track
-
-
-def _meta(logs: Sequence[Log], own: Stamps, start: Decimal) -> dict[str, Any]:
-    meta: dict[str, Any] = {
-        **{key: value for log in logs for key, value in log.meta.items() if key != "stamps"},
-        "source": [log.path.name for log in logs],
-        "start": f"{start.normalize():f}",
-        "jitter": {"rms": own.clock.jitter_rms, "max": own.clock.jitter_max},
-    }
-    unordered = [log.meta["stamps"] for log in logs if "stamps" in log.meta]
-    if unordered:
-        meta["stamps"] = {key: sum(each[key] for each in unordered) for key in unordered[0]}
-    return meta
 
 
 def _remarks(logs: Sequence[Log], tracks: Sequence[Track]) -> Iterator[str]:
