@@ -124,11 +124,13 @@ def test_isaac_labs_quaternions_are_in_the_order_that_fits_its_angular_velocity(
     if order == "xyzw":  # Isaac Lab 3.0
         turn = turn[:, [1, 2, 3, 0]]
     pose = np.hstack((np.tile([1.0, 2.0, 0.3], (STEPS, 1)), turn))
-    twist = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, yaw], (STEPS, 1))
+    twist = np.tile([1.0, 0.0, 0.0, 0.0, 0.0, yaw], (STEPS, 1))
     path, *_ = isaac_lab(tmp_path / "go2.hdf5", pose=pose, twist=twist)
     run, remarks = said(path, episode="demo_0")
     assert np.allclose(run.base_pose[:, 5], np.sin(yaw * time / 2), atol=1e-5)
     assert np.allclose(run.base_velocity[:, 5], yaw)
+    ahead = np.column_stack((np.cos(yaw * time), -np.sin(yaw * time)))  # the world's x, in the body
+    assert np.allclose(run.base_velocity[:, :2], ahead, atol=1e-5)
     assert f"base_pose = states/articulation/robot/root_pose ({order})" in remarks[1]
 
 
@@ -399,7 +401,7 @@ def test_robosuites_raw_states_are_an_error_that_says_what_they_are(tmp_path):
     arrays = {"data/demo_1/states": states, "data/demo_1/actions": np.zeros((60, 7))}
     path = hdf5(tmp_path / "demo.hdf5", arrays)
     message = (
-        r"such as --map position=states\[1:8\] \(MuJoCo's flattened states are time, qpos, qvel"
+        r"demo_1 holds no known .* --map position=states\[1:8\] \(MuJoCo's flattened states are"
     )
     with pytest.raises(LogError, match=message):
         read_log(path)
@@ -455,3 +457,13 @@ def test_lerobots_velocities_and_efforts_are_read_where_a_set_has_them(tmp_path)
     assert expected in remarks
     assert np.array_equal(run.velocity, np.float32(velocity)[: len(run.time)])
     assert np.abs(run.position_desired - position[: len(run.time)]).max() < 0.02
+
+
+def test_any_file_is_read_by_mapping(tmp_path):
+    _, position, _ = moved(250)
+    arrays = {"log/clock": np.arange(STEPS) / 250, "log/q_arm": position, "log/x": np.zeros((3, 3))}
+    path = hdf5(tmp_path / "own.h5", arrays)
+    mapping = ["time=log/clock", "position=log/q_arm[0:6]", "velocity.tool=log/q_arm[6]"]
+    run = read_log(path, mapping=mapping, joints=[*"abcdef"]).run
+    assert run.rate == 250.0
+    assert np.array_equal(run.velocity[:, run.joint_names.index("tool")], position[:, 6])

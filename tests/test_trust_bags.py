@@ -17,6 +17,7 @@ from inspector.errors import LogError
 from inspector.logs import bags
 
 TALK, OLD = Talk(), Talk(ros1=True)
+STATE = "sensor_msgs/msg/JointState"
 WAYS = {
     "mcap, zstd": (TALK, {"storage": "mcap", "compression": "storage"}),
     "each message": (TALK, {"storage": "sqlite3", "compression": "message"}),
@@ -107,18 +108,24 @@ def test_rows_that_are_no_messages_are_left_out_or_one_line(tmp_path, change, da
         assert np.isfinite(read_log(path).run.position).all()
 
 
-@pytest.mark.parametrize("stamp", [2**63, 2**64 - 1])
-def test_stamps_of_64_bits_are_left_out_and_said(tmp_path, stamp):
-    path = tmp_path / "a.mcap"
-    text = TALK.store.generate_msgdef("sensor_msgs/msg/JointState")[0].encode()
+def mcap(path, kind, text, messages):
+    """An MCAP file with messages of a type, whatever its definition is; each with its time."""
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start("ros2")
-        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", text)
+        schema = writer.register_schema(kind, "ros2msg", text.encode())
         topic = writer.register_channel("/joint_states", "cdr", schema)
-        for at, message in [*states(TALK), (stamp, states(TALK)[-1][1])]:
-            writer.add_message(topic, int(at), bytes(TALK.raw(message)), int(at))
+        for at, data in messages:
+            writer.add_message(topic, int(at), bytes(data), int(at))
         writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("stamp", [2**63, 2**64 - 1])
+def test_stamps_of_64_bits_are_left_out_and_said(tmp_path, stamp):
+    text = TALK.store.generate_msgdef(STATE)[0]
+    messages = [(at, TALK.raw(message)) for at, message in states(TALK)]
+    path = mcap(tmp_path / "a.mcap", STATE, text, [*messages, (stamp, messages[-1][1])])
     imported = read_log(path)
     assert len(imported.run.time) == len(TIMES)
     assert any("1 messages without data, or with stamps after 2116" in r for r in imported.remarks)
@@ -151,19 +158,10 @@ DEFINITIONS = {
 
 
 @pytest.mark.parametrize("text", DEFINITIONS.values(), ids=DEFINITIONS)
-@pytest.mark.parametrize(
-    "kind", ["sensor_msgs/msg/JointState", "control_msgs/msg/JointTrajectoryControllerState"]
-)
+@pytest.mark.parametrize("kind", [STATE, "control_msgs/msg/JointTrajectoryControllerState"])
 def test_a_definition_in_a_bag_is_not_run(tmp_path, kind, text):
-    path = tmp_path / "a.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start("ros2")
-        schema = writer.register_schema(kind, "ros2msg", text.encode())
-        topic = writer.register_channel("/joint_states", "cdr", schema)
-        for at in range(3):
-            writer.add_message(topic, at, b"\0\1\0\0" + b"\xff" * 4000, at)
-        writer.finish()
+    data = b"\0\1\0\0" + b"\xff" * 4000
+    path = mcap(tmp_path / "a.mcap", kind, text, [(at, data) for at in range(3)])
     tracemalloc.start()
     with pytest.raises(LogError) as caught:
         read_log(path)
