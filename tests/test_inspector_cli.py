@@ -64,7 +64,7 @@ def test_the_viewer_is_started_on_loopback_and_not_waited_for(monkeypatch, tmp_p
         def poll(self):
             return None
 
-    monkeypatch.setattr(viewer, "_unreachable", lambda _: "")  # display and viewer respond
+    monkeypatch.setattr(viewer, "listens", lambda *_: True)
     monkeypatch.setattr(viewer, "START_TIMEOUT", 0.0)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(viewer, "has_display", lambda: True)
@@ -98,52 +98,18 @@ def test_a_viewer_that_ends_is_reported_and_the_recording_stays(monkeypatch, tmp
     assert "recording:" in out
 
 
-@pytest.mark.parametrize(
-    ("display", "reason"),
-    [
-        ({"DISPLAY": ":99"}, "the display :99 cannot be opened (nothing listens there: "),
-        ({"DISPLAY": "127.0.0.1:9.0"}, "the display 127.0.0.1:9.0 cannot be opened (nothing"),
-        ({"DISPLAY": "screen"}, "the display screen cannot be opened (expected [HOST]:NUMBER,"),
-        (
-            {"WAYLAND_DISPLAY": "wayland-9"},
-            "wayland-9 cannot be opened (XDG_RUNTIME_DIR is not set)",
-        ),
-        (
-            {"WAYLAND_DISPLAY": "wayland-9", "XDG_RUNTIME_DIR": "/nowhere", "DISPLAY": ":99"},
-            "the display wayland-9 cannot be opened (nothing listens there: No such file",
-        ),
-    ],
-)
-def test_a_display_that_cannot_be_opened_ends_with_5_and_what_to_do(
-    monkeypatch, tmp_path, display, reason
-):
+def test_a_display_that_cannot_be_opened_ends_with_5_and_what_to_do(monkeypatch, tmp_path):
     monkeypatch.setattr(viewer, "has_display", HAS_DISPLAY)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "XDG_RUNTIME_DIR"):
-        monkeypatch.delenv(name, raising=False)
-    for name, value in display.items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setattr(subprocess, "Popen", None)  # no viewer is started
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", ":99")
     status, out, err = inspector("view", run_without_robot(tmp_path / "run.npz"))
     assert status == 5
     assert err.count("\n") == 1
-    assert reason in err
+    assert "(no window can be opened on this display: Failed to open connection to X server)" in err
     assert "--web shows it in a browser, -o FILE.rrd writes it" in err
     assert "recording:" in out
     assert "open it in the viewer:" in out
-
-
-def test_a_wayland_display_that_is_dead_does_not_hide_an_x_display_that_lives(monkeypatch):
-    monkeypatch.setenv("WAYLAND_DISPLAY", "/nowhere/wayland-9")
-    monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr(
-        viewer, "_unreachable", lambda at: "nothing" if "wayland" in str(at) else ""
-    )
-    assert viewer.display_problem() == ""
-    told = "import os, sys; sys.exit('WAYLAND_DISPLAY' in os.environ)"
-    monkeypatch.setattr(viewer, "command", lambda *_: [sys.executable, "-c", told])
-    with viewer.started() as process:
-        assert process.process.wait() == 0
 
 
 def test_a_rate_below_every_model_shows_everything_but_the_lanes(tmp_path):

@@ -31,9 +31,9 @@ def taken(stamps, rate=1000.0, size=50):
     kept, times, lost, held = [], [], 0, stamps[:0]
     for first in range(0, len(stamps), size):
         held = np.append(held, stamps[first : first + size])
-        mask, missing, time, waiting = clock.take(held, ended=first + size >= len(stamps))
+        mask, missing, time = clock.take(held, ended=first + size >= len(stamps))
         kept, times, lost = [*kept, *mask], [*times, *time], lost + int(missing.sum())
-        held = held[len(held) - waiting :]
+        held = held[len(mask) :]
     assert not len(held)
     assert (np.diff(times) > 0).all()
     return np.array(kept), np.array(times), lost, counted.counts, lines
@@ -274,21 +274,23 @@ def test_levels_of_links_are_those_of_the_whole_run_however_samples_come(size):
     for first in range(0, 3000, size):
         piece = slice(first, first + size)
         signals = {"velocity": velocity[piece], "position": position[piece]}
-        steps += levels.push(time[piece], signals)
-    assert [start for start, _ in steps] == pytest.approx(0.2 * np.arange(14))
+        steps += levels.push(signals, min(first + size, 3000) / 1000)
+    assert [start for start, _ in steps] == pytest.approx(0.05 + 0.2 * np.arange(14))
     for start, level in steps:
-        inside = (noise.time >= start) & (noise.time < start + 0.2)
+        inside = np.abs(noise.time - start - 0.1) < 0.1
         power = noise.vibration[inside].mean(axis=0)
         np.testing.assert_allclose(10 ** (level / 10) * 1e-12, power, rtol=1e-6, atol=1e-15)
 
 
-def test_levels_of_links_begin_anew_after_a_sample_that_is_not_known():
+def test_steps_with_a_sample_that_is_not_known_have_no_levels_of_links():
     names = nm.Robot.load("panda").joint_names[:7]
     levels = LinkLevels("panda", names, 1000.0, floating=False)
-    time, velocity = np.arange(2000) / 1000, np.ones((2000, 7))
+    velocity = np.ones((2000, 7))
     velocity[700] = np.nan
-    steps = levels.push(time, {"velocity": velocity, "position": np.zeros((2000, 7))})
-    assert [start for start, _ in steps] == pytest.approx(0.701 + 0.2 * np.arange(6))
+    steps = levels.push({"velocity": velocity, "position": np.zeros((2000, 7))}, 2.0)
+    assert [start for start, _ in steps] == pytest.approx(
+        [0.05, 0.25, 0.45, 0.85, 1.05, 1.25, 1.45, 1.65]
+    )
 
 
 # The robot.

@@ -16,8 +16,8 @@ import noisemodel as nm
 from inspector.analysis import analyse
 from inspector.library import label_run, load_library
 from inspector.live import LiveError
+from inspector.live.drawing import Sink
 from inspector.live.session import BATCH
-from inspector.live.sink import Sink
 from inspector.recording import unstable
 from inspector.report.findings import spoken
 from noiseclassifier.signals import JOINTS, MOTION, NOISE
@@ -108,8 +108,6 @@ def test_a_session_shows_everything(tmp_path, library):
     assert summary.model == "general"
     assert sum(summary.labels.values()) == 27
     assert summary.warnings == {}
-    assert "delay from a sample to its label: median" in str(summary)
-    assert all(0.0 < delay < 10.0 for delay in summary.delays)
 
 
 def test_findings_are_listed_as_they_come_and_are_those_of_the_summary(tmp_path, library):
@@ -538,8 +536,7 @@ def test_memory_does_not_grow(tmp_path, library):
         early = size_of(session)
         for _ in range(20):
             session.push(**second)
-        # Delays of labels, ten floats a second up to a limit, and nothing else.
-        assert size_of(session) - early < 20 * 10 * 64
+        assert size_of(session) - early < 1000
 
 
 def size_of(whole):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import inspector
-from inspector.live import sink
+from inspector.live import drawing
+from inspector.recording import viewer
 
 picture = pytest.importorskip("picture")
 pytestmark = [
@@ -14,8 +15,8 @@ pytestmark = [
 
 
 def test_a_viewer_follows_a_session_and_reports_no_error(monkeypatch):
-    monkeypatch.setattr(sink, "CONNECT_TIMEOUT", 60.0)
-    monkeypatch.setattr(sink, "FLUSH_TIMEOUT", 60.0)
+    monkeypatch.setattr(viewer, "CONNECT_TIMEOUT", 60.0)
+    monkeypatch.setattr(drawing, "FLUSH_TIMEOUT", 60.0)
     time_ = np.arange(3000) / 1000
     swing = 0.5 * np.cos(time_[:, None] * np.arange(1, 8))
     with picture.headless_viewer() as client:

@@ -1,12 +1,18 @@
-"""What a live session draws, the robot included, and how it is laid out; in columns, thinned."""
+"""Where a live session is drawn, what, the robot included, and how it is laid out."""
 
+import re
+import time
+import uuid
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from threading import Event as Signal
+from threading import Thread
+from typing import Any, cast
 
 import numpy as np
 import rerun as rr
@@ -17,17 +23,163 @@ import noisemodel as nm
 from inspector import colors
 from inspector.levels import LINKS, SPECTRUM, amplitudes, extremes, in_bands, window_length
 from inspector.live.labels import Labeller, Windows
-from inspector.live.sink import Sink
-from inspector.recording import axes, panels, unstable
+from inspector.live.samples import SinkError
+from inspector.recording import axes, panels, unstable, viewer
 from inspector.recording import robot as scene
 from inspector.recording.axes import Label, Panel, log_events, scalars, style_lines
-from inspector.recording.unstable import TIMELINE, Camera, Part
+from inspector.recording.run import writing
+from inspector.recording.unstable import TIMELINE, Camera
+from inspector.recording.viewer import HOST
 from inspector.report.findings import spoken
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
 from noisemodel.noise import FAST, REFERENCE_POWER, by_moments, decibel, second_moments, vibrating
 from noisemodel.robot import Limits, joint_limits
 from noisemodel.types import Array, Mask
+
+APPLICATION = "inspector-live"
+"""Another than recordings of whole runs have: the viewer keeps a layout for each application."""
+PORT = int(viewer.PORT)
+ADDRESS = re.compile(r"(?:rerun\+http://)?(?:(?P<host>[^:/]+):)?(?P<port>\d{1,5})(?:/proxy)?")
+CHECK_INTERVAL = 1.0
+"""Time between checks that the viewer is still there, in [s]."""
+LATE = 10.0
+"""How far behind the stream a viewer may be before it is sent no more, in [s]."""
+FLUSH_TIMEOUT = 5.0
+"""How long the last messages may take, in [s]."""
+MEMORY = "2GB"
+"""What a viewer that is opened here may keep; then it drops the oldest."""
+
+
+class Sink:
+    """A recording with its sinks: a file, which is whole once it is closed, a viewer, or both."""
+
+    def __init__(
+        self, save: Path | None = None, connect: str | None = None, *, overwrite: bool = False
+    ) -> None:
+        self.saved, self.gone = save is not None, False  # gone: there was a viewer
+        self.late = 0.0  # how far it was behind at the last check, if more than `LATE`, in [s]
+        self._address = (HOST, PORT)
+        self._checked = time.monotonic()
+        self._asked: float | None = None  # since when the viewer lacks what had been sent by then
+        self._ended = Signal()
+        # Of one identity, but two: a viewer that is late or hangs would hold the file up.
+        self._file = self._viewer = None
+        identity = uuid.uuid4().hex
+        places = []
+        with ExitStack() as stack:
+            if save is not None:
+                file = writing(save, identity, application=APPLICATION, overwrite=overwrite)
+                self._file = stack.enter_context(file)
+                places.append(f"written to {save}")
+            if connect is not None or save is None:
+                host, port = self._address = _viewer(connect)
+                self._viewer = rr.RecordingStream(APPLICATION, recording_id=identity)
+                self._viewer.set_sinks(rr.GrpcSink(f"rerun+http://{host}:{port}/proxy"))
+                places.append(f"shown by the viewer at {host}:{port}")
+                Thread(target=self._follow, args=(self._viewer,), daemon=True).start()
+            self._stack = stack.pop_all()
+        self.where = " and ".join(places)
+        self.recording: rr.RecordingStream = cast(Any, _Tee(self))
+
+    @property
+    def open(self) -> list[rr.RecordingStream]:
+        """The sinks that take what is logged: a file does when its viewer is gone or late."""
+        shown = None if self.gone or self.late else self._viewer
+        return [each for each in (self._file, shown) if each is not None]
+
+    @property
+    def watched(self) -> bool:
+        """Whether there is, or was, a viewer."""
+        return self._viewer is not None
+
+    def check_viewer(self) -> bool:
+        """Check once in a second that the viewer is there and keeps up."""
+        if self._viewer is None or self.gone or time.monotonic() - self._checked < CHECK_INTERVAL:
+            return False
+        self._checked = time.monotonic()
+        behind = 0.0 if self._asked is None else self._checked - self._asked
+        self.gone = not viewer.listens(*self._address)
+        self.late = behind if behind > LATE else 0.0
+        return not (self.gone or self.late)
+
+    def _follow(self, shown: rr.RecordingStream) -> None:
+        """Note since when the viewer is behind, until the recording ends."""
+        while not self._ended.wait(CHECK_INTERVAL):
+            self._asked = self._asked or time.monotonic()
+            with suppress(RuntimeError):  # it takes longer, or is gone
+                shown.flush(timeout_sec=CHECK_INTERVAL)
+                self._asked = None
+
+    def discard(self) -> None:
+        """End a recording in which there is nothing, and leave no file."""
+        self._leave()
+        with suppress(SinkError), self._stack:
+            raise SinkError("nothing was recorded")  # ends the context that writes the file
+
+    def close(self) -> bool:
+        """Send what waits, and put the file in its place if it is whole."""
+        taken = not (self.gone or self.late)
+        if taken and self._viewer is not None:
+            try:
+                self._viewer.flush(timeout_sec=FLUSH_TIMEOUT)
+            except RuntimeError:
+                taken = False
+        self._leave()
+        self._stack.close()
+        return taken
+
+    def _leave(self) -> None:
+        """Leave the viewer; of one that hangs or is late rerun waits without end."""
+        self._ended.set()
+        if self._viewer is not None:
+            ending = Thread(target=self._viewer.disconnect, daemon=True)
+            ending.start()
+            ending.join(FLUSH_TIMEOUT)
+            if ending.is_alive():
+                unstable.abandon(self._viewer)
+
+
+class _Tee:
+    """Logs into every sink that is open, by the methods of a recording."""
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        def log(*args: Any, **options: Any) -> None:
+            for each in self._sink.open:
+                getattr(each, name)(*args, **options)
+
+        return log
+
+
+def _viewer(connect: str | None) -> tuple[str, int]:
+    """Find a viewer, or open one."""
+    host, port = (HOST, PORT) if connect is None else _parsed(connect)
+    if viewer.listens(host, port):
+        return host, port
+    problem = "nothing listens there; `rerun` starts one"
+    if connect is None and viewer.has_display():
+        problem = viewer.launch(str(port), "--expect-data-soon", "--memory-limit", MEMORY)
+    elif connect is None:
+        problem = "there is no display to open one on"
+    if problem:
+        raise SinkError(
+            f"no viewer at {host}:{port}, {problem}; use --connect HOST:PORT or --save FILE.rrd"
+        )
+    return host, port
+
+
+def _parsed(address: str) -> tuple[str, int]:
+    match = ADDRESS.fullmatch(address)
+    if match is None or not 0 < int(match["port"]) < 65536:
+        raise SinkError(
+            f"{address!r} is no address of a viewer; expected PORT, HOST:PORT or"
+            " rerun+http://HOST:PORT/proxy"
+        )
+    return match["host"] or HOST, int(match["port"])
+
 
 SEND_INTERVAL = 0.1
 """Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
@@ -95,12 +247,11 @@ class SpectrogramStream:
     """Levels of the loudest joint in bands of a logarithmic axis, on a fixed scale."""
 
     def __init__(self, rate: float) -> None:
-        self._rate = rate
-        self._length = window_length(rate)
+        self._rate, self._length = rate, window_length(rate)
         self._hop = max(1, self._length // 4)
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
         self.edges = np.geomspace(self._frequency[0], self._frequency[-1], panels.BANDS + 1)
-        self._windows, self._gap = Windows(self._length, self._hop), False
+        self._windows = Windows(self._length, self._hop)
 
     def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
         """Take samples; centres of windows in [s], and levels, shape (columns, bands)."""
@@ -115,16 +266,11 @@ class SpectrogramStream:
         amplitude = every.max(axis=1).T * whole
         level = 2 * decibel(in_bands(self._frequency, amplitude, self.edges))
         level = np.clip(SPECTRUM.place(level), 0.0, 1.0).T
-        starts = self._hop * np.arange(-1 if self._gap else 0, len(windows))
-        if self._gap:  # a dark one ends it
-            level = np.concatenate((np.zeros((1, panels.BANDS)), level))
-        self._gap = False
-        return np.asarray(end - (since - starts - self._length / 2) / self._rate), level
+        return np.asarray(end - (since - self._length / 2) / self._rate), level
 
     def skip(self) -> None:
-        """Begin anew after a gap, and leave it dark."""
-        self._windows.clear()
-        self._gap = True
+        """Begin anew after a gap, with a window that touches it and is dark."""
+        self._windows.clear(self._hop)
 
 
 STEP = 0.2
@@ -141,54 +287,42 @@ class LinkLevels:
         self._surface = nm.Surface.of(self._robot, "auto")
         self.links = self._surface.names
         self._names, self._rate = tuple(joint_names), rate
-        self._size, self._half = max(1, round(STEP * rate)), max(1, round(rate / FAST / 2))
-        self.skip()
+        self._size, self._around = max(1, round(STEP * rate)), max(1, round(rate / FAST / 2))
+        self._windows = Windows(self._size + 2 * self._around, self._size)
 
     def skip(self) -> None:
         """Begin anew after a gap."""
-        self._held: dict[str, Array] = {}
-        self._before = 0  # samples before the step that comes next
+        self._windows.clear()
 
-    def push(self, time: Array, signals: Mapping[str, Array]) -> list[tuple[float, Array]]:
-        """Take samples that follow each other; one that is not finite begins anew.
+    def push(self, signals: Mapping[str, Array], end: float) -> list[tuple[float, Array]]:
+        """Take samples that follow each other, up to a time in [s].
 
         Returns:
-            Start of each step that is complete now, in [s], and the levels of all links, shape
-            (links,), in [dB re 1 pW]; silence is at -inf.
+            Start of each step that is complete now and whose samples are all known, in [s], and the
+            levels of all links, shape (links,), in [dB re 1 pW]; silence is at -inf.
         """
         floats = self._robot.floating_base and "base_velocity" in signals
-        names = ["velocity", "position", *(["base_velocity"] if floats else [])]
-        known = np.all([np.isfinite(signals[name]).all(axis=1) for name in names], axis=0)
-        first = 0
-        if not known.all():
-            self.skip()
-            first = int(np.flatnonzero(~known)[-1]) + 1
-        new = {"time": time[first:], **{name: signals[name][first:] for name in names}}
-        if self._held:
-            new = {name: np.concatenate((self._held[name], new[name])) for name in new}
-        self._held = new
-        steps = []
-        while len(self._held["time"]) >= self._before + self._size + self._half:
-            steps.append(self._step())
-        return steps
+        kinds = ["velocity", "position", *(["base_velocity"] if floats else [])]
+        rows = np.hstack([signals[kind] for kind in kinds])
+        edges = np.cumsum([signals[kind].shape[1] for kind in kinds])[:-1]
+        known = np.asarray(np.isfinite(rows).all(axis=1))
+        windows, whole, since = self._windows.push(rows, known)
+        starts = end - (since - self._around) / self._rate
+        return [
+            (start, self._level(dict(zip(kinds, np.split(window.T, edges, axis=1), strict=True))))
+            for start, window in zip(starts[whole].tolist(), windows[whole], strict=True)
+        ]
 
-    def _step(self) -> tuple[float, Array]:
-        first, stop = self._before, self._before + self._size
-        window: dict[str, Any] = {
-            name: values[: stop + self._half] for name, values in self._held.items()
-        }
-        start = float(window["time"][first])
-        window["time"] = np.arange(len(window["time"])) / self._rate
-        run = nm.Run(joint_names=self._names, **window)
+    def _level(self, signals: Mapping[str, Any]) -> Array:
+        time = np.arange(len(signals["velocity"])) / self._rate
+        run = nm.Run(time=time, joint_names=self._names, **signals)
         position, velocity = self._robot.configuration(run)
-        fast = vibrating(velocity, run.mask, self._rate)[first:stop]
-        moments = second_moments(fast, run.mask[first:stop], size=self._size)
-        pose = position[(first + stop) // 2][None]
+        step = slice(self._around, self._around + self._size)
+        fast = vibrating(velocity, run.mask, self._rate)[step]
+        moments = second_moments(fast, run.mask[step], size=self._size)
+        pose = position[len(time) // 2][None]
         (power,) = by_moments(self._robot, self._surface, pose, [("normal", moments)])
-        used = max(stop - self._half, 0)
-        self._before = stop - used
-        self._held = {name: values[used:] for name, values in self._held.items()}
-        return start, decibel(power[0] / REFERENCE_POWER)
+        return decibel(power[0] / REFERENCE_POWER)
 
 
 SHADES = 16
@@ -211,23 +345,16 @@ class LiveRobot:
     ) -> None:
         from scipy.spatial.transform import Rotation
 
-        self._messages, self._rotation = messages, Rotation
+        self._messages, self._rotation, self._named = messages, Rotation, tuple(joint_names)
         with TemporaryDirectory() as folder:
-            tree = scene.load(robot, Path(folder), joint_names)
+            tree = self._tree = scene.load(robot, Path(folder), joint_names)
             self._outermost = scene.outermost(scene.drawn_file(robot, Path(folder)))
             scene.log_shapes(messages.recording, tree)
             self._shapes = scene.shapes_by_link(tree)
-        self._tree = tree
         self._shades: dict[str, bytes] = {}
-        movable = {joint.name: joint for joint in tree.joints() if joint.joint_type != "fixed"}
-        leaders = {
-            name: joint.mimic.joint if joint.mimic else name for name, joint in movable.items()
-        }
-        joints = [joint for name, joint in movable.items() if leaders[name] in joint_names]
-        mimics = [joint.mimic for joint in joints]
-        self._columns = [joint_names.index(leaders[joint.name]) for joint in joints]
-        self._factor = np.array([mimic.multiplier if mimic else 1.0 for mimic in mimics])
-        self._offset = np.array([mimic.offset if mimic else 0.0 for mimic in mimics])
+        angles = self._angles(np.zeros((1, len(joint_names))))
+        joints = [joint for joint in tree.joints() if joint.name in angles]
+        self._names = [joint.name for joint in joints]
         slides = np.array([joint.joint_type == "prismatic" for joint in joints])[:, None]
         axis = np.array([joint.axis for joint in joints])
         self._slide, self._spin = np.where(slides, axis, 0.0), np.where(slides, 0.0, axis)
@@ -236,11 +363,14 @@ class LiveRobot:
         base = [str(tree.root_link().name), scene.VIEW] if floating else []
         self.children = [joint.child_link for joint in joints] + base
         self._carriers = [joint.parent_link for joint in joints] + len(base) * [scene.WORLD]
-        self._names = [joint.name for joint in joints]
         axes.log_scale(messages.recording, KEY, LINKS, "dB re\n1 pW")
         limits = joint_limits(robot)
         ranges = [_range(limits.get(name, Limits())) for name in joint_names]
         self._low, self._high = np.array(ranges).T
+
+    def _angles(self, position: Array) -> dict[str, Array]:
+        """Positions of all joints that move, mimics included, by positions (samples, joints)."""
+        return scene.angles(self._tree, dict(zip(self._named, position.T, strict=True)))
 
     def camera(self, position: Array, base_pose: Array | None) -> Camera:
         """Place the camera, before it is known what will come.
@@ -264,9 +394,7 @@ class LiveRobot:
         return scene.standing(replace(seen, floor=floor), self._tree, moves=False)
 
     def _reached(self, position: Array, pose: Array | None) -> Iterator[Array]:
-        angle = self._factor * position[:, self._columns] + self._offset
-        angles = dict(zip(self._names, angle.T, strict=True))
-        return scene.reached(self._tree, self._outermost, angles, pose)
+        return scene.reached(self._tree, self._outermost, self._angles(position), pose)
 
     def colour(self, time: float, links: Sequence[str], level: Array) -> None:
         """Colour the links from a time on, where that changes, by levels in [dB re 1 pW]."""
@@ -302,7 +430,8 @@ class LiveRobot:
 
     def transforms(self, position: Array) -> tuple[Array, Array]:
         """Places and quaternions of links in the axes of their carriers, mimics included."""
-        angle = (self._factor * position[self._columns] + self._offset)[:, None]
+        angles = self._angles(position[None])
+        angle = np.stack([angles[name] for name in self._names])
         turned = self._turn * self._rotation.from_rotvec(angle * self._spin)
         return self._place + self._turn.apply(angle * self._slide), turned.as_quat()
 
@@ -319,12 +448,7 @@ JOINT_POINTS = 400.0
 NOISE_POINTS = 4000.0
 SHOWN = 10.0
 """Time that plots reach back, in [s]."""
-NOISE, BANDS_PATH, SCORES, FOUND_PATH = (
-    "/noise/simplified",
-    "/spectrogram/bands",
-    "/score",
-    "/class/found",
-)
+NOISE, BANDS_PATH, SCORES = "/noise/simplified", "/spectrogram/bands", "/score"
 NOISE_PANEL = Panel("noise", 130.0)
 SPECTROGRAM_PANEL, SIGNALS_PANEL = Panel("spectrogram", 150.0), Panel("signals", 390.0)
 NEWEST = 8
@@ -356,14 +480,14 @@ class Drawing:
                 self._links = LinkLevels(robot, joint_names, rate, floating=floating)
             except nm.NoiseModelError as error:  # its surface cannot be had
                 warn(f"The links are not coloured: {error}.")
-        self._hop, self._length, classes = labeller.hop, labeller.length, labeller.classes
+        self._hop, classes = labeller.hop, labeller.classes
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
         self._classes = (
             Panel("class", panels.ROW * len(self._rows) + axes.AXIS) if classes else None
         )
-        self._lane, self._lane_end = "", 0.0  # class of the latest frame, and until when it lasts
-        self._drawn, self._told = "", ""  # class and findings that are drawn
+        self._lane_end = -np.inf  # until when the class of the latest frame is drawn, in [ns]
+        self._told = ""  # findings that are drawn
         self._start: float | None = None  # time of the first sample
         self._camera: Camera | None = None
         self._full = False  # whether plots show the last ten seconds, not the first
@@ -409,7 +533,7 @@ class Drawing:
         style_lines(recording, SCORES, names=classes, colours=own)
         shades = [self._colours[name] for name in self._rows]
         names = [spoken(name) for name in self._rows]
-        unstable.style_bands(recording, FOUND_PATH, names, shades, unstable.COPIES)
+        unstable.style_bands(recording, "/class/found", names, shades, unstable.COPIES)
         named = axes.row_labels(names, list(map(panels.readable, shades)))
         axes.log_beside(recording, self._classes, named, nothing)
 
@@ -437,7 +561,7 @@ class Drawing:
         if self._sink.open:
             self._messages.add(BANDS_PATH, nanoseconds(centres), level, _heat_map)
             if self._links is not None and self._robot is not None:
-                for start, each in self._links.push(time, signals):
+                for start, each in self._links.push(signals, end):
                     self._robot.colour(start, self._links.links, each)
 
     def skip(self) -> None:
@@ -449,17 +573,11 @@ class Drawing:
     def batch(self, time: Array, motion: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
         """Draw the noise, the joints' signals and the robot of the next stretch, where valid."""
         now, seconds = float(time[-1]), len(valid) / self._rate
-        if now > self._lane_end + self._length + self._hop:  # the next frame is overdue
-            self.end_lane()
-        rows = dict(signals)
-        if not valid.all():
-            time, motion = time[valid], motion[valid]
-            rows = {name: signal[valid] for name, signal in signals.items()}
-        plots = {NOISE: slice(None)}
-        self._lines(time, nm.simplified(motion)[:, None], plots, seconds * NOISE_POINTS)
+        noise = nm.simplified(motion)[:, None]
+        self._lines(time[valid], noise[valid], {NOISE: slice(None)}, seconds * NOISE_POINTS)
         for kind, plots in self._plots.items():
-            finite = np.isfinite(rows[kind]).all(axis=1)
-            self._lines(time[finite], rows[kind][finite], plots, seconds * JOINT_POINTS)
+            known = valid & np.isfinite(signals[kind]).all(axis=1)
+            self._lines(time[known], signals[kind][known], plots, seconds * JOINT_POINTS)
         if self._robot is not None:
             pose = signals.get("base_pose")
             self._robot.show(now, signals["position"][-1], None if pose is None else pose[-1])
@@ -477,35 +595,21 @@ class Drawing:
         """
         centres = (labels.start + labels.stop) / 2
         self._messages.add(SCORES, nanoseconds(centres), labels.scores, urgent=True)
-        changes: list[tuple[float, str]] = []
-        for centre, label in zip(centres.tolist(), labels.raw.tolist(), strict=True):
-            begin = centre - self._hop / 2
-            if self._lane and begin > self._lane_end + self._hop / 2:
-                changes.append((self._lane_end, ""))
-                self._lane = ""
-            if label != self._lane:
-                changes.append((begin, label))
-            self._lane, self._lane_end = label, begin + self._hop
-        self._change([*changes, (self._lane_end, self._lane)] if len(labels) else changes)
-
-    def end_lane(self) -> None:
-        """End the class that is drawn."""
-        if self._lane:
-            self._lane = ""
-            self._change([(self._lane_end, "")])
-
-    def _change(self, changes: Sequence[tuple[float, str]]) -> None:
-        """Draw classes from when on they hold, or until when so far, in [s]; empty is none."""
-        points: list[tuple[int, str]] = []
-        for time, state in changes:
-            begin = round(1e9 * time)
-            if self._drawn not in ("", state):
-                points.append((begin - 1, self._drawn))
-            points.append((begin, state))
-            self._drawn = state
-        shown = np.array([[state == name for name in self._rows] for _, state in points])
-        times = np.array([time for time, _ in points], dtype=np.int64)
-        self._messages.add(FOUND_PATH, times, shown, _found, urgent=True)
+        points, shown = list[int](), list[list[bool]]()
+        begins = nanoseconds(centres - self._hop / 2).tolist()
+        for begin, label in zip(begins, labels.raw.tolist(), strict=True):
+            if begin - self._lane_end > 5e8 * self._hop:  # the band before ends where it does
+                points.append(begin - 1)
+                shown.append([False] * len(self._rows))
+            else:
+                begin = int(self._lane_end)
+            self._lane_end = begin + round(1e9 * self._hop)
+            points += [begin, int(self._lane_end) - 1]
+            shown += 2 * [[label == name for name in self._rows]]
+        if self._sink.late:  # what is not sent leaves a gap
+            self._lane_end = -np.inf
+        times = np.array(points, dtype=np.int64)
+        self._messages.add("/class/found", times, np.array(shown), _found, urgent=True)
 
     def findings(self, time: float, found: Sequence[Event], latest: float = np.inf) -> None:
         """Show the findings so far in a document; those that reach the latest time last."""
@@ -541,7 +645,6 @@ class Drawing:
 
     def finish(self, time: float, found: Sequence[Event]) -> None:
         """Show what waits, and the findings of the whole stream."""
-        self.end_lane()
         if self._start is not None:
             self.findings(time, found)
         self._messages.flush()
@@ -551,45 +654,37 @@ class Drawing:
 
         Until the last ten seconds all lie after the start, no time is negative.
         """
-        shown: dict[str, Any] = {"during": (start, start + SHOWN)}
-        if self._full:
-            shown = {"last": SHOWN}
-        shown |= {"fixed": True, "titled": False}
-        rows = shown | {"between": (0.0, axes.TOP)}
+        shown: dict[str, Any] = {"last": SHOWN} if self._full else {}
+        shown = shown or {"during": (start, start + SHOWN)}
         over_time = [
-            (NOISE_PANEL, unstable.plot("Noise", "/noise", **shown)),
-            (SPECTROGRAM_PANEL, unstable.plot("Spectrum", "/spectrogram", **rows)),
+            axes.timed(NOISE_PANEL, title="Noise", paths=BELOW, between=None, **shown),
+            axes.timed(SPECTROGRAM_PANEL, title="Spectrum", paths=BELOW, **shown),
         ]
         left = [
             (unstable.text("Findings", "/report", titled=False), 2.0),
             (unstable.events("Events", "/events"), 1.4),
         ]
+        signals = {title: ("/joints", paths) for title, paths in self._titles.items()}
         if self._classes is not None:  # otherwise there is no verdict
-            over_time.insert(0, (self._classes, unstable.plot("Classes", "/class", **rows)))
+            over_time.insert(0, axes.timed(self._classes, title="Classes", paths=BELOW, **shown))
             left.insert(0, (unstable.drawing("/verdict"), 0.32))
+            signals["Scores"] = (SCORES, list(BELOW))
         if self._camera is not None:
-            title = "Robot, links coloured by level above 10 Hz" if self._links else "Robot"
-            robot = unstable.robot(title, "/robot", self._camera)
-            if self._links is not None:
-                key = unstable.drawing(f"/axis/{KEY.name}/right")
-                robot = unstable.beside((robot, 88.0), (key, 12.0))
+            robot = panels.robot_view(self._camera, coloured=self._links is not None)
             left.insert(len(left) - 1, (robot, 3.4))
-        right = [(axes.part(panel, plot), panel.height) for panel, plot in over_time]
-        right.append((self._signals(shown), SIGNALS_PANEL.height))
-        whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*right), 64.0))
+        plots = [
+            axes.timed(
+                SIGNALS_PANEL, origin, title=title, name=title, between=None, paths=paths,
+                legend=True, **shown,
+            )
+            for title, (origin, paths) in signals.items()
+        ]  # fmt: skip
+        over_time.append((unstable.tabs(*(part for part, _ in plots)), SIGNALS_PANEL.height))
+        whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*over_time), 64.0))
         return unstable.blueprint(whole, following=True)
 
-    def _signals(self, shown: Mapping[str, Any]) -> Part:
-        """Plots of joint signals and of scores, behind each other."""
-        views = {
-            title: unstable.plot(title, "/joints", own, legend=True, **shown)
-            for title, own in self._titles.items()
-        }
-        if self._classes is not None:
-            views["Scores"] = unstable.plot("Scores", SCORES, legend=True, **shown)
-        return unstable.tabs(
-            *(axes.part(SIGNALS_PANEL, plot, name=name) for name, plot in views.items())
-        )
+
+BELOW = ("$origin/**",)
 
 
 def _heat_map(level: Array) -> list[Any]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import ceil, inf
 
 import numpy as np
+from numpy.typing import NDArray
 
 import noiseclassifier as nc
 import noisemodel as nm
@@ -31,19 +32,23 @@ class Windows:
         """Begin anew, after so many samples that are not valid."""
         self._samples, self._valid = np.zeros((before, 1)), np.zeros(before, dtype=bool)
 
-    def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask, int]:
-        """Windows that are complete, which touch no gap, and samples since the first began."""
+    def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask, NDArray[np.int64]]:
+        """Windows that are complete, which touch no gap, and samples from their starts to the end.
+
+        Windows have the shape (windows, columns, length).
+        """
         held = np.broadcast_to(self._samples, (len(self._valid), samples.shape[1]))
         samples = np.concatenate((held, samples))
         valid = np.concatenate((self._valid, valid))
         length, hop = self._length, self._hop
         count = max(0, (len(samples) - length) // hop + 1)
         self._samples, self._valid = samples[count * hop :], valid[count * hop :]
+        since = len(samples) - hop * np.arange(count)
         if not count:
-            return np.empty((0, samples.shape[1], length)), valid[:0], len(samples)
+            return np.empty((0, samples.shape[1], length)), valid[:0], since
         view = np.lib.stride_tricks.sliding_window_view
         whole = view(valid, length)[::hop][:count].all(axis=1)
-        return view(samples, length, axis=0)[::hop][:count], np.asarray(whole), len(samples)
+        return view(samples, length, axis=0)[::hop][:count], np.asarray(whole), since
 
 
 class Decimator:

@@ -6,13 +6,13 @@ Rows are CSV with a header, or a JSON object per line.
 import json
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import date
 from itertools import chain, groupby
 from math import nan
 from pathlib import Path
-from time import perf_counter, sleep
+from time import sleep
 from types import FrameType
 from typing import Any, BinaryIO, TypeAlias, TypeVar
 
@@ -69,18 +69,17 @@ def follow(
     enough: Callable[[], bool] = lambda: False,
 ) -> Summary:
     """Show rows as they arrive, until they end, Ctrl-C is pressed, or there are enough."""
-    widen(stream)
     with interruptible(chunks(stream, gather=GATHER)) as incoming:
-        lines, number, received = next(incoming, (b"", 1, 0.0))
+        lines, number = next(incoming, (b"", 1))
         head, _, rest = lines.partition(b"\n")
         if not head.strip():
             raise LiveError(f"the input is empty; {EXPECTED}")
         reader, is_header = reader_of(head, names)
-        start = (rest, number + 1, received) if is_header else (lines, number, received)
+        start = (rest, number + 1) if is_header else (lines, number)
         with session_of(reader.names) as session:
-            for lines, number, received in chain([start], incoming):
+            for lines, number in chain([start], incoming):
                 for rows in reader.read(lines, number, session.note):
-                    session.push(**rows, received=received)
+                    session.push(**rows)
                 if enough():
                     break
     if not session.summary.samples:
@@ -88,35 +87,25 @@ def follow(
     return session.summary
 
 
-def widen(stream: BinaryIO) -> None:
-    """Set a pipe's buffer to as much as is read at once, so that its writer need not wait."""
-    import fcntl
-
-    with suppress(AttributeError, OSError):  # another system; no pipe
-        fcntl.fcntl(stream.fileno(), fcntl.F_SETPIPE_SZ, CHUNK_BYTES)
-
-
-def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, int, float]]:
-    """Whole lines of a stream as they come, the number of the first, and when they were received.
+def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, int]]:
+    """Whole lines of a stream as they come, and the number of the first.
 
     A small chunk waits for more, in [s]: to read row by row costs most.
     """
     read: Callable[[int], bytes] = getattr(stream, "read1", stream.read)
-    rest, number, waited = b"", 1, 0.0
+    rest, number = b"", 1
     while chunk := read(CHUNK_BYTES):
-        received = perf_counter() - waited
         lines, end, rest = (rest + chunk).rpartition(b"\n")
         if end:
-            yield lines + end, number, received
+            yield lines + end, number
             number += lines.count(b"\n") + 1
         elif len(rest) > MAX_LINE_BYTES:
             raise LiveError(
                 f"line {number} is longer than {MAX_LINE_BYTES} bytes: this is no CSV or JSON"
             )
-        waited = gather if len(chunk) < SMALL_CHUNK_BYTES else 0.0
-        sleep(waited)
+        sleep(gather if len(chunk) < SMALL_CHUNK_BYTES else 0.0)
     if rest.strip():
-        yield rest + b"\n", number, perf_counter()
+        yield rest + b"\n", number
 
 
 @contextmanager
@@ -133,8 +122,8 @@ def interruptible(items: Iterator[Item]) -> Iterator[Iterator[Item]]:
     def handed_out() -> Iterator[Item]:
         nonlocal waits
         while not pressed:
-            waits = True
             try:
+                waits = True
                 item = next(items)
             except (StopIteration, KeyboardInterrupt):
                 return
@@ -149,9 +138,7 @@ def interruptible(items: Iterator[Item]) -> Iterator[Iterator[Item]]:
         signal.signal(signal.SIGINT, before)
 
 
-def reader_of(
-    head: bytes, names: tuple[str, ...]
-) -> "tuple[CsvReader, bool] | tuple[JsonReader, bool]":
+def reader_of(head: bytes, names: tuple[str, ...]) -> "tuple[CsvReader | JsonReader, bool]":
     """Choose a format by the first line, and say whether that is a header."""
     if head.lstrip().startswith(b"{"):
         return JsonReader(names), False
@@ -187,14 +174,11 @@ class CsvReader:
                 f" they are {listed(self._header)}"
             )
         self.names = names or tuple(found["velocity"])
-        self._places: dict[str, list[int] | slice] = {}
+        self._places: dict[str, list[int]] = {}
         for kind, by_joint in found.items():
             if lacking := [name for name in self.names if name not in by_joint]:
                 raise LiveError(f"the header has no {kind} of joint {lacking[0]!r}")
-            places = [by_joint[name] for name in self.names]
-            beside = slice(places[0], places[0] + len(places))  # need not be copied together
-            together = places == list(range(beside.start, beside.stop))
-            self._places[kind] = beside if together else places
+            self._places[kind] = [by_joint[name] for name in self.names]
         time = time_column(self._header)
         self._time = self._header.index(time) if time else None
         self._second = float(UNITS[TIME_UNITS.get(without_unit(time)[1], "seconds")])
@@ -243,13 +227,13 @@ class JsonReader:
                 continue
             try:
                 samples.append(_sample(line))
-            except ValueError as error:
+            except (ValueError, RecursionError) as error:
                 note("malformed rows", f"line {number}: {error}; such rows are left out")
-        for widths, group in groupby(
+        for widths, alike in groupby(
             samples, key=lambda each: {k: len(v) for k, v in each.items()}
         ):
-            alike = list(group)
-            rows = {name: np.array([each[name] for each in alike]) for name in widths}
+            together = list(alike)
+            rows = {name: np.array([each[name] for each in together]) for name in widths}
             if "time" in rows:
                 rows["time"] = rows["time"][:, 0]
             yield rows
@@ -257,24 +241,19 @@ class JsonReader:
 
 def _sample(line: bytes) -> dict[str, list[float]]:
     """Read one object, its values as lists of numbers."""
-    try:
-        found = json.loads(line, parse_int=float)
-    except RecursionError as error:
-        raise ValueError("nested too deeply") from error
+    found = json.loads(line, parse_int=float)
     if not isinstance(found, dict) or "velocity" not in found:
         raise ValueError("no JSON object with a velocity")
-    if isinstance(found.get("time", 0.0), list) and len(found["time"]) != 1:
-        raise ValueError("time is no single number")
     numbers = {}
     for name in ("time", *SIGNALS):
         if name in found:
             values = found[name] if isinstance(found[name], list) else [found[name]]
-            if not values:
-                raise ValueError(f"{name} is empty")
             try:
                 numbers[name] = [nan if each is None else float(each) for each in values]
             except (TypeError, ValueError) as error:
                 raise ValueError(f"{name} holds no numbers") from error
+            if not values or (name == "time" and len(values) > 1):
+                raise ValueError(f"{name} has {len(values)} numbers")
     return numbers
 
 

@@ -40,66 +40,58 @@ SIGNALS = ("velocity", "velocity_desired", "position", "base_velocity", "base_po
 
 
 class SampleBuffer:
-    """Room for a batch of samples, and for some that wait for those that follow."""
+    """Collects a batch of samples, beside some that wait for those that follow."""
 
     def __init__(self, size: int, widths: Mapping[str, int], warnings: Warnings) -> None:
-        self._size, self._warnings = size, warnings
-        room = size + 2 * AGREE
-        self._signals = {name: np.empty((room, width)) for name, width in widths.items()}
-        self._time, self._received = np.empty(room), np.empty(room)
+        self._size, self._widths, self._warnings = size, widths, warnings
+        self._pieces: list[dict[str, Array]] = []
         self.held = self._waiting = 0
 
     @property
-    def full(self) -> bool:
-        """Whether there is a batch beside the samples that wait."""
-        return self.held >= self._size + self._waiting
+    def room(self) -> int:
+        """Samples that are missing from a batch."""
+        return self._size + self._waiting - self.held
 
     @property
     def stamps(self) -> Array:
         """Timestamps of all samples that are held, shape (held,)."""
-        return self._time[: self.held]
+        names = ("time", *self._widths)
+        joined = {name: np.concatenate([each[name] for each in self._pieces]) for name in names}
+        self._pieces = [joined]
+        return joined["time"]
 
-    def put(self, rows: Mapping[str, Array], time: Array, received: float) -> int:
-        """Take as many samples as fit in; missing signals, or of other widths, are unknown."""
-        count = min(len(time), self._size + self._waiting - self.held)
-        place = slice(self.held, self.held + count)
-        self._time[place], self._received[place] = time[:count], received
-        for name, values in self._signals.items():
+    def put(self, rows: Mapping[str, Array], time: Array) -> None:
+        """Take samples; missing signals, or of other widths, are unknown."""
+        piece, since, count = {"time": time}, f"from {time[0]:.3f} s on", len(time)
+        for name, width in self._widths.items():
             given = rows.get(name)
-            if given is not None and given.shape[1] == values.shape[1]:
-                values[place] = given[:count]
-            else:
-                values[place] = np.nan
-                self._note(name, given, values.shape[1], time[0], count)
-        for name in (name for name in rows if name not in self._signals):
-            line = f"{name} from {time[0]:.3f} s on was not there at first: not shown"
+            if given is not None and given.shape[1] == width:
+                piece[name] = given
+                continue
+            piece[name] = np.full((count, width), np.nan)
+            kind, line = f"samples without {name}", f"no {name} {since}: it was there at first"
+            if given is not None:
+                kind = f"samples with another width of {name}"
+                line = (
+                    f"{name} of {given.shape[1]} columns {since}, where it had {width}: not shown,"
+                    " and not labelled where it makes noise"
+                )
+            self._warnings.note(kind, line, count)
+        for name in (name for name in rows if name not in self._widths):
+            line = f"{name} {since} was not there at first: not shown"
             self._warnings.note(f"samples with a new {name}", line, count)
+        self._pieces.append(piece)
         self.held += count
-        return count
 
-    def take(self, kept: Mask, waiting: int) -> tuple[Array, dict[str, Array]]:
-        """Take out those that do not wait and are kept: when they came, and signals."""
-        decided = len(kept)
-        received = self._received[:decided][kept]
-        signals = {name: values[:decided][kept] for name, values in self._signals.items()}
+    def take(self, kept: Mask) -> dict[str, Array]:
+        """Take out the signals of the samples that are kept; those after them wait."""
+        (whole,) = self._pieces
+        signals = {name: whole[name][: len(kept)][kept] for name in self._widths}
         for values in signals.values():
             values[~(np.abs(values) < LARGEST)] = np.nan  # the square of others would overflow
-        for held in (self._time, self._received, *self._signals.values()):
-            held[:waiting] = held[decided : decided + waiting].copy()
-        self.held = self._waiting = waiting
-        return received, signals
-
-    def _note(self, name: str, given: Array | None, width: int, time: float, count: int) -> None:
-        since = f"from {time:.3f} s on"
-        if given is None:
-            kind, line = f"samples without {name}", f"no {name} {since}: it was there at first"
-        else:
-            kind = f"samples with another width of {name}"
-            line = (
-                f"{name} of {given.shape[1]} columns {since}, where it had {width}: not shown,"
-                " and not labelled where it makes noise"
-            )
-        self._warnings.note(kind, line, count)
+        self._pieces = [{name: values[len(kept) :] for name, values in whole.items()}]
+        self.held = self._waiting = self.held - len(kept)
+        return signals
 
 
 def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
@@ -107,7 +99,7 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
     rows: dict[str, Array] = {}
     for name, values in given.items():
         try:
-            array = np.asarray(values, dtype=np.float64)
+            array = np.array(values, dtype=np.float64)  # a copy: a caller may use his again
         except (TypeError, ValueError) as error:
             raise LiveError(f"{name}: holds no numbers ({error})") from error
         if array.ndim not in (1, 2):
@@ -170,7 +162,7 @@ class Clock:
         self._before: float | None = None  # its time
         self._checked = False
 
-    def take(self, stamps: Array, *, ended: bool = False) -> tuple[Mask, Array, Array, int]:
+    def take(self, stamps: Array, *, ended: bool = False) -> tuple[Mask, Array, Array]:
         """Decide about samples, those that waited before first.
 
         Args:
@@ -178,13 +170,13 @@ class Clock:
             ended: Whether none will follow, so that none has to wait.
 
         Returns:
-            Which samples are kept, shape (decided,); how many are missing before each of those,
-            shape (kept,); their times, always increasing, shape (kept,), in [s]; and how many
-            samples at the end wait, since only those that follow can decide about them.
+            Which samples are kept, shape (decided,), since of those at the end only what follows
+            can decide; how many are missing before each that is kept; and their times, always
+            increasing, in [s].
         """
         stamps = np.where(np.abs(stamps) < 1e100, stamps, np.nan)  # differences would overflow
         if not self._unit and not self._begin(stamps, ended=ended):
-            return np.zeros(0, dtype=bool), np.empty(0), np.empty(0), len(stamps)
+            return np.zeros(0, dtype=bool), np.empty(0), np.empty(0)
         known = stamps * self._unit
         kept, time = np.zeros(len(known), dtype=bool), np.empty(len(known))
         place, decided = 0, len(known)
@@ -206,7 +198,7 @@ class Clock:
                     self._jump(float(known[stop]))
                 place = stop
         time = time[:decided][kept[:decided]]
-        return kept[:decided], self._lost(time), time, len(known) - decided
+        return kept[:decided], self._lost(time), time
 
     def _begin(self, stamps: Array, *, ended: bool) -> bool:
         """Take the unit of timestamps from the first ones, if there are enough."""

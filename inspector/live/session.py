@@ -1,7 +1,6 @@
 """A live session: samples in, a viewer that follows."""
 
-import time as clocks
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike
 from inspector.analysis import headline, status_of
 from inspector.errors import Status
 from inspector.library import Library, for_robot, load_library
-from inspector.live.drawing import Drawing
+from inspector.live.drawing import Drawing, Sink
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
 from inspector.live.samples import (
     DROPPED,
@@ -28,7 +27,6 @@ from inspector.live.samples import (
     rows_of,
     widths_of,
 )
-from inspector.live.sink import LATE, Sink
 from inspector.logs.plausibility import LONG, LimitWatch, check_joints
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from noiseclassifier import Event, merged
@@ -36,8 +34,6 @@ from noisemodel.files import beyond, limit
 from noisemodel.robot import joint_limits
 from noisemodel.types import Array, Mask
 
-MAX_DELAYS = 100_000
-"""Delays that are kept, of the latest labels."""
 UNSEEN = "samples that the viewer may not have shown"
 LATE_SAMPLES = "samples that were not sent to a late viewer"
 BATCH = 0.05
@@ -50,36 +46,19 @@ MOST_DROPPED = 0.05
 
 @dataclass(frozen=True)
 class Summary:
-    """What became of the samples of a session.
+    """What became of the samples of a session."""
 
-    Attributes:
-        samples: That were received.
-        rate: Nominal samples per second, in [Hz].
-        model: Name of the model that labelled, empty without.
-        labels: Frames that were labelled, by class.
-        warnings: What could not be shown, by kind.
-        delays: From a frame's last sample to its label in the recording, of the latest labels,
-            in [s].
-        where: Where it was shown.
-        status: The status that `inspector classify` gives these labels.
-        findings: From the start of the first frame of each to the end of its last.
-        reason: Why nothing can be told; empty otherwise.
-        frame: Duration of a frame, by which findings may begin too early, in [s].
-        levels: Octave levels of the whole session once it is closed, if they were kept.
-    """
-
-    samples: int
-    rate: float
-    model: str
-    labels: Mapping[str, int]
-    warnings: Mapping[str, int]
-    delays: Sequence[float]
-    where: str
-    status: Status = Status.CANNOT_TELL
-    findings: Sequence[Event] = ()
-    reason: str = "no frame was labelled"
-    frame: float = 0.0
-    levels: Levels | None = None
+    samples: int  # that were received
+    rate: float  # nominal, in [Hz]
+    model: str  # that labelled, empty without
+    labels: Mapping[str, int]  # frames by class
+    warnings: Mapping[str, int]  # what could not be shown, by kind
+    where: str  # it was shown
+    status: Status = Status.CANNOT_TELL  # that `inspector classify` gives these labels
+    findings: Sequence[Event] = ()  # each from the start of its first frame to the end of its last
+    reason: str = "no frame was labelled"  # why nothing can be told
+    frame: float = 0.0  # duration, by which findings may begin too early, in [s]
+    levels: Levels | None = None  # of the whole session once it is closed, if they were kept
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {label}" for label, count in self.labels.items())
@@ -90,12 +69,6 @@ class Summary:
             *(f"  {finding}" for finding in self.findings),
             f"labels by {self.model}: {counts}" if counts else "no labels",
         ]
-        if self.delays:
-            median, late = (1e3 * delay for delay in np.percentile(self.delays, [50, 99]))
-            lines.append(
-                f"delay from a sample to its label: median {median:.1f} ms,"
-                f" 99 % within {late:.1f} ms"
-            )
         lines += [f"{count} {kind}" for kind, count in self.warnings.items()]
         return "\n".join(lines)
 
@@ -155,7 +128,6 @@ class LiveSession:
         self._buffer: SampleBuffer | None = None  # what follows is there once there are samples
         self._samples = self._unconfirmed = 0  # since the viewer was last known to be there
         self._counts: Counter[str] = Counter()  # frames that were labelled, by class
-        self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
         self._levels: Levels | None = None
         self._shift: float | None = None  # from the clock of the labels to that of the samples
         self._closed = False
@@ -170,7 +142,6 @@ class LiveSession:
         base_velocity: ArrayLike | None = None,
         base_pose: ArrayLike | None = None,
         time: ArrayLike | None = None,
-        received: float | None = None,
     ) -> None:
         """Take one sample, or a chunk of them.
 
@@ -185,14 +156,11 @@ class LiveSession:
                 (6,) or (samples, 6), in [m/s] and [rad/s].
             base_pose: x, y, z and quaternion x, y, z, w of it, shape (7,) or (samples, 7).
             time: Timestamps, shape () or (samples,), in [s]; by default samples follow each other.
-            received: Reading of ``time.perf_counter()`` when they were, by which the delay of
-                labels is measured; by default now.
 
         Raises:
             LiveError: If shapes do not fit together, or the session is closed.
             UnknownJointError: If the robot lacks a joint.
         """
-        received = clocks.perf_counter() if received is None else received
         if self._closed:
             raise LiveError("the session is closed; begin another one")
         given = (velocity, velocity_desired, position, base_velocity, base_pose)
@@ -204,9 +172,10 @@ class LiveSession:
         buffer = self._buffer = self._buffer or self._begin(rows)
         taken = 0
         while taken < len(stamps):
-            rest = {name: array[taken:] for name, array in rows.items()} if taken else rows
-            taken += buffer.put(rest, stamps[taken:], received)
-            if buffer.full:
+            piece = slice(taken, taken + buffer.room)
+            buffer.put({name: array[piece] for name, array in rows.items()}, stamps[piece])
+            taken = piece.stop
+            if buffer.room <= 0:
                 self._work(buffer)
 
     def note(self, kind: str, line: str, count: int = 1) -> None:
@@ -218,7 +187,7 @@ class LiveSession:
         """What became of the samples so far."""
         counts = dict(self._warnings.counts)
         if self._buffer is None:
-            return Summary(0, self._rate, "", {}, counts, (), self._sink.where)
+            return Summary(0, self._rate, "", {}, counts, self._sink.where)
         labeller, findings = self._labeller, self._found
         samples = self._samples + self._buffer.held
         status = status_of(self._counts.total(), findings)
@@ -234,7 +203,6 @@ class LiveSession:
             model=labeller.model,
             labels=dict(self._counts),
             warnings=counts,
-            delays=tuple(self._delays),
             where=self._sink.where,
             status=status,
             findings=findings,
@@ -289,10 +257,8 @@ class LiveSession:
         joints, robot = widths["velocity"], self._robot
         if joints > limit("joints"):
             raise LiveError(f"{joints} joints, {beyond('joints')}")
-        names = self._names
-        if not names and robot is None:
-            names = tuple(f"joint{number + 1}" for number in range(joints))
-        elif not names and robot is not None:
+        names = self._names or tuple(f"joint{number + 1}" for number in range(joints))
+        if not self._names and robot is not None:
             known = tuple(joint_limits(robot))
             if len(known) < joints:
                 raise LiveError(
@@ -362,8 +328,10 @@ class LiveSession:
 
     def _work(self, buffer: SampleBuffer, *, ended: bool = False) -> None:
         """Show the samples that a buffer holds, and empty it; few may have to wait for others."""
-        kept, lost, time, waiting = self._clock.take(buffer.stamps, ended=ended)
-        received, signals = buffer.take(kept, waiting)
+        if not buffer.held:
+            return
+        kept, lost, time = self._clock.take(buffer.stamps, ended=ended)
+        signals = buffer.take(kept)
         self._samples += len(kept)
         if not len(time):
             return
@@ -381,12 +349,12 @@ class LiveSession:
         if self._stream is not None:
             self._stream.push(float(time[0]), signals, valid, lost)
         edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(time)]
-        for first, stop in pairwise(edges):  # labels first: their latency counts
+        for first, stop in pairwise(edges):
             piece = slice(first, stop)
             if lost[first]:
                 self._labeller.skip(int(lost[first]))
                 self._drawing.skip()
-            self._label(time[piece], received[piece], motion[piece], valid[piece])
+            self._label(time[piece], motion[piece], valid[piece])
             own = {name: signal[piece] for name, signal in signals.items()}
             self._drawing.piece(time[piece], valid[piece], own)
         if self._sink.open:
@@ -398,15 +366,13 @@ class LiveSession:
                 self._watch = None
         self._check_viewer(len(time))
 
-    def _label(self, time: Array, received: Array, motion: Array, valid: Mask) -> None:
+    def _label(self, time: Array, motion: Array, valid: Mask) -> None:
         """Label and draw a stretch without missing samples."""
         labels = self._labeller.push(motion, valid)
         if labels is None or not len(labels):
             return
-        end, elapsed = float(time[-1]) + 1.0 / self._rate, self._labeller.elapsed
-        # How far back in the stretch frames end; a lower rate lags behind.
-        back = np.rint((elapsed - labels.stop) * self._rate).astype(int)
-        shift = end - elapsed
+        end = float(time[-1]) + 1.0 / self._rate
+        shift = end - self._labeller.elapsed
         labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
         self._findings.add(labels)
         self._shift = shift if self._shift is None else self._shift
@@ -416,17 +382,11 @@ class LiveSession:
         self._counts.update(labels.raw.tolist())
         self._drawing.labels(labels)
         if self._sink.open:
-            last = len(received) - 1 - back
-            before = np.minimum(last, 0) / self._rate
-            delay = clocks.perf_counter() - received[np.maximum(last, 0)] - before
-            self._delays.extend(delay.tolist())
             self._drawing.findings(end, self._found, end - 2 * self._labeller.hop)
 
     def _check_viewer(self, samples: int) -> None:
         """Count samples until the viewer is known to be there; warn if it is gone or late."""
         self._unconfirmed += samples
-        if self._sink.behind > LATE and not (self._sink.late or self._sink.gone):
-            self._drawing.end_lane()  # nothing is shown while it is late
         if self._sink.check_viewer():
             self._unconfirmed = 0
         if self._sink.gone or self._sink.late:

@@ -225,29 +225,40 @@ Timed: TypeAlias = tuple[Part, float]
 """A panel over time with its height, in points."""
 
 
-def part(panel: Panel, plot: Part, *, name: str | None = None) -> Part:
-    """A panel with what stands beside it."""
-    left, right = (unstable.drawing(f"/axis/{panel.name}/{side}") for side in ("left", "right"))
-    return unstable.beside((left, LEFT), (plot, MIDDLE), (right, RIGHT), name=name)
-
-
 def timed(
     panel: Panel,
     path: str = "",
     *,
     title: str | None = None,
     name: str | None = None,
-    between: tuple[float, float] = (0.0, TOP),
+    between: tuple[float, float] | None = (0.0, TOP),
     paths: Sequence[str] = ALL,
     legend: bool = False,
+    during: tuple[float, float] | None = None,
+    last: float | None = None,
 ) -> Timed:
-    """A panel of what lies below a path, its own unless given: of rows, or of an axis with ends."""
+    """A panel of what lies below a path, its own unless given, with what stands beside it.
+
+    Args:
+        name: What its tab is called.
+        between: Ends of its axis, those of rows by default; that of its lines if None.
+        during: See `unstable.plot`, as for `last`.
+    """
     path = path or f"/{panel.name}"
-    title = path.rpartition("/")[2] if title is None else title
     plot = unstable.plot(
-        title, path, paths, between=between, fixed=True, titled=False, legend=legend
+        path.rpartition("/")[2] if title is None else title,
+        path,
+        paths,
+        between=between,
+        fixed=between == (0.0, TOP),
+        titled=False,
+        legend=legend,
+        during=during,
+        last=last,
     )
-    return part(panel, plot, name=name), panel.height
+    left, right = (unstable.drawing(f"/axis/{panel.name}/{side}") for side in ("left", "right"))
+    parts = (left, LEFT), (plot, MIDDLE), (right, RIGHT)
+    return unstable.beside(*parts, name=name), panel.height
 
 
 def row_labels(names: Sequence[str], colours: Sequence[Color] = ()) -> list[Label]:

@@ -20,7 +20,7 @@ from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps, orders
 from inspector.levels import RANGE_DB, WINDOW, Scale, Spectrogram, extremes, in_bands
 from inspector.recording import axes, robot, unstable
 from inspector.recording.axes import Label, Panel, Timed, at
-from inspector.recording.unstable import Part
+from inspector.recording.unstable import Camera, Part
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
 from inspector.report.findings import brief, classes_of, finding_of, spoken
@@ -275,8 +275,7 @@ def _curve(
     }
     log_shades(recording, f"{path}/finding", found, styles, between)
     log_gaps(recording, path, analysis.run, between)
-    plot = unstable.plot(panel.name, path, axes.ALL, between=between, titled=False)
-    return axes.part(panel, plot), panel.height
+    return axes.timed(panel, between=between)
 
 
 def scaled(values: Array) -> tuple[float, str]:
@@ -562,6 +561,14 @@ def _log_strip(
         shades=shades,
     )
     return axes.timed(panel, path, name=title)
+
+
+def robot_view(camera: Camera, *, coloured: bool = True) -> Part:
+    """A robot, and the scale of its colours if it has any."""
+    title = "Robot, links coloured by level above 10 Hz" if coloured else "Robot"
+    robot = unstable.robot(title, "/robot", camera)
+    key = unstable.drawing(f"/axis/{KEY.name}/right")
+    return unstable.beside((robot, 88.0), (key, 12.0)) if coloured else robot
 
 
 def log_power(

@@ -145,13 +145,15 @@ def log_robots(
         names = (*run.joint_names, *run.desired_joint_names)
         tree, frames = load(run.robot, folder, names, side=side), shown(run)
         log_shapes(recording, tree)
-        moved, index = angles(tree, run, frames), [axes.at(run.time[frames])]
+        assert run.position is not None
+        columns = dict(zip(run.joint_names, run.position[frames].T, strict=True))
+        moved, index = angles(tree, columns), [axes.at(run.time[frames])]
         for joint in tree.joints():
             if joint.name in moved:
                 angle = moved[joint.name].tolist()
-                columns = joint.compute_transform_columns(angle, clamp=False)
                 path = f"{origin(tree)}/motion/{joint.name}"
-                recording.send_columns(path, indexes=index, columns=columns)
+                turns = joint.compute_transform_columns(angle, clamp=False)
+                recording.send_columns(path, indexes=index, columns=turns)
         pose = None if run.base_pose is None else run.base_pose[frames].astype(np.float64)
         if pose is not None:
             _log_motion(recording, tree, "base", run, pose[:, :3], quaternion=pose[:, 3:])
@@ -190,13 +192,13 @@ def shown(run: Run) -> NDArray[np.intp]:
     return frames[run.mask[frames]]
 
 
-def angles(tree: UrdfTree, run: Run, frames: NDArray[np.intp]) -> dict[str, Array]:
-    """Positions of all joints that move, by joint, mimics included, shape (frames,)."""
-    assert run.position is not None
-    columns = {name: run.position[frames, i] for i, name in enumerate(run.joint_names)}
+def angles(tree: UrdfTree, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Positions of all joints that move, by joint, mimics included, by those that are known."""
     found = {}
     for joint in tree.joints():
         follows = joint.mimic
+        if joint.joint_type == "fixed":
+            continue
         if follows is not None and follows.joint in columns:
             found[joint.name] = columns[follows.joint] * follows.multiplier + follows.offset
         elif joint.name in columns:

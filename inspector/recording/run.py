@@ -111,11 +111,8 @@ def write(
         if analysis.links is not None:
             robots = robot.log_robots(recording, {"": run}, Path(folder), aspect=ASPECT)
             ((tree, seen),) = robots
-            title = "Robot, links coloured by level above 10 Hz"
-            views = (unstable.robot(title, "/robot", seen), 88.0)
-            key = (unstable.drawing(f"/axis/{panels.KEY.name}/right"), 12.0)
             rest = WHOLE - DETAILS - sum(size for _, size in left)
-            left.append((unstable.beside(views, key), rest))
+            left.append((panels.robot_view(seen), rest))
         details = unstable.tabs(*panels.log_details(recording, analysis, moments))
         over_time = [
             *panels.log_classes(recording, analysis),

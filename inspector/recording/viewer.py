@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from ctypes.util import find_library
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ SETTLE = 2.0
 START_TIMEOUT = 20.0
 """Time within which a viewer listens, in [s]."""
 CONNECT_TIMEOUT = 2.0
-"""Time within which a display on another machine has to respond, in [s]."""
+"""Time within which a program that listens has to respond, in [s]."""
 PORT = "9876"
 """Where rerun's viewer listens; one that does already takes the recording over."""
 HOST = "127.0.0.1"
@@ -70,55 +70,13 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def display_problem() -> str:
-    """Why the display that is set cannot be opened, in a line; empty if it can or none is set."""
-    if sys.platform.startswith(("darwin", "win")):
-        return ""
-    problems = [problem for problem in (_wayland_problem(), _x_problem()) if problem is not None]
-    return problems[0] if problems and all(problems) else ""
-
-
-def _wayland_problem() -> str | None:
-    """Why the Wayland display cannot be opened, empty if it can; None if none is set."""
-    name = os.environ.get("WAYLAND_DISPLAY")
-    if not name:
-        return None
-    path = Path(os.environ.get("XDG_RUNTIME_DIR", "")) / name
-    reason = _unreachable([str(path)]) if path.is_absolute() else "XDG_RUNTIME_DIR is not set"
-    return reason and f"the display {name} cannot be opened ({reason})"
-
-
-def _x_problem() -> str | None:
-    """Why the X display cannot be opened, empty if it can; None if none is set."""
-    name = os.environ.get("DISPLAY")
-    if not name:
-        return None
-    parts = re.fullmatch(r"(?:unix/)?(?P<host>[^/]*):(?P<number>\d{1,4})(?:\.\d+)?", name)
-    if parts is None:
-        reason = "expected [HOST]:NUMBER, such as :0"
-    elif parts["host"] in ("", "unix"):
-        path = f"/tmp/.X11-unix/X{parts['number']}"  # noqa: S108  # where X servers listen
-        reason = _unreachable([path, f"\0{path}"])
-    else:
-        reason = _unreachable([(parts["host"], 6000 + int(parts["number"]))])
-    return reason and f"the display {name} cannot be opened ({reason})"
-
-
-def _unreachable(addresses: Sequence[str | tuple[str, int]]) -> str:
-    """Why no server can be reached at any of some addresses; empty if one can."""
-    problem = ""
-    for address in addresses:
-        try:
-            if isinstance(address, str):
-                with socket.socket(socket.AF_UNIX) as probe:
-                    probe.connect(address)
-            else:
-                socket.create_connection(address, CONNECT_TIMEOUT).close()
-        except OSError as error:
-            problem = problem or f"nothing listens there: {error.strerror or error}"
-        else:
-            return ""
-    return problem
+def listens(host: str, port: int) -> bool:
+    """Whether a program listens on a port."""
+    try:
+        socket.create_connection((host, port), CONNECT_TIMEOUT).close()
+    except OSError:
+        return False
+    return True
 
 
 def scratch_path(run: Path) -> Path:
@@ -180,11 +138,11 @@ class Process:
     def listens(self, port: int, seconds: float) -> bool:
         """Wait until a program listens on a port, unless this one ends or it takes too long."""
         until = time.monotonic() + seconds
-        while problem := _unreachable([(HOST, port)]):
-            if self.process.poll() is not None or time.monotonic() > until:
-                break
+        while self.process.poll() is None and time.monotonic() < until:
+            if listens(HOST, port):
+                return True
             time.sleep(0.05)
-        return not problem
+        return listens(HOST, port)
 
     def kill(self) -> None:
         """End it with all its children."""
@@ -207,8 +165,6 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
     It does not end with the block, nor by Ctrl-C, and it sends no usage data.
     """
     given = NO_ANALYTICS | dict(os.environ if env is None else env)
-    if _wayland_problem() and _x_problem() == "":
-        del given["WAYLAND_DISPLAY"]  # the viewer would try it alone
     with tempfile.TemporaryFile() as stderr:
         process = subprocess.Popen(
             command(*arguments),
@@ -223,13 +179,11 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
 
 def open_window(recording: Path, seconds: float | None = None) -> str:
     """Show a recording in the viewer that runs, or a new one; why no window opened, if none did."""
-    if problem := display_problem():
-        return problem
-    if not _started(recording, PORT):
+    if not launch(PORT, str(recording)):
         if seconds is not None:
             _put_cursor(f"rerun+http://{HOST}:{PORT}/proxy", seconds)
         return ""
-    return _started(recording, "auto")  # another program listens where viewers do
+    return launch("auto", str(recording))  # another program listens where viewers do
 
 
 def _put_cursor(address: str, seconds: float) -> None:
@@ -247,9 +201,10 @@ def _put_cursor(address: str, seconds: float) -> None:
         time.sleep(0.1)
 
 
-def _started(recording: Path, port: str) -> str:
-    taken = port.isdigit() and not _unreachable([(HOST, int(port))])
-    with started("--port", port, "--hide-welcome-screen", str(recording)) as viewer:
+def launch(port: str, *arguments: str) -> str:
+    """Start a viewer that opens a window, if none listens on the port; why it ended, if it did."""
+    taken = port.isdigit() and listens(HOST, int(port))
+    with started("--port", port, "--hide-welcome-screen", *arguments) as viewer:
         # It listens before it opens its window; if another one does already, it only passes on.
         if taken:
             with suppress(subprocess.TimeoutExpired):
