@@ -3,13 +3,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import rerun as rr
 from chains import chain
 from commandline import call
-from recordings import read
-from rerun.chunk import RrdReader
 
-from inspector.compare.models import cells, draw, levels, shades, write, write_csv
+from inspector.compare.models import write_csv
 from noisemodel import ROBOTS, Comparisons, compare
 from noisemodel.compare import excitation
 
@@ -32,10 +29,6 @@ def inspector(*arguments):
     return call("noise", "--compare", *arguments)
 
 
-def entities(path):
-    return set(RrdReader(path).store().schema().entity_paths())
-
-
 def test_the_csv_has_a_row_per_robot_and_kind(found, tmp_path):
     write_csv(Comparisons(found.robots[:2]), tmp_path / "out.csv")
     with (tmp_path / "out.csv").open(encoding="utf-8") as file:
@@ -51,76 +44,19 @@ def test_the_csv_has_a_row_per_robot_and_kind(found, tmp_path):
     assert bands[-1] == "distance_500_up_db"
 
 
-def test_a_recording_holds_every_model_of_every_robot(found, urdf, tmp_path):
-    rr.set_strict_mode(True)
-    write(Comparisons(found.robots[:1]), tmp_path / "out.rrd")
-    root = f"/{rr.escape_entity_path_part(urdf)}"
-    held = entities(tmp_path / "out.rrd")
-    for kind in KINDS:
-        assert f"{root}/level/{kind}" in held
-        assert f"{root}/vibration/{kind}" in held
-        assert f"{root}/spectrogram/{kind}/bands/00" in held
-    assert {f"{root}/events/jerk", "/report"} <= held
-    assert len(RrdReader(tmp_path / "out.rrd").blueprints()) == 1
-
-
-def test_the_heat_maps_have_the_numbers_of_the_table_and_the_reference_is_dark(found, tmp_path):
-    rr.set_strict_mode(True)
-    write(found, tmp_path / "out.rrd")
-    for name, own, form in (("correlation", 1.0, "{:.2f}"), ("distance", 0.0, "{:.1f}")):
-        numbers = cells(found, name)
-        assert numbers.shape == (3, len(KINDS))
-        np.testing.assert_allclose(numbers[:, KINDS.index("normal")], own)
-        _, (labels,) = read(tmp_path / "out.rrd", f"/overview/{name}/numbers", "Points2D:labels")
-        written = [form.format(number) for row in numbers for number in row]
-        assert [label for label in labels if label in written] == written
-        assert labels[-len(KINDS) :] == list(KINDS)
-    near, far = shades(np.array([[1.0, 0.2]]), "correlation")[0].astype(int).sum(axis=-1)
-    assert near < far
-    near, far = shades(np.array([[0.0, 8.0]]), "distance")[0].astype(int).sum(axis=-1)
-    assert near < far
-
-
-def test_curves_of_all_kinds_lie_over_each_other_in_one_plot(found, tmp_path):
-    write(Comparisons(found.robots[:1]), tmp_path / "out.rrd")
-    reader = RrdReader(tmp_path / "out.rrd")
-    (blueprint,) = reader.blueprints()
-    origins = [
-        batch.column("ViewBlueprint:space_origin").to_pylist()[0][0]
-        for batch in (c.to_record_batch() for c in reader.store(store=blueprint).stream())
-        if "ViewBlueprint:space_origin" in batch.schema.names
-    ]
-    assert sum(origin.endswith("/vibration") for origin in origins) == 1
-    assert sum(origin.endswith("/level") for origin in origins) == 1
-
-
-def test_levels_are_relative_to_the_root_mean_square(found):
-    time, level = levels(found[0], found[0].pressure)
-    assert level.shape == (len(time), len(KINDS))
-    np.testing.assert_allclose(np.mean(10 ** (level / 10), axis=0), 1.0, rtol=1e-6)
-    np.testing.assert_allclose(np.diff(time), 0.01, rtol=1e-9)
-    _, silence = levels(found[0], np.zeros_like(found[0].pressure))
-    assert (silence == -60.0).all()
-
-
-def test_a_picture_is_drawn_without_a_display(found, tmp_path):
-    pytest.importorskip("matplotlib")
-    draw(found, tmp_path / "out.png")
-    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_the_command_writes_everything_and_continues_after_a_robot_that_cannot_be_read(
     urdf, tmp_path
 ):
     pytest.importorskip("matplotlib")
-    outputs = {name: tmp_path / f"out.{name}" for name in ("csv", "rrd", "png")}
+    outputs = {name: tmp_path / f"out.{name}" for name in ("csv", "png")}
     arguments = ["--robots", f"{urdf},ur3_empty,robby", "--kind", ",".join(KINDS), "-j", "2"]
-    arguments += ["--csv", outputs["csv"], "--save", outputs["rrd"], "--picture", outputs["png"]]
+    arguments += ["--csv", outputs["csv"], "--picture", outputs["png"]]
     status, out, err = inspector(*arguments)
     assert status == 0
     assert "correlation" in out
     assert [line.split(": ")[1] for line in err.splitlines()] == ["ur3_empty", "robby"]
-    assert all(path.stat().st_size > 0 for path in outputs.values())
+    assert outputs["png"].read_bytes().startswith(b"\x89PNG")
+    assert len(outputs["csv"].read_text().splitlines()) == 1 + len(KINDS)
 
 
 def test_the_command_compares_runs(tmp_path):
@@ -168,7 +104,6 @@ def test_runs_without_robot_are_one_line_and_nothing_else_is_left(tmp_path):
         (["--robots", "panda", "--kind", "paper,loud"], 2, "no kind 'loud' of noise"),
         (["--robots", "panda", "--csv", "/no/such/folder/x.csv"], 3, "cannot be written"),
         (["--robots", "robby"], 3, "no robot 'robby'"),
-        (["--robots", "all", "--save", "x.rrd"], 3, "x.rrd: a recording holds 8 robots and runs"),
     ],
 )
 def test_what_cannot_be_compared_is_one_line(arguments, status, message):

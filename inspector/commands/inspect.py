@@ -319,7 +319,6 @@ Compare = Annotated[
 Robots = Annotated[str, _model_option("Compare them on robots that move: talos,go2 or all.")]
 Geometry = Annotated[Geometries, _model_option("Shapes: visual, collision, hull or auto.")]
 Seed = Annotated[int, _model_option("Random seed of the generated motion.", min=0)]
-SaveCompared = Annotated[Path | None, _model_option("Write a recording (.rrd).")]
 PictureCompared = Annotated[Path | None, _model_option("Write a PNG (needs the extra `report`).")]
 
 
@@ -332,7 +331,6 @@ def noise(
     robots: Robots = "",
     geometry: Geometry = "auto",
     seed: Seed = 0,
-    save: SaveCompared = None,
     picture: PictureCompared = None,
     jobs: NumberOfJobs = 1,
     overwrite: Overwrite = False,
@@ -345,20 +343,24 @@ def noise(
     if not compare and not robots:
         if len(runs or ()) != 1:
             raise typer.BadParameter("name one run; --compare takes several")
-        if save or picture:
-            raise typer.BadParameter("--save and --picture take --compare")
+        if picture:
+            raise typer.BadParameter("--picture takes --compare")
         _print_levels((runs or [])[0], ctx.obj, kinds, csv, overwrite=overwrite)
         return
     import noisemodel as nm
-    from inspector.compare.models import Outputs
+    from inspector.compare.models import draw, write_csv
+    from inspector.report.picture import require
     from inspector.text import progress
+    from noisemodel.files import refuse_existing
 
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
     sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
     if not sources:
         raise typer.BadParameter("name run files, or robots with --robots")
-    outputs = Outputs(csv, save, picture, overwrite=overwrite)
-    outputs.check(len(sources))
+    for path in filter(None, (csv, picture)):  # before long work is done for them
+        refuse_existing(path, overwrite=overwrite)
+    if picture:
+        require()
     found = nm.compare(
         sources,
         kinds=kinds or COMPARED,
@@ -371,7 +373,10 @@ def noise(
         typer.echo(f"inspector: {left_out.name}: {left_out.reason}", err=True)
     if not found:
         raise typer.Exit(3)
-    outputs.write(found)
+    if csv:
+        write_csv(found, csv, overwrite=overwrite)
+    if picture:
+        draw(found, picture, overwrite=overwrite)
     typer.echo(found)
 
 

@@ -101,16 +101,6 @@ def drawing(origin: str) -> Part:
     )
 
 
-def picture(name: str, origin: str, across: tuple[float, float], down: tuple[float, float]) -> Part:
-    """Draw images, points and lines in a part of a plane, y downwards."""
-    return rrb.Spatial2DView(
-        origin=origin,
-        name=name,
-        visual_bounds=rrb.VisualBounds2D(x_range=across, y_range=down),
-        background=rrb.Background(color=PLOTS),
-    )
-
-
 def bars(name: str, origin: str) -> Part:
     """Draw the bar chart that holds at the time cursor."""
     return rrb.BarChartView(origin=origin, name=name, plot_legend=rrb.PlotLegend(visible=False))
