@@ -6,7 +6,7 @@ and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robot
 """
 
 from noisemodel.compare import Comparison, Comparisons, LeftOut, compare
-from noisemodel.noise import KINDS, Noise, by_joint, extended, norms, simplified, surface_speed
+from noisemodel.noise import KINDS, Noise, by_joint, extended, norms, simplified
 from noisemodel.recorder import Recorder
 from noisemodel.robot import ROBOTS, Robot, link_twists
 from noisemodel.run import Block, Run, decimated, resample
@@ -54,10 +54,4 @@ __all__ = [
     "norms",
     "resample",
     "simplified",
-    "surface_speed",
 ]
-
-
-def __dir__() -> list[str]:
-    """Public names alone: submodules are found by importing them."""
-    return __all__

@@ -521,29 +521,23 @@ def compare(
 
     All estimates are compared as pressures, whose scale is arbitrary: a factor between two kinds
     changes neither their correlation nor their distance. F. Sygulla and D. Rixen define the
-    kinds "simplified" and "paper" ("Learning the Noise of Failure", Sec. II-A); ``surface_speed``
-    defines the others. Each kind is evaluated once.
-
-    Robots that cannot be read or have no surface, and runs that do not suffice, are left out and
-    listed with the reason.
+    kinds "simplified" and "paper" ("Learning the Noise of Failure", Sec. II-A); ``extended``
+    defines the others. Robots that cannot be read or have no surface, and runs that do not suffice,
+    are left out and listed with the reason.
 
     Args:
-        robots: One or many: a ``Robot``, a name, or the path of a URDF or an MJCF; or a
-            ``Run``, or the path of a run file (a ``Path``, or text that ends in ``.npz``), for the
-            robot that it names and the motion that it holds. If a run has gaps, the longest stretch
-            without one is compared. What is no run moves by the `excitation`, for which mimic
-            joints of named robots are coupled.
-        kinds: "simplified", or kinds of ``surface_speed``.
+        robots: One or many: a ``Robot``, a name, or the path of a URDF or an MJCF, which move by
+            the `excitation`; or a ``Run``, or the path of a run file (a ``Path``, or text that ends
+            in ``.npz``), for the robot that it names and the longest stretch without a gap.
+        kinds: "simplified", or kinds of ``extended``.
         surface: The geometry that surfaces are taken from: "visual", "collision", "hull" or "auto".
         seed: Random seed of the excitation.
         jobs: How many robots to compare at once, or the address of a Dask scheduler.
-        progress: Shows the progress; takes an iterable and its length ``total``, and yields the
-            items, as ``tqdm`` does.
+        progress: Takes an iterable and its length ``total``, and yields the items, as ``tqdm``.
 
     Raises:
-        UnknownKindError: If a kind does not exist.
-        GeometryError: If the geometry does not exist.
-        NoiseModelError: If there are no robots, or fewer than two different kinds.
+        NoiseModelError: If there are no robots, or fewer than two different kinds; or one of its
+            subclasses, if a kind or the geometry does not exist.
     """
     sources = [robots] if isinstance(robots, Source) else list(robots)
     kinds = (kinds,) if isinstance(kinds, str) else tuple(kinds)

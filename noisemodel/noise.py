@@ -23,7 +23,6 @@ Index: TypeAlias = NDArray[np.intp]
 DENSITY = 1.204  # of air at 20 °C, in [kg/m³]
 SOUND_SPEED = 343.2  # in air at 20 °C, in [m/s]
 REFERENCE_POWER = 1e-12  # 0 dB of sound power, in [W]
-LOUDEST = 5  # links that are printed by name
 CHUNK = 4096  # samples worked on at once: few enough for the cache, with little overhead of Python
 
 KINDS = ("paper", "A", "B", "C", "mean", "rms", "normal")
@@ -49,9 +48,6 @@ def simplified(velocity: Real, velocity_desired: Real | None = None) -> Array:
 
     Returns:
         The noise estimate p_hat, shape (samples,), in [rad/s].
-
-    Raises:
-        NoiseModelError: If an array is not two-dimensional or the lengths differ.
     """
     power = _squared(velocity)
     if velocity_desired is not None:
@@ -75,13 +71,11 @@ def _squared(velocity: Real) -> Array:
 
 
 def norms(run: Run) -> dict[str, Array]:
-    """Reduce the velocities of a run to a few signals.
+    """Reduce the velocities of a run to signals by name, each of shape (samples,), in [rad/s].
 
-    Returns:
-        Signals by name, each of shape (samples,), in [rad/s]: ``measured``, a floating base's
-        velocities among them, and ``noise``, the simplified estimate; with desired velocities also
-        ``desired`` and ``error``, the difference of desired and measured velocities of the joints
-        that have both, if there are any.
+    They are ``measured``, a floating base's velocities among them, and ``noise``, the simplified
+    estimate; with desired velocities also ``desired`` and ``error``, the difference of desired and
+    measured velocities of the joints that have both, if there are any.
     """
     motion, desired = run.motion, run.velocity_desired
     signals = {"noise": simplified(motion, desired), "measured": simplified(motion)}
@@ -97,13 +91,11 @@ def norms(run: Run) -> dict[str, Array]:
 
 
 def by_joint(run: Run) -> dict[str, Array]:
-    """Take the velocities of those joints that are desired as well as measured.
+    """Take the velocities of joints, by name of the signal, each (joints, samples), in [rad/s].
 
-    Returns:
-        ``desired_joints``, ``measured_joints`` and ``error_joints``, their difference, each of
-        shape (joints, samples), in [rad/s]; without desired velocities, ``measured_joints`` of all
-        joints; with efforts, also ``effort_joints``, in their unit; nothing if no desired joint is
-        measured.
+    They are ``desired_joints``, ``measured_joints`` and ``error_joints``, their difference, of the
+    joints that are desired as well as measured; without desired velocities, ``measured_joints`` of
+    all joints; with efforts, also ``effort_joints``, in their unit.
     """
     found = {}
     own = list(range(len(run.joint_names)))
@@ -165,13 +157,6 @@ class Noise:
         energy = self.power.sum(axis=0)
         return np.asarray(energy / max(energy.sum(), TINY))
 
-    def __str__(self) -> str:
-        mean = float(decibel(self.total.mean() / REFERENCE_POWER))
-        share = self.shares
-        lines = [f"{len(self.power)} samples, mean sound power {mean:.1f} dB re 1 pW"]
-        loudest = [link for link in np.argsort(-share, kind="stable")[:LOUDEST] if share[link]]
-        return "\n".join([*lines, *(f"{self.names[i]:28} {share[i]:6.1%}" for i in loudest)])
-
 
 def sound_power(mean_square: Array, area: Array | float) -> Array:
     """Sound power in [W] of surfaces, by mean-square speeds in [m²/s²] and areas in [m²]."""
@@ -186,34 +171,6 @@ def decibel(ratio: Array) -> Array:
 
 
 # Mean speeds of a link's surface: the paper's equation and its alternatives.
-
-
-def surface_speed(robot: Robot, surface: Surface, q: Real, v: Real, kind: str = "paper") -> Array:
-    """Mean speed of the surface of every link.
-
-    Args:
-        robot: The robot.
-        surface: Its surface.
-        q: Configurations as Pinocchio has them, shape (samples, nq).
-        v: Velocities as Pinocchio has them, shape (samples, nv).
-        kind: "paper", the sum of the paper's terms "A", "B" and "C", or one of these; "mean",
-            the exact mean that the sum is an upper bound of; "rms", the root of the mean-square
-            speed; "normal", the same for the speed normal to the surface.
-
-    Returns:
-        Shape (samples, links), in [m/s]; 0 for links without geometry.
-
-    Raises:
-        UnknownKindError: If there is no such kind.
-        GeometryError: If the surface belongs to another robot.
-        NoiseModelError: If ``q`` or ``v`` are of another shape or not finite.
-    """
-    _check(robot, surface, q, v, kind)
-    speeds = np.empty((len(surface.links), len(q)))
-    for start in range(0, len(q), CHUNK):
-        part = slice(start, start + CHUNK)
-        speeds[:, part] = chunk_speeds(robot, surface, q[part], v[part], kind)
-    return speeds.T
 
 
 def chunk_speeds(robot: Robot, surface: Surface, q: Real, v: Real, kind: str) -> Array:
@@ -261,18 +218,6 @@ def _length(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("is,is->s", vectors, vectors)))
 
 
-def _check(robot: Robot, surface: Surface, q: Real, v: Real, kind: str) -> None:
-    """Refuse an unknown kind, a surface of another robot, and a motion that is not this robot's."""
-    if kind not in KINDS:
-        raise UnknownKindError(kind, KINDS)
-    if len(surface.names) != len(robot.joints):
-        raise GeometryError(
-            f"a surface of {len(surface.names)} links for {robot.name!r}, which has"
-            f" {len(robot.joints)}; expected Surface.of(robot)"
-        )
-    _check_motion(robot, q, v, ("q", "v"))
-
-
 def _check_motion(robot: Robot, q: Real, v: Real, names: tuple[str, str]) -> None:
     for name, array, width in zip(names, (q, v), (robot.nq, robot.nv), strict=True):
         if array.shape != (len(q), width):
@@ -302,7 +247,9 @@ def extended(
         surface: Its surface.
         q: Configurations as Pinocchio has them, shape (samples, nq).
         v: Velocities as Pinocchio has them, shape (samples, nv).
-        kind: How the mean speed of a surface is taken, see ``surface_speed``.
+        kind: How the mean speed of a surface is taken: "paper", the sum of the paper's terms "A",
+            "B" and "C", or one of these; "mean", the exact mean that the sum is an upper bound of;
+            "rms", the root of the mean-square speed; "normal", the same normal to the surface.
         q_desired: Desired configurations, shape (samples, nq); ``q`` unless given.
         v_desired: Desired velocities, shape (samples, nv); the power of this motion is added.
             A floating base is stationary in it, whatever is given.
@@ -312,7 +259,14 @@ def extended(
         GeometryError: If the surface belongs to another robot.
         NoiseModelError: If a motion is of another shape than the robot's, or not finite.
     """
-    _check(robot, surface, q, v, kind)
+    if kind not in KINDS:
+        raise UnknownKindError(kind, KINDS)
+    if len(surface.names) != len(robot.joints):
+        raise GeometryError(
+            f"a surface of {len(surface.names)} links for {robot.name!r}, which has"
+            f" {len(robot.joints)}; expected Surface.of(robot)"
+        )
+    _check_motion(robot, q, v, ("q", "v"))
     motions = _motions(robot, q, v, q_desired, v_desired)
     power, stop = np.empty((len(surface.links), len(q))), 0
     for part in _powers(robot, surface, motions, kind, CHUNK):

@@ -185,7 +185,7 @@ class Robot:
         mimic: bool = False,
         package_root: str | Path | None = None,
     ) -> Self:
-        """Read a robot.
+        """Read a robot; a RobotError if it is not known or cannot be read.
 
         Args:
             name: A listed name (see ``noisemodel.ROBOTS``), ``menagerie/NAME`` or
@@ -195,10 +195,6 @@ class Robot:
                 of its own, and as an MJCF has it.
             mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
             package_root: A further folder that meshes may lie in, see `package_roots`.
-
-        Raises:
-            UnknownRobotError: If there is neither such a name nor such a file.
-            RobotError: If the URDF or MJCF cannot be read, or ``package_root`` is no folder.
         """
         listed = ROBOTS.get(str(name))
         path = locate(name)
@@ -305,7 +301,7 @@ class Robot:
 def locate(name: str | Path) -> Path:
     """Find the URDF or MJCF of a robot that is given by its name or its path."""
     if str(name) in ROBOTS:
-        return urdf_path(str(name))
+        return listed_folders()[-1] / ROBOTS[str(name)].urdf
     path = Path(name)
     with suppress(OSError, ValueError):  # no name that a file can have
         if path.is_file():
@@ -434,11 +430,6 @@ def listed_folders() -> tuple[Path, ...]:
     return share, data, data / "robots"
 
 
-def urdf_path(name: str) -> Path:
-    """Find the URDF of a listed robot."""
-    return listed_folders()[-1] / ROBOTS[name].urdf
-
-
 def is_name(name: str) -> bool:
     """Whether a text is a listed robot, or names one of MuJoCo Menagerie."""
     return name in ROBOTS or (name.startswith(MENAGERIE) and not is_robot_file(name))
@@ -553,9 +544,6 @@ def link_twists(robot: Robot, q: Real, v: Real) -> Array:
         Linear, then angular velocity of each joint's frame in its own axes, the universe first,
         as Pinocchio's ``data.v``, shape (samples, njoints, 6), in [m/s] and [rad/s]. In memory
         the samples lie next to each other.
-
-    Raises:
-        NoiseModelError: If ``q`` is not (samples, nq) or ``v`` not (samples, nv).
     """
     for name, array, width in (("q", q, robot.nq), ("v", v, robot.nv)):
         if array.shape != (len(q), width):

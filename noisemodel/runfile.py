@@ -83,7 +83,8 @@ class ObjectArrayError(ArchiveError):
 
     def __init__(self, name: str) -> None:
         self.name = name
-        super().__init__(f"Object arrays cannot be loaded: {name} holds Python objects")
+        instead = "leave it out, or save plain numbers or text"
+        super().__init__(f"{name} holds a Python object, such as None; {instead}")
 
 
 def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
@@ -102,13 +103,6 @@ def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
                 )
         arrays = read_npz(path, on_demand=LARGE if on_demand else inf)
         found = {name: _plain(path, name, each) for name, each in arrays.items()}
-    except ObjectArrayError as error:
-        kind = KIND_WORDS[ARRAYS.get(error.name, STAGE_ARRAY)[0]]
-        raise RunFileError(
-            path,
-            f"not a run file: {error.name} holds a Python object, such as None; leave it out, or"
-            f" save {kind}",
-        ) from error
     except (OSError, ArchiveError) as error:
         raise _unread(path, error) from error
     version = str(found.get("format", FORMAT))

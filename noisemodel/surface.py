@@ -424,9 +424,3 @@ class Surface:
     def without_geometry(self) -> tuple[str, ...]:
         """Names of the links without geometry."""
         return tuple(self.names[link] for link in np.flatnonzero(self.area == 0.0))
-
-    def __str__(self) -> str:
-        lines = [f"{'link':28} {'area [m²]':>9} {'lever [m]':>9}"]
-        for name, link in zip(self.names, self.links, strict=True):
-            lines.append(f"{name:28} {link.area:9.4f} {link.lever:9.4f}")
-        return "\n".join([*lines, f"{'all':28} {self.area.sum():9.4f}"])

@@ -70,10 +70,9 @@ def mimics(path: Path, root: ET.Element) -> dict[str, Mimic]:
     found = {}
     for joint in root.findall("joint"):
         if (mimic := joint.find("mimic")) is not None:
-            multiplier = _finite(path, mimic, "multiplier") or [1.0]
-            offset = _finite(path, mimic, "offset") or [0.0]
-            leader = mimic.get("joint", "")
-            found[joint.get("name", "")] = Mimic(leader, multiplier[0], offset[0])
+            (multiplier,) = _numbers(path, mimic, ("multiplier",), 1, default="1")
+            (offset,) = _numbers(path, mimic, ("offset",), 1, default="0")
+            found[joint.get("name", "")] = Mimic(mimic.get("joint", ""), multiplier, offset)
     for name in found:
         leader = name
         for _ in found:
@@ -85,19 +84,16 @@ def mimics(path: Path, root: ET.Element) -> dict[str, Mimic]:
 
 def _check_numbers(path: Path, root: ET.Element) -> None:
     for element in root.iter():
-        for name, count in NUMBERS.items():
-            if name in element.attrib:
-                values = _finite(path, element, name)
-                if len(values) != count:
-                    raise RobotError(
-                        f"{path}: <{element.tag} {name}={element.get(name)!r}> has"
-                        f" {len(values)} numbers, expected {count}"
-                    )
-        if element.tag == "mass" and len(_finite(path, element, "value")) != 1:
-            raise RobotError(f"{path}: <mass value={element.get('value')!r}> is not one number")
+        counts = {name: count for name, count in NUMBERS.items() if name in element.attrib}
+        if element.tag == "mass":
+            counts["value"] = 1
+        for name, count in counts.items():
+            _numbers(path, element, (name,), count)
     for joint in root.findall("joint"):
         axis = joint.find("axis")
-        if axis is not None and joint.get("type") in AXIAL and not any(_finite(path, axis, "xyz")):
+        if axis is None or joint.get("type") not in AXIAL:
+            continue
+        if not any(_numbers(path, axis, ("xyz",), 3, default="0 0 0")):
             raise RobotError(f"{path}: the axis of joint {joint.get('name')!r} has length 0")
 
 
@@ -119,15 +115,27 @@ def _check_tree(path: Path, joints: list[ET.Element]) -> None:
         done |= chain
 
 
-def _finite(path: Path, element: ET.Element, name: str) -> list[float]:
-    text = element.get(name, "")
+def _numbers(
+    where: str | Path,
+    element: ET.Element,
+    names: Sequence[str],
+    count: int,
+    *,
+    default: str = "",
+    error: type[RobotError | GeometryError] = RobotError,
+) -> list[float]:
+    """So many finite numbers that attributes of an element hold together."""
+    text = " ".join(element.get(name, default) for name in names)
     try:
-        values = [float(word) for word in text.split()]
-    except ValueError as error:
-        raise RobotError(f"{path}: <{element.tag} {name}={text!r}> is not a number") from error
-    if not all(map(math.isfinite, values)):
-        raise RobotError(f"{path}: <{element.tag} {name}={text!r}> is not finite")
-    return values
+        numbers = [float(word) for word in text.split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise error(
+            f"{where}: {' and '.join(names)} of <{element.tag}> is {text!r},"
+            f" expected {count} finite number{'s' if count > 1 else ''}"
+        )
+    return numbers
 
 
 def shapes_in(urdf: Path, use: str) -> list[LinkShape]:
@@ -156,33 +164,17 @@ def _body(where: str, geometry: ET.Element | None) -> tuple[list[float], str | A
         raise GeometryError(f"{where}: has no geometry, expected one of {known}")
     element = geometry[0]
     if element.tag == "mesh":
-        scale = _numbers(where, element, ("scale",), 3, default="1 1 1")
+        scale = _numbers(where, element, ("scale",), 3, default="1 1 1", error=GeometryError)
         if 0 in scale:
             raise GeometryError(f"{where}: scale {element.get('scale')!r} flattens the mesh")
         return scale, element.get("filename", "")
     if element.tag not in SOLIDS:
         raise GeometryError(f"{where}: <{element.tag}> is not known, expected one of {known}")
     names, count, draw = SOLIDS[element.tag]
-    sizes = _numbers(where, element, names, count)
+    sizes = _numbers(where, element, names, count, error=GeometryError)
     if min(sizes) <= 0:
         raise GeometryError(f"{where}: <{element.tag}> of size {sizes} m, expected more than 0")
     return [1.0, 1.0, 1.0], draw(*sizes)
-
-
-def _numbers(
-    where: str, element: ET.Element, names: Sequence[str], count: int, default: str = ""
-) -> list[float]:
-    text = " ".join(element.get(name, default) for name in names)
-    try:
-        numbers = [float(word) for word in text.split()]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise GeometryError(
-            f"{where}: {' and '.join(names)} of <{element.tag}> is {text!r},"
-            f" expected {count} finite number{'s' if count > 1 else ''}"
-        )
-    return numbers
 
 
 def _about(axis: int, angle: float) -> Array:

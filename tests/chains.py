@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from noisemodel import Robot
+from noisemodel.noise import chunk_speeds
 
 BAR = '<visual><origin xyz="0.1 0 0.3"/><geometry><box size="0.2 0.1 0.6"/></geometry></visual>'
 
@@ -34,3 +35,8 @@ def motion(robot, samples=40, seed=1):
     steps = 2 * random.standard_normal((samples, robot.nv))
     q = np.array([pin.integrate(robot.model, neutral, step) for step in steps])
     return q, random.standard_normal((samples, robot.nv))
+
+
+def surface_speed(robot, surface, q, v, kind):
+    """Mean speed of the surface of every link, shape (samples, links)."""
+    return chunk_speeds(robot, surface, q, v, kind).T

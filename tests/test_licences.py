@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import noisemodel
-from noisemodel.robot import urdf_path
+from noisemodel.robot import locate
 
 ROOT = Path(__file__).parents[1]
 NOTES = tomllib.loads((ROOT / "REUSE.toml").read_text(encoding="utf-8"))["annotations"]
@@ -66,7 +66,7 @@ def test_pictures_of_robots_name_the_licence_of_the_robot():
 def test_the_licence_of_a_robot_is_that_of_its_package(row):
     robots, package, licence, source, _ = row
     for robot in re.findall(r"`(\w+)`", robots):
-        urdf = urdf_path(robot)
+        urdf = locate(robot)
         folder = urdf.parents[1]
         said = stated(folder, urdf)
         assert folder.name == package

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from chains import BAR, chain, motion
+from chains import BAR, chain, motion, surface_speed
 
 from noisemodel import (
     KINDS,
@@ -16,7 +16,6 @@ from noisemodel import (
     Surface,
     UnknownKindError,
     extended,
-    surface_speed,
 )
 from noisemodel.noise import (
     by_moments,
@@ -63,10 +62,10 @@ def test_pressure_halves_with_twice_the_distance_and_spreads_over_a_sphere(solo)
     assert np.allclose(noise.pressure(1.0), near / 2, rtol=1e-14)
 
 
-@pytest.mark.parametrize(("watts", "decibels"), [(1.0, "120.0"), (1e-3, "90.0"), (2.0, "123.0")])
-def test_a_noise_prints_the_level_of_its_mean_power(watts, decibels):
+@pytest.mark.parametrize(("watts", "decibels"), [(1.0, 120.0), (1e-3, 90.0), (2.0, 123.0103)])
+def test_a_noise_has_the_level_of_its_total_power(watts, decibels):
     noise = Noise(watts * np.array([[0.5, 0.5], [0.25, 0.75], [0.0, 1.0]]), ("left", "right"))
-    assert str(noise).startswith(f"3 samples, mean sound power {decibels} dB re 1 pW\n")
+    np.testing.assert_allclose(noise.level, decibels, atol=1e-4)
 
 
 def test_desired_motion_adds_its_own_power_with_a_resting_base(solo):
@@ -89,11 +88,6 @@ def test_shares_are_those_in_the_energy(solo):
     noise = extended(robot, surface, *motion(robot))
     energy = noise.power.sum(axis=0)
     assert np.allclose(noise.shares, energy / energy.sum(), rtol=1e-12)
-    loudest = int(noise.shares.argmax())
-    assert str(noise).splitlines()[1].split() == [
-        surface.names[loudest],
-        f"{noise.shares[loudest]:.1%}",
-    ]
 
 
 def test_a_link_without_geometry_radiates_nothing(tmp_path):
@@ -148,30 +142,17 @@ def terms(robot, surface, q, v):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_standstill_has_no_speed(every, kind):
-    robot, surface = every
-    q, v = motion(robot)
-    assert not surface_speed(robot, surface, q, 0 * v, kind).any()
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_twice_the_velocity_is_twice_the_speed(every, kind):
+def test_speed_follows_the_velocity_and_not_the_place_of_the_base(every, kind):
     robot, surface = every
     q, v = motion(robot)
     once = surface_speed(robot, surface, q, v, kind)
     assert once[:, surface.area > 0].any()
+    assert not surface_speed(robot, surface, q, 0 * v, kind).any()
     twice = surface_speed(robot, surface, q, -2 * v, kind)
     assert np.allclose(twice, 2 * once, rtol=1e-12, atol=1e-15)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_noise_does_not_depend_on_the_place_of_the_base(every, kind):
-    robot, surface = every
-    q, v = motion(robot)
     elsewhere = q.copy()
     elsewhere[:, :7] = [5, -3, 1, 0.5, 0.5, 0.5, 0.5]
-    here = surface_speed(robot, surface, q, v, kind)
-    assert np.array_equal(surface_speed(robot, surface, elsewhere, v, kind), here)
+    assert np.array_equal(surface_speed(robot, surface, elsewhere, v, kind), once)
 
 
 def test_the_sum_of_the_terms_is_above_the_mean_which_is_below_the_root_mean_square(every):
@@ -259,13 +240,13 @@ def test_mean_squares_are_the_kinetic_energy_of_bodies_with_the_surfaces_for_mas
 
 def test_an_unknown_kind_is_refused_with_those_that_there_are(panda):
     with pytest.raises(UnknownKindError, match=r"no kind 'loud' of noise; there are paper, A, B"):
-        surface_speed(*panda, *motion(panda[0]), "loud")
+        extended(*panda, *motion(panda[0]), "loud")
 
 
 def test_the_surface_of_another_robot_is_refused(panda, tmp_path):
     robot = chain(tmp_path, "revolute")
     with pytest.raises(GeometryError, match="a surface of 9 links for 'chain', which has 1"):
-        surface_speed(robot, panda[1], *motion(robot))
+        extended(robot, panda[1], *motion(robot))
 
 
 @pytest.mark.parametrize(
@@ -280,7 +261,7 @@ def test_the_surface_of_another_robot_is_refused(panda, tmp_path):
 )
 def test_motions_that_cannot_be_are_refused(panda, q, v, message):
     with pytest.raises(NoiseModelError, match=message):
-        surface_speed(*panda, q, v)
+        extended(*panda, q, v)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -255,17 +255,17 @@ def cut(monkeypatch):
 @pytest.mark.parametrize(
     ("time", "message"),
     [
-        ([0.0, 0.5, np.nan, np.inf, 2.0], "time: nan in row 2"),
-        ([0.0, np.inf, np.nan], "time: inf in row 1"),
-        ([0.0, 0.5, 1.0, 1.0, 1.5], "time: stands still in row 3 (1 s, then 1 s)"),
-        (
-            [0.0, 0.5, 1.0, 0.987654321, 0.987654321],
-            "time: runs backwards in row 3 (1 s, then 0.987654321 s)",
-        ),
+        ([np.nan, 0.5, 1.0], "does not rise to row 1 (nan s, then 0.5 s)"),
+        ([0.0, 0.5, np.nan, np.inf, 2.0], "does not rise to row 2 (0.5 s, then nan s)"),
+        ([0.0, np.inf, np.inf], "does not rise to row 2 (inf s, then inf s)"),
+        ([0.0, 0.5, 1.0, 1.5, np.inf], "inf s, expected seconds, 9e+09 at most"),
+        ([-np.inf, 0.5, 1.0, 1.5], "inf s, expected seconds, 9e+09 at most"),
+        ([0.0, 0.5, 1.0, 1.0, 1.5], "does not rise to row 3 (1 s, then 1 s)"),
+        ([0.0, 1.0, 0.987654321, 0.5], "does not rise to row 2 (1 s, then 0.987654321 s)"),
     ],
 )
 def test_the_first_row_of_a_time_that_is_wrong_is_named(time, message):
-    with refused(message):
+    with refused(f"time: {message}"):
         check_time(np.array(time))
 
 

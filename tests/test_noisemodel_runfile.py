@@ -135,13 +135,11 @@ def test_a_urdf_is_found_from_the_file_wherever_that_is_read_or_copied(tmp_path,
     assert urdf.samefile(Run.load("b/copy.npz").robot)
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"), [("robot", "text"), ("valid", "booleans"), ("stage_x", "numbers")]
-)
-def test_an_array_that_is_none_should_hold_its_own_kind(tmp_path, name, kind):
+@pytest.mark.parametrize("name", ["robot", "stage_x"])
+def test_an_array_that_is_none_is_refused(tmp_path, name):
     np.savez(tmp_path / "run.npz", **BASE, **{name: None})
-    text = f"{name} holds a Python object, such as None; leave it out, or save {kind}$"
-    with pytest.raises(RunFileError, match=text):
+    text = f"run.npz: not a run file: {name} holds a Python object, such as None; leave it out, or"
+    with pytest.raises(RunFileError, match=f"{text} save plain numbers or text$"):
         Run.load(tmp_path / "run.npz")
 
 
@@ -154,9 +152,7 @@ def test_object_arrays_are_never_unpickled(tmp_path):
 
     velocity = np.array([Trap()], dtype=object)
     np.savez(tmp_path / "run.npz", time=TIME, velocity=velocity)
-    with pytest.raises(
-        RunFileError, match="not a run file: velocity holds a Python object, .* save numbers"
-    ):
+    with pytest.raises(RunFileError, match="velocity holds a Python object"):
         Run.load(tmp_path / "run.npz")
     assert ran == []
 
@@ -252,7 +248,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path, name, hint, content):
             BASE | {"velocity": VELOCITY * np.nan},
             "velocity: nan in row 0, column 0; mark gaps with valid = false and zeros",
         ),
-        (BASE | {"time": TIME[::-1]}, "time: runs backwards in row 1 (0.039 s, then 0.038 s)"),
+        (BASE | {"time": TIME[::-1]}, "time: does not rise to row 1 (0.039 s, then 0.038 s)"),
         (
             BASE | {"block_start": [0.02], "block_stop": [0.01], "block_label": ["ok"]},
             "block 'ok': starts at 0.02 s, stops at 0.01 s",
@@ -431,7 +427,7 @@ def test_headers_of_version_one_and_two_are_read_and_no_others(tmp_path):
     with refused("a is no array ((3, 0))"):
         runfile.read_npz(packed(tmp_path / "a.npz", a=content(CUBE, (3, 0))))
     objects = stated("(1,)", "|O", bytes(8))
-    with refused("Object arrays cannot be loaded: a holds Python objects") as caught:
+    with pytest.raises(ArchiveError, match="^a holds a Python object") as caught:
         runfile.read_npz(packed(tmp_path / "a.npz", a=objects))
     assert isinstance(caught.value, runfile.ObjectArrayError)
     assert caught.value.name == "a"

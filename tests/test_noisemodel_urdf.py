@@ -53,16 +53,16 @@ def test_fixed_joints_may_have_an_axis_of_length_0(tmp_path):
         ('<!DOCTYPE robot [<!ENTITY a "b">]>' + GOOD, "no document type or entities"),
         (GOOD.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>'), "'elbow' has length 0"),
         (GOOD.replace('<axis xyz="0 0 1"/>', "<axis/>"), "'elbow' has length 0"),
-        (GOOD.replace('xyz="0 0 1" rpy', 'xyz="0 nan 1" rpy'), "xyz='0 nan 1'> is not finite"),
-        (GOOD.replace('xyz="0 0 1" rpy', 'xyz="0 inf 1" rpy'), "xyz='0 inf 1'> is not finite"),
-        (GOOD.replace('xyz="0 0 1" rpy', 'xyz="0 1" rpy'), "has 2 numbers, expected 3"),
-        (GOOD.replace('xyz="0 0 1" rpy', 'xyz="a b c" rpy'), "xyz='a b c'> is not a number"),
+        *(
+            (
+                GOOD.replace('xyz="0 0 1" rpy', f'xyz="{numbers}" rpy'),
+                f"xyz of <origin> is '{numbers}', expected 3 finite numbers",
+            )
+            for numbers in ("0 nan 1", "0 inf 1", "0 1", "a b c", "")
+        ),
         (chain(5000), "5000 joints; the limit is 1000"),
         (GOOD.replace('"revolute"', '"screw"'), r"Joint \[elbow\] has no known type \[screw\]"),
-        (
-            GOOD.replace('"tip"/><origin', '"toe"/><origin'),
-            r"child link \[toe\] of joint",
-        ),
+        (GOOD.replace('"tip"/><origin', '"toe"/><origin'), r"child link \[toe\] of joint"),
         (GOOD.replace(JOINT, JOINT * 2), "joint 'elbow' is not unique"),
         (GOOD.replace(JOINT, ""), "Two root links found"),
     ],
@@ -90,9 +90,12 @@ def test_the_limit_of_joints_is_how_many_there_may_be(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (chain(3).replace("</robot>", "<a ixx='1 2'/></robot>"), "ixx='1 2'> has 2 numbers, exp"),
-        (chain(3).replace("</robot>", "<mass value='1 2'/></robot>"), "<mass value='1 2'> is not"),
-        (chain(3).replace("</robot>", "<mass/></robot>"), "<mass value=None> is not one number"),
+        (chain(3).replace("</robot>", "<a ixx='1 2'/></robot>"), "ixx of <a> is '1 2', expected 1"),
+        (
+            chain(3).replace("</robot>", "<mass value='1 2'/></robot>"),
+            "value of <mass> is '1 2', e",
+        ),
+        (chain(3).replace("</robot>", "<mass/></robot>"), "value of <mass> is '', expected 1 fini"),
         (chain(3).replace('<child link="l3"', '<child link="l1"'), "'l1' go round in a circle"),
     ],
 )

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.elsewhere.faults import Control
 from benchmarks.elsewhere.recorded import Recorded
-from noisemodel.robot import urdf_path
+from noisemodel.robot import locate
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def plant_of(arm: DrakeArm, loop: Loop, rate: float, payload: float) -> Any:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
-    urdf = urdf_path(arm.robot).read_text()
+    urdf = locate(arm.robot).read_text()
     for part in ("visual", "collision", "transmission", "gazebo"):
         urdf = re.sub(rf"<{part}[ >].*?</{part}>", "", urdf, flags=re.DOTALL)
     plant = MultibodyPlant(1 / rate)
