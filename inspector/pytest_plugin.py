@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from inspector.analysis import Analysis
     from inspector.library import Library
     from inspector.reference.judging import Comparison
+    from inspector.reference.levels import Levels
     from inspector.reference.store import Reference
     from inspector.verdict import Finding, Verdict
     from noiseclassifier import Event
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 
 Allowed: TypeAlias = "str | tuple[str, float, float]"
 """A class of findings; or a class, and from when to when, in [s]."""
-FINDING = "noise_finding"
-"""Property of a test that failed: its first finding, in a line."""
+ARTEFACTS = "noise-artefacts"
+"""Folder below rootdir with recordings and pictures of failures."""
 LONGEST = 120
 """Most characters of a file name that a test's name may take."""
 PLAIN = re.compile(
@@ -44,35 +45,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="accept the runs of noise.check into the reference, and compare nothing",
     )
     group.addoption(
-        "--noise-reference",
-        metavar="DIR",
-        help="the store of references; by default the nearest reference/, or one beside the test",
-    )
-    group.addoption(
-        "--noise-artefacts",
-        metavar="DIR",
-        help="folder of recordings and pictures of failures; by default noise-artefacts in rootdir",
-    )
-    group.addoption(
         "--noise-model",
         metavar="FILE",
         action="append",
         help="classify by this model only: a file, or the name of a shipped one; repeatable",
     )
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print the first finding of each test that failed: pytest cuts its own lines."""
-    lines = [
-        value
-        for report in terminalreporter.getreports("failed")
-        for name, value in report.user_properties
-        if name == FINDING
-    ]
-    if lines:
-        terminalreporter.section("noise")
-    for line in lines:
-        terminalreporter.write_line(str(line))
 
 
 @pytest.fixture
@@ -82,11 +59,7 @@ def noise(request: pytest.FixtureRequest) -> "Noise":
 
 
 class Noise:
-    """An assertion on the noise of runs, for one test.
-
-    Args:
-        request: Of the test.
-    """
+    """An assertion on the noise of runs, for one test."""
 
     def __init__(self, request: pytest.FixtureRequest) -> None:
         self._node, self._config = request.node, request.config
@@ -143,31 +116,38 @@ class Noise:
         return verdicts
 
     def _judged(
-        self, run: "Run", scenario: str, reference: "Reference"
+        self, run: "Run", scenario: str, reference: "Reference | None" = None
     ) -> "tuple[Analysis, Verdict, Comparison | None]":
         """Analysis of a run, the verdict on it, and how it compares; None without a reference."""
         from datetime import date
 
         from inspector.analysis import analyse, with_links
-        from inspector.reference.levels import levels
         from inspector.reference.verdicts import beside, judge
         from inspector.verdict import Verdict
 
         analysis = with_links(analyse(run, self._library, name=self._node.name), "normal")
-        verdict = Verdict.of(Path(scenario), analysis)
-        if not reference.scenarios:
-            return analysis, judge(verdict, today=date.today()), None
-        comparison = reference.compare(levels(analysis.run, name=scenario))
-        verdict = beside(verdict, comparison, reference, analysis.labels)
-        return analysis, judge(verdict, reference, today=date.today()), comparison
+        verdict, comparison = Verdict.of(Path(scenario), analysis), None
+        if reference is not None and reference.scenarios:
+            comparison = reference.compare(self._levels(run, scenario))
+            verdict = beside(verdict, comparison, reference, analysis.labels)
+        return (
+            analysis,
+            judge(verdict, reference, today=date.today()),
+            comparison,
+        )
+
+    def _levels(self, run: "Run", scenario: str, **known: str) -> "Levels":
+        from inspector.audit.signals import without_placeholder
+        from inspector.reference.levels import levels
+
+        return levels(without_placeholder(run)[0], name=scenario, **known)
 
     def _reference(self) -> "Reference":
         """What was accepted; nothing if there is no store yet."""
         from inspector.reference.store import FOLDER, Reference, find
 
-        named = self._config.getoption("--noise-reference")
         folder = Path(self._node.path).parent
-        store = self._config.rootpath / named if named else find(folder) or folder / FOLDER
+        store = find(folder) or folder / FOLDER
         return Reference.load(store) if store.exists() else Reference(store, (), stored=True)
 
     def _accept(
@@ -179,22 +159,13 @@ class Noise:
         reason: str,
     ) -> None:
         """Accept runs as repetitions of a scenario."""
-        from inspector.audit.signals import without_placeholder
-        from inspector.reference.levels import levels
         from inspector.reference.store import accept_into, digest, wanted_in, who
 
-        files = [
-            str(each) if isinstance(each, (str, Path)) else f"{self._node.nodeid} {place}"
-            for place, each in enumerate(given, 1)
-        ]
-        measured = [
-            levels(without_placeholder(run)[0], name=scenario, file=file, sha256=digest(run))
-            for run, file in zip(runs, files, strict=True)
-        ]
-        events = {
-            file: self._judged(run, scenario, type(reference)(reference.path))[1].events
-            for run, file in zip(runs, files, strict=True)
-        }
+        measured, events = [], {}
+        for place, (run, source) in enumerate(zip(runs, given, strict=True), 1):
+            file = str(source) if source is not run else f"{self._node.nodeid} {place}"
+            measured.append(self._levels(run, scenario, file=file, sha256=digest(run)))
+            events[file] = self._judged(run, scenario)[1].events
         found = wanted_in(measured, events)
         accept_into(reference.path, measured, wanted=found, reason=reason, by=who(), renames=False)
 
@@ -203,19 +174,15 @@ class Noise:
         __tracebackhide__ = True
         from inspector.errors import Status
         from inspector.reference.verdicts import classes_found
-        from noisemodel.types import hint
 
         known = (*classes_found(self._library), Status.CANNOT_TELL.value)
         allowed = (allow,) if isinstance(allow, str) else tuple(allow)
         for each in allowed:
             match each:
-                case str(name) | (str(name), float() | int(), float() | int()):
-                    if name in known:
-                        continue
-                    told = f"{name!r} is none of {', '.join(known)}{hint(name, known)}"
-                case _:
-                    told = f"{each!r}, expected a class, or (class, from, to) in [s]"
-            pytest.fail(f"allow: {told}", pytrace=False)
+                case str(name) | (str(name), float() | int(), float() | int()) if name in known:
+                    continue
+            told = f"allow: {each!r}, expected a class, or (class, from, to) in [s]"
+            pytest.fail(f"{told}; classes are {', '.join(known)}", pytrace=False)
         return allowed
 
     @property
@@ -234,17 +201,18 @@ class Noise:
         which = "" if self._count == 1 else f"-{self._count}"
         return f"{name_of(self._node.nodeid)}{which}"
 
-    def _artefacts(self) -> tuple[Path, Path | None]:
-        """Paths of recording and picture, earlier ones removed; no picture without matplotlib."""
+    def _artefacts(self) -> dict[str, Path]:
+        """Paths of recording and picture, if matplotlib draws one; earlier ones are removed."""
         from importlib.util import find_spec
 
-        named = self._config.getoption("--noise-artefacts") or "noise-artefacts"
-        folder = self._config.rootpath / named
+        folder = self._config.rootpath / ARTEFACTS
         folder.mkdir(parents=True, exist_ok=True)
-        paths = folder / f"{self._stem}.rrd", folder / f"{self._stem}.png"
-        for path in paths:
+        paths = {"recording": folder / f"{self._stem}.rrd", "picture": folder / f"{self._stem}.png"}
+        for path in paths.values():
             path.unlink(missing_ok=True)
-        return paths[0], paths[1] if find_spec("matplotlib") else None
+        if not find_spec("matplotlib"):
+            del paths["picture"]
+        return paths
 
     def _fail(
         self,
@@ -259,28 +227,25 @@ class Noise:
         from inspector.recording.run import write
         from inspector.report.findings import told
 
-        recording, picture = self._artefacts()
-        write(analysis, recording, overwrite=True)
-        if picture and comparison is not None and not comparison.empty:
-            from inspector.report.picture import over_reference
+        left = self._artefacts()
+        write(analysis, left["recording"], overwrite=True)
+        if "picture" in left:
+            from inspector.report.picture import over_reference, picture
 
-            picture.write_bytes(over_reference(comparison, f"{shown}: {comparison}"))
-        elif picture:
-            from inspector.report.picture import picture as drawn
-
-            picture.write_bytes(drawn(analysis))
+            drawn = picture(analysis)
+            if comparison is not None and not comparison.empty:
+                drawn = over_reference(comparison, f"{shown}: {comparison}")
+            left["picture"].write_bytes(drawn)
         number = len(events) + len(verdict.missing)
         by = f", {verdict.beside.words}" if verdict.beside else f", by model {analysis.model}"
         first = told(verdict, events[0], short=True) if events else str(verdict.missing[0])
-        self._node.user_properties.append((FINDING, f"{verdict.path}: {first}"))
         lines = [f"noise: {first} ({verdict.path})"]
         lines += [f"{number} finding{'s' * (number != 1)} in {shown}{by}"]
         lines += [f"  {told(verdict, event)}" for event in events]
         lines += [f"  {each}" for each in verdict.missing]
-        left = {"recording": recording, **({"picture": picture} if picture else {})}
         for what, path in left.items():
             self._node.user_properties.append((f"noise_{what}", str(path)))
-        lines += [f"{what}: {path}" for what, path in left.items()]
+            lines.append(f"{what}: {path}")
         lines += ['meant to be so? pytest --noise-accept "reason" accepts it']
         pytest.fail("\n".join(lines), pytrace=False)
 
