@@ -54,13 +54,33 @@ CALIBRATED = 3
 """Repetitions from which the margin beside other motions is taken."""
 REPETITION = re.compile(r"(?P<name>.+?)[-_./](?:run|rep|take|seed)?[-_.]?\d+")
 """Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
-KEYS = (
-    *("name", "robot", "required", "at_least", "renamed_from", "accepted", "by", "reason"),
-    *("duration_s", "margin_db", "scores_db", "elsewhere_db", "joints", "loudest_db", "levels"),
-    *("sha256", "repetition", "wanted", "waive"),
-)
-REPETITION_KEYS = ("run", "sha256", "rate_hz", "start_s", "duration_s", "guided_by", "joints")
-EXPECTED_KEYS = ("class", "time_s", "joints", "loudest_db", "required", "until", "reason")
+Keys = Mapping[str, type | tuple[type]]
+"""Kinds of values by key; a kind in brackets stands for lists of such values."""
+TEXTS, NUMBERS, TABLES = (str,), (float,), (dict,)
+SCENARIO: Keys = {
+    **dict.fromkeys(("name", "robot", "by", "reason", "levels", "sha256"), str),
+    **dict.fromkeys(("renamed_from", "joints"), TEXTS),
+    **dict.fromkeys(("duration_s", "scores_db", "elsewhere_db", "loudest_db"), NUMBERS),
+    **dict.fromkeys(("repetition", "wanted", "waive"), TABLES),
+    "required": bool,
+    "at_least": int,
+    "accepted": date,
+    "margin_db": float,
+}
+REPETITION_KEYS: Keys = {
+    **dict.fromkeys(("run", "sha256", "guided_by"), str),
+    **dict.fromkeys(("rate_hz", "start_s", "duration_s"), float),
+    "joints": TEXTS,
+}
+EXPECTED: Keys = {
+    "class": str,
+    "time_s": NUMBERS,
+    "joints": TEXTS,
+    "loudest_db": float,
+    "required": bool,
+    "until": date,
+    "reason": str,
+}
 """What a scenario of the store may hold, its repetitions, and what it wants and waives."""
 KINDS = {
     str: "a text",
@@ -68,9 +88,8 @@ KINDS = {
     int: "a whole number",
     bool: "true or false",
     date: "a date such as 2027-01-31",
+    dict: "a table",
 }
-NEEDED = object()
-"""Default of a value that has to be there."""
 
 
 class StoreError(FileError):
@@ -79,17 +98,11 @@ class StoreError(FileError):
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Accepted runs: what is normal for a robot's scenarios.
+    """Accepted runs: what is normal for a robot's scenarios."""
 
-    Attributes:
-        path: The store, or the folder of good runs.
-        scenarios: In order of their names.
-        stored: Whether it is a store.
-    """
-
-    path: Path
-    scenarios: tuple[Scenario, ...] = ()
-    stored: bool = False
+    path: Path  # the store, or the folder of good runs
+    scenarios: tuple[Scenario, ...] = ()  # in order of their names
+    stored: bool = False  # whether it is a store
 
     @classmethod
     def load(cls, path: str | Path, reading: Reading | None = None) -> "Reference":
@@ -97,7 +110,6 @@ class Reference:
 
         Args:
             path: A store, its ``reference.toml``, a folder of runs, or a run.
-            reading: How runs are read.
 
         Raises:
             StoreError: If the store is damaged or of a later version.
@@ -113,14 +125,7 @@ class Reference:
         return cls(path, of_runs(measured([path], reading)))
 
     def compare(self, run: Run | Levels) -> Comparison:
-        """Compare a run with what is normal.
-
-        Args:
-            run: The run, or levels that a live session kept of one.
-
-        Returns:
-            The `Comparison`: dB over the reference by joint, octave and time, and findings.
-        """
+        """Compare a run, or levels that a live session kept of one, with what is normal."""
         if isinstance(run, Run):
             name = str(run.meta.get("scenario", ""))
             run = levels(without_placeholder(run)[0], name=name)
@@ -515,127 +520,104 @@ def _read(folder: Path) -> Reference:
     rows = content.pop("scenario", [])
     if content or not isinstance(rows, list) or len(rows) > MOST_SCENARIOS:
         raise StoreError(path, "expected a format and entries [[scenario]] alone")
-    scenarios = tuple(
-        _scenario(_Row(path, f"[[scenario]] {place}", row, KEYS))
-        for place, row in enumerate(rows, 1)
-    )
+    every = enumerate(rows, 1)
+    try:
+        scenarios = tuple(_scenario(path, f"[[scenario]] {n}", row) for n, row in every)
+    except OverflowError as error:
+        raise StoreError(path, f"a number is too large ({error})") from error
     if len({each.name for each in scenarios}) < len(scenarios):
         raise StoreError(path, "two scenarios have one name")
     return Reference(folder, scenarios, stored=True)
 
 
-class _Row:
-    """A table of the store; errors name it."""
-
-    def __init__(self, path: Path, where: str, content: Any, keys: Sequence[str]) -> None:
-        self.path, self.where, self.content = path, where, content
-        if not isinstance(content, dict):
-            raise self.error("expected a table")
-        for key in content:
-            if key not in keys:
-                raise self.error(f"no {key!r}; there are {', '.join(keys)}")
-
-    def error(self, problem: str) -> StoreError:
-        return StoreError(self.path, f"{self.where}: {problem}")
-
-    def get(self, key: str, kind: type, default: Any = NEEDED) -> Any:
-        if key not in self.content and default is not NEEDED:
-            return default
-        value = self.content.get(key)
-        if kind is float and type(value) is int:
-            value = float(value)
-        if type(value) is not kind or (isinstance(value, float) and not isfinite(value)):
-            told = f"= {toml_shown(value)}" if key in self.content else "is missing"
-            raise self.error(f"{key} {told}, expected {KINDS[kind]}")
-        return value
-
-    def listed(self, key: str, kind: type, default: Any = ()) -> tuple[Any, ...]:
-        values = self.content.get(key, default)
-        numbers = (int, float) if kind is float else (kind,)
-        if values is default:
-            return ()
-        if not isinstance(values, list) or not all(type(each) in numbers for each in values):
-            raise self.error(f"{key} = {toml_shown(values)}, expected a list")
-        return tuple(map(kind, values))
-
-    def rows(self, key: str, keys: Sequence[str]) -> list["_Row"]:
-        rows = self.content.get(key, [])
-        if not isinstance(rows, list):
-            raise self.error(f"{key}: expected entries that begin with [[scenario.{key}]]")
-        where = f"{self.where}, [[scenario.{key}]]"
-        return [_Row(self.path, f"{where} {n}", row, keys) for n, row in enumerate(rows, 1)]
+def _checked(path: Path, where: str, row: Any, keys: Keys, needed: Sequence[str]) -> dict[str, Any]:
+    """A table of the store, whose keys are known and whose values have their kinds."""
+    problem = "" if isinstance(row, dict) else "expected a table"
+    for key, value in row.items() if not problem else ():
+        if key not in keys:
+            problem = f"no {key!r}; there are {', '.join(keys)}"
+            break
+        kind = keys[key]
+        of = kind[0] if isinstance(kind, tuple) else kind
+        values = value if isinstance(kind, tuple) else [value]
+        known = isinstance(values, list) and all(
+            type(each) in ((int, float) if of is float else (of,)) for each in values
+        )
+        if not known or (kind is float and not isfinite(value)):
+            several = "a list, each of it " if isinstance(kind, tuple) else ""
+            problem = f"{key} = {toml_shown(value)}, expected {several}{KINDS[of]}"
+    missing = [key for key in needed if not problem and key not in row]
+    if problem or missing:
+        raise StoreError(path, f"{where}: {problem or f'{missing[0]} is missing'}")
+    return dict(row)
 
 
-def _scenario(row: _Row) -> Scenario:
-    repetitions = _levels(row)
+def _scenario(path: Path, where: str, given: Any) -> Scenario:
+    row = _checked(path, where, given, SCENARIO, ("name", "levels", "sha256", "joints"))
+    rows: dict[str, list[Any]] = {key: row.get(key, []) for key in ("wanted", "waive")}
     return Scenario(
-        row.get("name", str),
-        repetitions,
-        row.listed("scores_db", float),
-        row.listed("elsewhere_db", float),
-        row.get("required", bool, True),
-        row.get("at_least", int, 1),
-        row.listed("renamed_from", str),
-        tuple(map(_expected, row.rows("wanted", EXPECTED_KEYS))),
-        tuple(map(_waiver, row.rows("waive", EXPECTED_KEYS))),
-        row.get("accepted", date, None),
-        row.get("by", str, ""),
-        row.get("reason", str, ""),
+        row["name"],
+        _levels(path, where, row),
+        tuple(map(float, row.get("scores_db", ()))),
+        tuple(map(float, row.get("elsewhere_db", ()))),
+        row.get("required", True),
+        row.get("at_least", 1),
+        tuple(row.get("renamed_from", ())),
+        tuple(_expected(path, f"{where}, [[scenario.wanted]]", each) for each in rows["wanted"]),
+        tuple(
+            _expected(path, f"{where}, [[scenario.waive]]", each, ("until", "reason"))
+            for each in rows["waive"]
+        ),
+        row.get("accepted"),
+        row.get("by", ""),
+        row.get("reason", ""),
     )
 
 
-def _waiver(row: _Row) -> Expected:
-    if row.get("until", date, None) is None or not row.content.get("reason"):
-        raise row.error("needs 'until' and 'reason'")
-    return _expected(row)
-
-
-def _expected(row: _Row) -> Expected:
-    until = row.get("until", date, None)
-    span = row.content.get("time_s", [float("-inf"), float("inf")])
-    numbers = isinstance(span, list) and all(type(each) in (int, float) for each in span)
-    if not numbers or len(span) != 2 or not span[0] < span[1]:
-        raise row.error(f"time_s = {toml_shown(span)}, expected [from, to] in seconds")
+def _expected(path: Path, where: str, given: Any, needed: Sequence[str] = ()) -> Expected:
+    row = _checked(path, where, given, EXPECTED, needed)
+    span = row.get("time_s", [float("-inf"), float("inf")])
+    if len(span) != 2 or not span[0] < span[1]:
+        shown = toml_shown(span)
+        raise StoreError(path, f"{where}: time_s = {shown}, expected [from, to] in seconds")
     return Expected(
-        row.get("class", str, ""),
+        row.get("class", ""),
         float(span[0]),
         float(span[1]),
-        row.listed("joints", str),
-        row.get("loudest_db", float, None),
-        row.get("required", bool, False),
-        row.get("reason", str, ""),
-        until,
+        tuple(row.get("joints", ())),
+        row.get("loudest_db"),
+        row.get("required", False),
+        row.get("reason", ""),
+        row.get("until"),
     )
 
 
-def _levels(row: _Row) -> tuple[Levels, ...]:
+def _levels(path: Path, where: str, row: Mapping[str, Any]) -> tuple[Levels, ...]:
     """Levels of the repetitions, from the .npz, whose hash is checked."""
-    row.get("joints", list)
-    file, joints = row.get("levels", str), row.listed("joints", str)
-    if not re.fullmatch(r"[\w.~-]+\.npz", file, re.ASCII):
-        raise row.error(f"levels = {toml_shown(file)}, expected the name of an .npz beside it")
-    path = row.path.parent / file
-    rows = row.rows("repetition", REPETITION_KEYS)
+    file, rows = path.parent / row["levels"], row.get("repetition", [])
+    if not re.fullmatch(r"[\w.~-]+\.npz", row["levels"], re.ASCII):
+        shown = toml_shown(row["levels"])
+        raise StoreError(path, f"{where}: levels = {shown}, expected the name of an .npz beside it")
     if not 1 <= len(rows) <= NEWEST:
-        raise row.error(f"{len(rows)} repetitions, expected 1 to {NEWEST}")
+        raise StoreError(path, f"{where}: {len(rows)} repetitions, expected 1 to {NEWEST}")
+    again = f"{NAME}; accept the runs again"
     try:
-        if not path.is_file():
-            raise StoreError(path, "no such file, or no regular one; accept the runs again")
-        with path.open("rb") as stream:
+        if not file.is_file():
+            raise StoreError(file, "no such file, or no regular one; accept the runs again")
+        with file.open("rb") as stream:
             sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
-        if sha256 != row.get("sha256", str):
-            raise StoreError(
-                path, f"was changed, or does not belong to {NAME}; accept the runs again"
-            )
-        arrays = runfile.read_npz(path)
+        if sha256 != row["sha256"]:
+            raise StoreError(file, f"was changed, or does not belong to {again}")
+        arrays = runfile.read_npz(file)
     except (OSError, runfile.ArchiveError) as error:
-        raise StoreError(path, f"cannot be read ({error})") from error
+        raise StoreError(file, f"cannot be read ({error})") from error
     found = []
-    for number, each in enumerate(rows):
-        own = each.listed("joints", str) or joints
-        rate = each.get("rate_hz", float)
+    for number, given in enumerate(rows):
+        where_of = f"{where}, [[scenario.repetition]] {number + 1}"
+        each = _checked(path, where_of, given, REPETITION_KEYS, ("rate_hz", "duration_s"))
+        own, rate = tuple(each.get("joints") or row["joints"]), float(each["rate_hz"])
         if not 0 < rate < 1e7:
-            raise each.error(f"rate_hz = {rate:g}, expected a rate")
+            raise StoreError(path, f"{where_of}: rate_hz = {rate:g}, expected a rate")
         bands = octaves(rate)
         names = (f"{name}_{number}" for name in ("level", "guide", "pace"))
         level, guide, pace = (np.asarray(arrays.get(name, np.empty(0))) for name in names)
@@ -644,20 +626,20 @@ def _levels(row: _Row) -> tuple[Levels, ...]:
         fit = fit and level.dtype.kind + guide.dtype.kind + pace.dtype.kind == "uff"
         finite = fit and bool(np.isfinite(guide).all() and np.isfinite(pace).all())
         if not finite or len(set(own)) < len(own):
-            raise StoreError(path, f"its arrays do not belong to {NAME}; accept the runs again")
+            raise StoreError(file, f"its arrays do not belong to {again}")
         measured = Levels(
-            row.get("name", str),
-            each.get("run", str, ""),
-            each.get("sha256", str, ""),
-            row.get("robot", str, ""),
+            row["name"],
+            each.get("run", ""),
+            each.get("sha256", ""),
+            row.get("robot", ""),
             own,
             rate,
-            each.get("start_s", float, 0.0),
-            each.get("duration_s", float),
+            float(each.get("start_s", 0.0)),
+            float(each["duration_s"]),
             bands,
             decoded(level.astype(np.uint8)),
             guide.astype(np.float32),
-            each.get("guided_by", str, ""),
+            each.get("guided_by", ""),
             pace.astype(np.float32),
         )
         found.append(measured)
