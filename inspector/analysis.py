@@ -49,46 +49,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Analysis:
-    """A run, or a scalar noise, with what was found in it.
+    """A run, or a scalar noise, with what was found in it; texts are empty where there is none."""
 
-    Attributes:
-        name: Name of the run.
-        status: `ok`, `findings` or `cannot-tell`.
-        run: The run as it was analysed; a scalar noise is a run of one joint.
-        reason: Why there is no verdict, in a sentence or two; empty if there is one.
-        labels: One label per frame; None where no model fits.
-        model: Name of the model that labelled, empty without.
-        model_sha256: SHA-256 of its file, empty without.
-        spans: The events of the labels, from the start of the first frame of each to the end of
-            its last.
-        findings: The same events, from their estimated onset to their end.
-        audit: What the run can show; None of a scalar noise.
-        notes: What was done to the run before it was labelled, a sentence each.
-        unknown: What becomes of `unknown` frames.
-        sha256: SHA-256 of the file that the run came from, empty without.
-        links: Noise link by link; None unless it was asked for and the run has a robot.
-        missing: What the run lacks to show the robot, and why, a sentence each.
-        assumed: What was assumed when its log was read, in a line; empty of a run file.
-        alarm: Alarm threshold of the model, a probability of any failure; None without one.
-    """
-
-    name: str
-    status: Status
-    run: nm.Run
-    reason: str = ""
-    labels: nc.Labels | None = None
-    model: str = ""
-    model_sha256: str = ""
+    name: str  # of the run
+    status: Status  # `ok`, `findings` or `cannot-tell`
+    run: nm.Run  # as it was analysed; a scalar noise is a run of one joint
+    reason: str = ""  # why there is no verdict, in a sentence or two
+    labels: nc.Labels | None = None  # one per frame; None where no model fits
+    model: str = ""  # name of the model that labelled
+    model_sha256: str = ""  # of its file
+    # The events of the labels, from the start of the first frame of each to the end of its last.
     spans: tuple[Event, ...] = ()
-    findings: tuple[Event, ...] = ()
-    audit: Audit | None = None
-    notes: tuple[str, ...] = ()
-    unknown: Unknown = Unknown.FINDING
-    sha256: str = ""
-    links: "LinkNoise | None" = None
-    missing: tuple[str, ...] = ()
-    assumed: str = ""
-    alarm: float | None = None
+    findings: tuple[Event, ...] = ()  # the same events, from their estimated onset to their end
+    audit: Audit | None = None  # what the run can show; None of a scalar noise
+    notes: tuple[str, ...] = ()  # what was done to the run before it was labelled, sentences
+    unknown: Unknown = Unknown.FINDING  # what becomes of `unknown` frames
+    sha256: str = ""  # of the file that the run came from
+    links: "LinkNoise | None" = None  # None unless it was asked for and the run has a robot
+    missing: tuple[str, ...] = ()  # what the run lacks to show the robot, and why, sentences
+    assumed: str = ""  # when its log was read, in a line
+    alarm: float | None = None  # threshold of the model, a probability; None without one
 
     @cached_property
     def noise(self) -> Array:
@@ -168,23 +148,18 @@ class Analysis:
         return f"{line}; {IGNORED}" if self.unknown is Unknown.IGNORE else line
 
     @property
-    def evidence(self) -> str:
-        """What an `ok` relies on, and what it cannot rely on, a sentence or two."""
-        if self.audit is None:
-            return "Nothing stands out within the log."
-        desired = self.run.velocity_desired is not None
-        without = "" if desired else " No desired velocity: tracking errors were not judged."
-        return f"Nothing stands out, within the run or for any robot.{without}"
-
-    @property
     def message(self) -> str:
         """What `classify` says beside the findings, in a line; may be empty."""
         ignored = [f"{IGNORED[0].upper()}{IGNORED[1:]}."] if self.unknown is Unknown.IGNORE else []
         notes = [*ignored, *self.notes]
-        if self.status is Status.OK:
-            notes.insert(0, self.evidence)
         if self.status is Status.CANNOT_TELL:
             return " ".join([f"{self.reason.rstrip('.')}.", *notes]) if notes else self.reason
+        if self.status is Status.OK and self.audit is None:
+            notes.insert(0, "Nothing stands out within the log.")
+        elif self.status is Status.OK:
+            desired = self.run.velocity_desired is not None
+            without = "" if desired else " No desired velocity: tracking errors were not judged."
+            notes.insert(0, f"Nothing stands out, within the run or for any robot.{without}")
         return " ".join([*notes, *(() if self.audit is None else shortcomings(self.audit))])
 
     @property
@@ -230,10 +205,8 @@ def analyse(
     need, piece by piece where they stay in their file (`noisemodel.Run.load`, ``on_demand``).
 
     Args:
-        run: The run, a run file, or any log that `inspector import` reads.
         library: Models to choose from, see `inspector.load_library`; those that ship unless given.
         name: Name of the run; by default the file's name.
-        sha256: SHA-256 of the file that it came from.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
 
     Returns:
@@ -303,7 +276,6 @@ def analyse_file(
     """Analyse a file for people: with its hash, its links, and what was assumed of a log.
 
     Args:
-        path: A run file, any log that `inspector import` reads, or one that is open already.
         links: Whether to compute the noise link by link, if the run names a robot that is known.
         kind: Kind of the extended noise, see ``noisemodel.noise``.
         terms: Whether to compute the paper's terms A, B and C one by one.
@@ -497,11 +469,11 @@ def worst_signal(analysis: Analysis, joint: int | None) -> Array:
 
     The noise is a norm, in which a vibration of 35 Hz has 70 Hz.
     """
-    run = analysis.run
-    if joint is None:
-        return np.asarray(vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0])
-    own = [run.velocity[rows][:, joint].astype(np.float64) for rows in pieces(run.velocity)]
-    return np.asarray(vibrating(np.concatenate(own)[:, None], run.mask, run.rate)[:, 0])
+    run, signal = analysis.run, analysis.noise
+    if joint is not None:
+        own = [run.velocity[rows][:, joint].astype(np.float64) for rows in pieces(run.velocity)]
+        signal = np.concatenate(own)
+    return np.asarray(vibrating(signal[:, None], run.mask, run.rate)[:, 0])
 
 
 def chosen(analysis: Analysis, time: Array, level: Array) -> list[int]:
@@ -518,26 +490,6 @@ def chosen(analysis: Analysis, time: Array, level: Array) -> list[int]:
 
 
 KINDS = ("simplified", *nm.KINDS)
-
-
-@dataclass(frozen=True)
-class NoiseLevel:
-    """A run's noise in numbers, by one estimate."""
-
-    kind: str  # "simplified", or a kind of the extended noise
-    unit: str  # of the root mean square and the peak: the square root of the power
-    rms: float
-    peak: float
-    peak_time: float  # [s]
-    shares: tuple[tuple[str, float], ...]  # of joints or links in the power, the largest first
-    remarks: tuple[str, ...] = ()  # what this estimate leaves out, a sentence each
-
-    def __str__(self) -> str:
-        """The levels in lines."""
-        head = f"{self.kind}: rms {self.rms:.4g} {self.unit}, peak {self.peak:.4g} {self.unit}"
-        rows = [f"  {share:6.1%}  {name}" for name, share in self.shares if share >= 0.001]
-        remarks = [f"  {remark}" for remark in self.remarks]
-        return "\n".join([f"{head} at {self.peak_time:.3f} s", *rows, *remarks])
 
 
 @dataclass(frozen=True, eq=False)
@@ -581,8 +533,8 @@ def estimate(run: Run, kind: str, *, geometry: str = "auto") -> Estimate:
     return Estimate(kind, "√W", noise.power, noise.names, remarks)
 
 
-def noise_level(run: Run, estimate: Estimate) -> NoiseLevel:
-    """Sum an estimate up."""
+def noise_level(run: Run, estimate: Estimate) -> str:
+    """Sum an estimate up: root mean square, peak, and the shares of joints or links, in lines."""
     pressure = np.where(run.mask, estimate.pressure, 0.0)
     if not np.isfinite(pressure).all():
         sample = int(np.argmin(np.isfinite(pressure)))
@@ -591,17 +543,16 @@ def noise_level(run: Run, estimate: Estimate) -> NoiseLevel:
             " no robot moves so fast, or is so large"
         )
     energy = estimate.power[run.mask].sum(axis=0)
-    shares = energy / (energy.sum() or 1.0)
-    order = np.argsort(-shares, kind="stable")
-    return NoiseLevel(
-        kind=estimate.kind,
-        unit=estimate.unit,
-        rms=float(np.sqrt(np.mean(pressure[run.mask] ** 2))),
-        peak=float(pressure.max()),
-        peak_time=float(run.time[pressure.argmax()]),
-        shares=tuple((estimate.parts[i], float(shares[i])) for i in order),
-        remarks=estimate.remarks,
-    )
+    shares, unit = energy / (energy.sum() or 1.0), estimate.unit
+    rms = float(np.sqrt(np.mean(pressure[run.mask] ** 2)))
+    peak, when = float(pressure.max()), float(run.time[pressure.argmax()])
+    lines = [f"{estimate.kind}: rms {rms:.4g} {unit}, peak {peak:.4g} {unit} at {when:.3f} s"]
+    lines += [
+        f"  {shares[part]:6.1%}  {estimate.parts[part]}"
+        for part in np.argsort(-shares, kind="stable")
+        if shares[part] >= 0.001
+    ]
+    return "\n".join([*lines, *(f"  {remark}" for remark in estimate.remarks)])
 
 
 def write_csv(

@@ -26,35 +26,23 @@ FLOOR_DB = -100.0
 
 @dataclass(frozen=True)
 class Scale:
-    """Levels that colours show.
+    """Levels that colours show."""
 
-    Attributes:
-        low: Level of the darkest colour, in [dB].
-        high: Level of the lightest one, in [dB].
-        unit: Such as "dB re 1 rad/s".
-        step: From one tick to the next, in [dB].
-        palette: Colours of places from 0 to 1.
-    """
-
-    low: float
-    high: float
-    unit: str
-    step: float = 20.0
-    palette: Callable[[Array], NDArray[np.uint8]] = colors.heat
+    low: float  # level of the darkest colour, in [dB]
+    high: float  # of the lightest one, in [dB]
+    unit: str  # such as "dB re 1 rad/s"
+    step: float = 20.0  # from one tick to the next, in [dB]
+    palette: Callable[[Array], NDArray[np.uint8]] = colors.heat  # of places from 0 to 1
 
     def place(self, level: Array) -> Array:
         """Levels as shares of the scale: 0 at its low end and 1 at its high end, not clipped."""
         return np.asarray((level - self.low) / (self.high - self.low))
 
     def colours(self, level: Array, *, shades: int = 0) -> NDArray[np.uint8]:
-        """Colour levels: the louder, the lighter.
+        """Colour levels, the louder, the lighter: red, green, blue and opacity, shape (…, 4).
 
         Args:
-            level: Any shape, in [dB]; -inf is the darkest.
             shades: Number of colours; as many as there are levels if 0. Few change rarely.
-
-        Returns:
-            Red, green, blue and opacity, shape (…, 4).
         """
         place = np.clip(self.place(level), 0.0, 1.0)
         return self.palette(np.round(place * (shades - 1)) / (shades - 1) if shades else place)
@@ -62,10 +50,7 @@ class Scale:
     def following(self, level: Array) -> "Scale":
         """The scale of a run: 60 dB up to its loudest level, so that not all of it is dark.
 
-        A run more than 30 dB below this scale looks quiet all the same.
-
-        Args:
-            level: Any shape, in [dB]; what is not finite does not count.
+        A run more than 30 dB below this scale looks quiet all the same; -inf does not count.
         """
         loudest = float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
         high = max(10.0 * np.ceil(loudest / 10.0), self.high - 30.0)
@@ -97,13 +82,10 @@ def velocity_levels(
     Args:
         velocity: Shape (samples, joints), in [rad/s]; a noise is a single column.
         valid: False in gaps, shape (samples,).
-        rate: Samples per second, in [Hz].
-        start: Time of the first sample, in [s].
 
     Returns:
         Starts of the steps of 50 ms, shape (steps,), in [s], and levels of the root mean square of
-        what is valid in each, shape (steps, joints), in [dB re 1 rad/s], at least -100; NaN in
-        steps that lie in a gap.
+        what is valid in each, shape (steps, joints), in [dB re 1 rad/s]; NaN in gaps.
     """
     size = max(1, round(STEP * rate))
     firsts = np.arange(0, len(valid), size)
@@ -144,19 +126,12 @@ RANGE_DB = 70.0
 
 @dataclass(frozen=True, eq=False)
 class Spectrogram:
-    """Amplitudes of a signal in windows.
+    """Amplitudes of a signal in windows."""
 
-    Attributes:
-        time: Centres of the windows, shape (columns,), in [s].
-        frequency: Shape (bins,), in [Hz]; the mean is left out.
-        amplitude: Shape (bins, columns), in the unit of the signal; 0 in windows that touch a gap.
-        valid: False for windows that touch a gap, shape (columns,).
-    """
-
-    time: Array
-    frequency: Array
-    amplitude: Array
-    valid: Mask
+    time: Array  # centres of the windows, shape (columns,), in [s]
+    frequency: Array  # shape (bins,), in [Hz]; the mean is left out
+    amplitude: Array  # shape (bins, columns), in the unit of the signal; 0 where not valid
+    valid: Mask  # false for windows that touch a gap, shape (columns,)
 
     @cached_property
     def decibel(self) -> Array:
@@ -173,14 +148,7 @@ class Spectrogram:
 
 
 def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spectrogram:
-    """Compute the spectrogram of a signal for viewing.
-
-    Args:
-        signal: Such as noise, shape (samples,).
-        rate: Samples per second, in [Hz].
-        start: Time of the first sample, in [s].
-        valid: False in gaps, shape (samples,).
-    """
+    """Compute the spectrogram of a signal for viewing; ``start`` is its first time, in [s]."""
     length = min(window_length(rate), len(signal))
     hop = max(1, length // 4, -(-(len(signal) - length) // (COLUMNS - 1)))
     windows = np.lib.stride_tricks.sliding_window_view(signal, length)[::hop]
@@ -196,11 +164,9 @@ def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spe
 
 
 def in_bands(frequency: Array, amplitude: Array, edges: Array) -> Array:
-    """The largest amplitude in each of several bands, such as the bands of a logarithmic axis.
+    """The largest amplitude in each of several bands, such as those of a logarithmic axis.
 
-    Args:
-        frequency: In order, shape (bins,).
-        edges: Of the bands, in order, in the unit of the frequency, shape (bands + 1,).
+    Frequencies of shape (bins,) and edges of shape (bands + 1,) are in order.
     """
     firsts = np.searchsorted(frequency, edges[:-1])
     lasts = np.searchsorted(frequency, edges[1:])
@@ -233,10 +199,6 @@ def _hann(length: int) -> Array:
 
 def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
     """Keep the least and the greatest value of each bucket of samples.
-
-    Args:
-        time: Shape (samples,), in [s].
-        points: How many points each series may have at most.
 
     Returns:
         Times, shape (kept,), and values, shape (kept, series), kept ≤ points; everything, if

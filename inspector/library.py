@@ -1,7 +1,7 @@
 """The demo run and the models: those that ship, the one for a run, and what it labels."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from noisemodel.types import Array, Mask, Real
 
 Library = Mapping[str, nc.Model]
 """Models by name."""
+Events = tuple[nc.Event, ...]
 HERE = Path(__file__).parent
 FOLDERS = (HERE / "assets", HERE.parent / "assets", HERE.parent)
 """In an installed wheel, and in a checkout."""
@@ -28,31 +29,18 @@ class CannotTellError(InspectorError):
 
 @dataclass(frozen=True)
 class Labelled:
-    """Labels of a run, and the model that gave them.
+    """Labels of a run, and the model that gave them."""
 
-    Attributes:
-        labels: One label per frame.
-        model: The model's name.
-        remark: What was done to the run before, a sentence; empty if nothing was.
-        alarm: Alarm threshold, a probability of any failure; None of a model without one.
-        lasting: Oscillations that stand out of any robot's motion, see `noiseclassifier.lasting`.
-        bursts: Oscillations that the rest of the run lacks, see `noiseclassifier.bursts`.
-    """
-
-    labels: nc.Labels
-    model: str
-    remark: str = ""
-    alarm: float | None = None
-    lasting: tuple[nc.Event, ...] = ()
-    bursts: tuple[nc.Event, ...] = ()
+    labels: nc.Labels  # one per frame
+    model: str  # its name
+    remark: str = ""  # what was done to the run before, a sentence; empty if nothing was
+    alarm: float | None = None  # threshold, a probability of any failure; None without one
+    lasting: Events = ()  # lines that stand out of any robot's motion
+    bursts: Events = ()  # lines that the rest of the run lacks
 
 
 def folder(kind: str) -> Path:
-    """Find a folder of shipped files.
-
-    Args:
-        kind: "runs" or "models".
-    """
+    """Find the folder of shipped "runs" or "models"."""
     for place in FOLDERS:
         if any((place / kind).glob("*.npz")):
             return place / kind
@@ -60,16 +48,12 @@ def folder(kind: str) -> Path:
 
 
 def demo_run() -> Path:
-    """Name the run file that ships: a simulated Panda that touches a table unexpectedly."""
+    """The run file that ships: a simulated Panda that touches a table unexpectedly."""
     return folder("runs") / "demo.npz"
 
 
 def model_files(chosen: Sequence[str | Path] | None = None) -> tuple[Path, ...]:
-    """Name model files: those that were chosen, or all that ship.
-
-    Args:
-        chosen: Model files, or names of models that ship; None or empty for all of these.
-    """
+    """Name model files: those chosen, which may be names of models that ship, or all of these."""
     shipped = {path.stem: path for path in sorted(folder("models").glob("*.npz"))}
     found = []
     for path in map(Path, chosen or shipped.values()):
@@ -101,19 +85,15 @@ def for_robot(library: Library, robot: str | None) -> Library:
     Signals of single joints generalise to new robots less than norms. A model whose runs name no
     robot stays, and so do all if none would be left.
     """
-    kept = {name: model for name, model in library.items() if _fits(model, robot)}
-    return kept or library
 
+    def fits(model: nc.Model) -> bool:
+        if isinstance(model, nc.General) or model.profile.reference:
+            return True
+        robots = {nc.recording.robot_of(name) for name in model.runs} - {""}
+        by_joint = any(map(nc.signals.by_joint, model.profile.signals))
+        return not by_joint or not robots or robot in robots
 
-def _fits(model: nc.Model, robot: str | None) -> bool:
-    if (
-        isinstance(model, nc.General)
-        or model.profile.reference
-        or not any(map(nc.signals.by_joint, model.profile.signals))
-    ):
-        return True
-    robots = {nc.recording.robot_of(name) for name in model.runs} - {""}
-    return not robots or robot in robots
+    return {name: model for name, model in library.items() if fits(model)} or library
 
 
 def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) -> Labelled:
@@ -148,11 +128,11 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
             " requires"
         )
-    alarm = _alarm(classifier, labels)
-    return _counted(Labelled(labels, name, remark, alarm, lasting.events, bursts.events))
+    found = {"lasting": lasting.events, "bursts": bursts.events}
+    return _labelled(classifier, name, labels, remark, **found)
 
 
-def lines(run: nm.Run) -> tuple[tuple[nc.Event, ...], tuple[nc.Event, ...]]:
+def lines(run: nm.Run) -> tuple[Events, Events]:
     """What lasts in a run, and its bursts."""
     lasting, bursts = _line_detectors(run)
     for _ in _watched(run, lasting, bursts):
@@ -183,10 +163,8 @@ def nearest(
 ) -> tuple[str, nc.Classifier]:
     """Model of the nearest rate at or below the rate of a log's values, bound to them.
 
-    Args:
-        rate: Rate of the log's values, in [Hz].
-        logged: Rate of the log, in [Hz]: higher where values are held. If no model takes the rate
-            of the values, it is one of a single rate that takes this one.
+    Where values are held, the rate at which they were logged is higher, in [Hz]: if no model takes
+    the rate of the values, it is one of a single rate that takes this one.
     """
     try:
         return nc.nearest(library, rate, signals)
@@ -200,9 +178,7 @@ def nearest(
 def signals_of(run: nm.Run) -> dict[str, Real]:
     """Signals that models take, without the error where the desired motion is the measured one.
 
-    Returns:
-        Norms by name, each of shape (samples,), and velocities joint by joint, shape
-        (joints, samples), in [rad/s].
+    Norms have shape (samples,), velocities joint by joint (joints, samples), in [rad/s].
     """
     return nc.signals.without_zero_error(_signals(run))
 
@@ -229,27 +205,20 @@ def _differs(run: nm.Run) -> bool:
     return bool(np.any(desired[:, wanted] != run.velocity[:, measured]))
 
 
-def _alarm(classifier: nc.Classifier, labels: nc.Labels) -> float | None:
-    return None if labels.above_threshold is None else classifier.profile.alarm
-
-
-def _counted(labelled: Labelled) -> Labelled:
-    """Add a remark on how many frames are out of distribution."""
-    labels = labelled.labels
+def _labelled(
+    classifier: nc.Classifier, name: str, labels: nc.Labels, remark: str = "", **lines: Events
+) -> Labelled:
+    """Add the alarm threshold, and a remark on how many frames are out of distribution."""
     novel = 0 if labels.novel is None else int(labels.novel.sum())
-    if not novel:
-        return labelled
-    line = f"{novel} of {len(labels)} frames are out of distribution for model {labelled.model}."
-    return replace(labelled, remark=" ".join(filter(None, (labelled.remark, line))))
+    if novel:
+        line = f"{novel} of {len(labels)} frames are out of distribution for model {name}."
+        remark = f"{remark} {line}".lstrip()
+    alarm = None if labels.above_threshold is None else classifier.profile.alarm
+    return Labelled(labels, name, remark, alarm, **lines)
 
 
 def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
-    """Label a scalar noise, as NoisyTest's logs hold it.
-
-    Args:
-        time: Uniform, shape (samples,), in [s].
-        noise: Shape (samples,), in [rad/s].
-    """
+    """Label a scalar noise in [rad/s] at uniform times in [s], as NoisyTest's logs hold it."""
     rate = nc.nominal_rate(time)
     try:
         name, classifier = nc.nearest(library, rate, (nc.NOISE,))
@@ -261,7 +230,7 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
             f" {classifier.rate:g} Hz of model {name}"
         )
     labels = classifier.classify(noise, rate, start=float(time[0]))
-    return _counted(Labelled(labels, name, alarm=_alarm(classifier, labels)))
+    return _labelled(classifier, name, labels)
 
 
 def _close(rate: float, other: float) -> bool:

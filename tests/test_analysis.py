@@ -14,17 +14,29 @@ from generalmodel import fixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspector.analysis import Analysis, analyse, analyse_noise, with_links
+from inspector.analysis import (
+    Analysis,
+    Estimate,
+    analyse,
+    analyse_file,
+    analyse_noise,
+    default_kinds,
+    estimate,
+    extents,
+    noise_level,
+    with_links,
+    write_csv,
+)
 from inspector.audit.audit import audit
 from inspector.audit.signals import without_placeholder
-from inspector.errors import Status, Unknown
+from inspector.errors import InspectorError, Status, Unknown
 from inspector.library import demo_run, load_library, model_files
 from inspector.report import findings, html
 from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
-from inspector.verdict import Verdict, classify_file, exit_status
+from inspector.verdict import Verdict, _has_header, classify_file, exit_status, work_of
 from noiseclassifier import Event, Labels
-from noisemodel import Robot, Run
+from noisemodel import NoiseModelError, Robot, Run
 from noisemodel.run import METHOD, joint_velocity
 
 LIBRARY = load_library(model_files())
@@ -82,21 +94,19 @@ def test_the_status_is_the_same_in_every_output(tmp_path):
         assert exit_status([verdict]) == {"ok": 0, "findings": 1, "cannot-tell": 4}[status]
 
 
-def test_a_log_held_at_ten_hertz_has_the_status_cannot_tell_in_every_output():
-    steps = 1e-3 * np.random.default_rng(1).normal(size=(50, 2))
-    velocity = np.repeat(steps, 100, axis=0)
-    held = Run(time=np.arange(5000) / RATE, velocity=velocity, joint_names=("a", "b"))
-    found = analyse(held, LIBRARY)
-    assert found.status is Status.CANNOT_TELL
-    assert "measured values are held: logged at 10 Hz" in found.headline
-    assert found.reason == found.message
-
-
 def test_a_run_without_a_fitting_model_has_the_status_cannot_tell_and_a_reason():
-    found = analyse(moving(rate=50.0), LIBRARY)
-    assert (found.status, found.labels, found.findings) == (Status.CANNOT_TELL, None, ())
-    assert "logged at 50 Hz" in found.reason
-    assert any(remark.startswith("No labels: logged at 50 Hz") for remark in found.remarks)
+    steps = 1e-3 * np.random.default_rng(1).normal(size=(50, 2))
+    held = moving(velocity=np.repeat(steps, 100, axis=0), desired=False)
+    for run, reason in (
+        (held, "measured values are held: logged at 10 Hz"),
+        (moving(rate=50.0), "logged at 50 Hz"),
+    ):
+        found = analyse(run, LIBRARY)
+        assert (found.status, found.labels, found.findings) == (Status.CANNOT_TELL, None, ())
+        assert found.reason.startswith(reason)
+        assert found.headline == f"cannot-tell: {found.reason}"
+        assert found.reason == found.message
+        assert any(remark.startswith(f"No labels: {reason}") for remark in found.remarks)
 
 
 def test_an_analysis_names_its_model_and_the_hash_of_its_file():
@@ -105,14 +115,15 @@ def test_an_analysis_names_its_model_and_the_hash_of_its_file():
     assert found.model_sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def test_a_finding_starts_at_its_onset_and_ends_when_the_event_does():
+def test_a_finding_starts_at_its_onset_and_ends_when_the_event_does_in_the_lane_too():
     found = analyse(moving(tone=1.0), LIBRARY)
-    first, last = found.findings[0], max(found.findings, key=lambda event: event.stop)
-    assert first.start == pytest.approx(2.0, abs=0.05)
-    assert last.stop == pytest.approx(3.0, abs=0.05)
+    first, last = found.findings[0].start, max(event.stop for event in found.findings)
+    assert (first, last) == pytest.approx((2.0, 3.0), abs=0.05)
     for span, finding in zip(found.spans, found.findings, strict=True):
         assert span.start <= finding.start < finding.stop <= span.stop
     assert [*found.findings] == sorted(found.findings, key=lambda each: (each.start, each.stop))
+    shown = [stretch for stretch in found.lane if stretch[2] != "ok"]
+    assert (shown[0][0], shown[-1][1]) == (first, last)
 
 
 def test_an_unknown_frame_that_is_no_finding_takes_the_hop_around_its_middle_in_the_lane():
@@ -150,29 +161,6 @@ def test_runs_are_worse_by_status_then_by_their_findings_then_by_the_best_score(
     severities = [each.severity for each in worst_first]
     assert severities == sorted(severities)
     assert len(set(severities)) == len(severities)
-
-
-def test_what_a_run_lacks_is_missing_and_what_it_has_is_not():
-    none, motion = (
-        "No 3D robot: the run names none.",
-        "The run has no desired velocities: the noise",
-    )
-    assert with_links(analysed("..."), "").missing == (none,)
-    bare = with_links(analysed("...", run=moving(desired=False)), "").missing
-    assert bare == (none, f"{motion} counts the measured motion alone.")
-    valid = np.arange(5000) >= 3
-    gap = with_links(analysed("...", run=moving(valid=valid, robot="panda")), "").missing
-    assert gap == (
-        "No 3D robot: the run has no positions.",
-        "3 samples lie in gaps; frames that touch one are not labelled.",
-    )
-
-
-def test_the_lane_shows_findings_from_onset_to_end():
-    found = analyse(moving(tone=1.0), LIBRARY)
-    shown = [stretch for stretch in found.lane if stretch[2] != "ok"]
-    assert shown[0][0] == found.findings[0].start
-    assert shown[-1][1] == max(event.stop for event in found.findings)
 
 
 @given(st.text(alphabet=".iIoOu", min_size=1, max_size=30))
@@ -243,9 +231,11 @@ def test_zeros_in_place_of_a_desired_velocity_are_left_out_of_a_run_that_moves()
         " seconds: it was left out."
     )
     assert remark in analyse(zeros(moving()), LIBRARY).message
-
-
-def test_zeros_are_left_out_where_the_desired_position_changes():
+    told = remark.removeprefix("The desired velocity is ").replace("was", "is").rstrip(".")
+    assert any(told in warning for warning in audit(zeros(moving()), LIBRARY).warnings)
+    for other in (moving(), moving(desired=False)):
+        assert without_placeholder(other) == (other, "")
+    assert not any("left out" in warning for warning in audit(moving(), LIBRARY).warnings)
     still = 1e-4 * np.random.default_rng(0).normal(size=(5000, 2))
     target = np.linspace(0.0, 0.5, 5000)[:, None] * np.ones(2)
     run, remark = without_placeholder(zeros(moving(), velocity=still, position_desired=target))
@@ -287,12 +277,6 @@ def test_a_desired_velocity_made_of_coarse_positions_is_left_out():
         " noise: it was left out."
     )
     assert without_placeholder(stepping(1e-4))[1] == ""
-
-
-def test_a_desired_velocity_that_is_not_all_zero_stays():
-    run = moving()
-    assert without_placeholder(run) == (run, "")
-    assert without_placeholder(moving(desired=False))[1] == ""
 
 
 def test_an_object_that_reads_arrays_on_demand_stands_in_for_a_run(tmp_path):
@@ -344,8 +328,6 @@ def test_a_run_is_labelled_and_audited_once(monkeypatch):
 @given(st.text(alphabet="..iIoOu", min_size=1, max_size=30))
 @settings(deadline=None, max_examples=60)
 def test_a_finding_lies_within_its_frames(text):
-    from inspector.analysis import extents
-
     labels = analysed(text).labels
     spans, findings = extents(moving(), labels)
     assert spans == labels.events()
@@ -363,42 +345,24 @@ def test_a_run_file_is_analysed_by_its_path_and_a_shipped_model_by_its_name(tmp_
     assert found.findings == analyse(run, library).findings
 
 
-def test_short_findings_are_written_to_the_millisecond():
-    assert str(Event("impact", 3.0, 3.002, 0.9)) == "impact from 3.000 s to 3.002 s (score 0.90)"
-    assert str(Event("impact", 3.0, 3.2, 0.9)) == "impact from 3.00 s to 3.20 s (score 0.90)"
-
-
-def test_the_audit_names_a_placeholder_of_the_desired_velocity():
-    clause = "zero throughout while joints move at more than 0.1 rad/s for seconds: it is left out"
-    assert any(clause in warning for warning in audit(zeros(moving()), LIBRARY).warnings)
-    assert not any("left out" in warning for warning in audit(moving(), LIBRARY).warnings)
-
-
 @pytest.mark.parametrize(
     ("content", "names"),
     [
         ("0.0 1.5\n", False),
         ("# time noise\n\n 0.0, 1.5\n", False),
         ("-1;2\n", False),
-        ("1.5\n", False),
         ("time,noise\n", True),
         ("0.0 1.5 2.5\n", True),
-        ("0.0 1.5 2.5 3.5\n", True),
         ("# nothing but a remark\n", False),
-        ("", False),
     ],
 )
 def test_a_log_of_two_numbers_a_line_is_told_from_one_with_names(tmp_path, content, names):
-    from inspector.verdict import _has_header
-
     path = tmp_path / "noise.log"
     path.write_text(content)
     assert _has_header(path) == names
 
 
 def test_what_is_no_regular_file_is_not_read_for_a_header(tmp_path):
-    from inspector.verdict import _has_header
-
     os.mkfifo(tmp_path / "pipe.log")  # has no end, and is never opened
     assert _has_header(tmp_path / "pipe.log")
     assert _has_header(tmp_path)
@@ -418,8 +382,6 @@ def test_a_verdict_has_localisations_where_they_are_asked_for():
 
 
 def test_a_file_is_analysed_with_its_links_unless_told():
-    from inspector.analysis import analyse_file
-
     found = analyse_file(demo_run(), {})
     assert found.links is not None
     assert found.sha256 == hashlib.sha256(demo_run().read_bytes()).hexdigest()
@@ -430,35 +392,32 @@ def test_a_file_is_analysed_with_its_links_unless_told():
     assert with_links(replace(bare, run=replace(bare.run, position=None)), "normal").links is None
 
 
-def test_what_was_computed_in_place_of_what_a_run_lacks_is_said():
+def test_what_a_run_lacks_and_what_was_computed_in_its_place_is_said():
     still = np.zeros((3, 12))
-    time = np.arange(3) / 1000
-    meta = {"differentiated": {"velocity": "central", "velocity_desired": "backward"}}
+    meta = {"differentiated": {"velocity": "central"}}
     names = Robot.load("solo12").joint_names
-    fields = {"time": time, "velocity": still, "position": still, "joint_names": names}
+    fields = {"time": np.arange(3) / 1000, "velocity": still, "position": still, "meta": meta}
     pose = np.tile([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], (3, 1))
-    run = Run(**fields, velocity_desired=still, robot="solo12", meta=meta)
-    made = [
-        f"The run had no {signal}: it was differentiated ({method})."
-        for signal, method in meta["differentiated"].items()
-    ]
-    drawn = "The run has no base pose: the robot is drawn with its base at the origin."
-    missing = [
-        with_links(analysed(".", run=each), "").missing
-        for each in (
-            run,
-            replace(run, base_pose=pose),
+    run = Run(**fields, joint_names=names, velocity_desired=still, robot="solo12")
+    made = "The run had no velocity: it was differentiated (central)."
+    motion = "The run has no desired velocities: the noise counts the measured motion alone."
+    positions, none = "No 3D robot: the run has no positions.", "No 3D robot: the run names none."
+    gap = "3 samples lie in gaps; frames that touch one are not labelled."
+    for each, missing in (
+        (run, ("The run has no base pose: the robot is drawn with its base at the origin.", made)),
+        (replace(run, base_pose=pose), (made,)),
+        (replace(run, position=None), (positions, made)),
+        (
             replace(run, robot="no such robot"),
-            replace(run, position=None),
-        )
-    ]
-    unknown = "No 3D robot: 'no such robot' is neither a listed robot nor a URDF or MJCF file."
-    assert missing == [
-        (drawn, *made),
-        tuple(made),
-        (unknown, *made),
-        ("No 3D robot: the run has no positions.", *made),
-    ]
+            (
+                "No 3D robot: 'no such robot' is neither a listed robot nor a URDF or MJCF file.",
+                made,
+            ),
+        ),
+        (moving(desired=False), (none, motion)),
+        (moving(valid=np.arange(5000) >= 3), (none, gap)),
+    ):
+        assert with_links(analysed(".", run=each), "").missing == missing
 
 
 def still_and_fast(**changes):
@@ -470,31 +429,23 @@ def still_and_fast(**changes):
 
 
 def test_the_level_of_a_run_is_that_of_its_samples():
-    from inspector.analysis import estimate, noise_level
+    def level(**changes):
+        run = still_and_fast(**changes)
+        return noise_level(run, estimate(run, "simplified"))
 
-    run = still_and_fast()
-    found = noise_level(run, estimate(run, "simplified"))
-    assert found.rms == pytest.approx(np.sqrt((9 * 25.0 + 100.0) / 10))
-    assert (found.peak, found.peak_time) == pytest.approx((10.0, 2.007))
-    assert [name for name, _ in found.shares] == ["b", "a"]
-    assert [share for _, share in found.shares] == pytest.approx([0.64, 0.36])
-    assert str(found) == (
-        "simplified: rms 5.701 rad/s, peak 10 rad/s at 2.007 s\n   64.0%  b\n   36.0%  a"
-    )
-    gap = still_and_fast(valid=np.arange(10) != 7)
-    found = noise_level(gap, estimate(gap, "simplified"))
-    assert (found.rms, found.peak, found.peak_time) == pytest.approx((5.0, 5.0, 2.0))
-    rest = still_and_fast(velocity=np.zeros((10, 2)))
-    assert noise_level(rest, estimate(rest, "simplified")).shares == (("a", 0.0), ("b", 0.0))
+    rms = np.sqrt((9 * 25.0 + 100.0) / 10)
+    shares = "\n   64.0%  b\n   36.0%  a"
+    assert level() == f"simplified: rms {rms:.4g} rad/s, peak 10 rad/s at 2.007 s{shares}"
+    gap = level(valid=np.arange(10) != 7)
+    assert gap == f"simplified: rms 5 rad/s, peak 5 rad/s at 2.000 s{shares}"
+    rest = level(velocity=np.zeros((10, 2)))
+    assert rest == "simplified: rms 0 rad/s, peak 0 rad/s at 2.000 s"
 
 
 def test_parts_of_a_thousandth_are_listed_and_remarks_after_them():
-    from inspector.analysis import NoiseLevel
-
-    shares = (("a", 0.998), ("b", 0.001), ("c", 0.0009))
-    found = NoiseLevel("paper", "√W", 0.12345, 1.5, 0.0, shares, ("links without geometry: d",))
-    assert str(found).splitlines() == [
-        "paper: rms 0.1235 √W, peak 1.5 √W at 0.000 s",
+    power = np.tile([0.998, 0.001, 0.0009], (10, 1))
+    known = Estimate("paper", "√W", power, ("a", "b", "c"), ("links without geometry: d",))
+    assert noise_level(still_and_fast(), known).splitlines()[1:] == [
         "   99.8%  a",
         "    0.1%  b",
         "  links without geometry: d",
@@ -502,8 +453,6 @@ def test_parts_of_a_thousandth_are_listed_and_remarks_after_them():
 
 
 def test_the_simplified_noise_has_what_is_measured_what_is_desired_and_the_base(tmp_path):
-    from inspector.analysis import estimate, write_csv
-
     base = np.tile([1.0, 2.0, 2.0, 0.0, 4.0, 0.0], (10, 1))
     run = still_and_fast(
         velocity_desired=np.tile([0.5, 0.25], (10, 1)),
@@ -524,16 +473,13 @@ def test_the_simplified_noise_has_what_is_measured_what_is_desired_and_the_base(
 
 
 def test_noise_that_is_not_finite_names_its_time():
-    from inspector.analysis import Estimate, noise_level
-    from inspector.errors import InspectorError
-
     power = np.ones((10, 1))
     power[4:6] = np.inf
     text = "the paper noise is inf at 2.004 s: no robot moves so fast, or is so large"
     with pytest.raises(InspectorError, match=f"^{text}$"):
         noise_level(still_and_fast(), Estimate("paper", "√W", power, ("a",)))
     gap = still_and_fast(valid=~np.isin(np.arange(10), [4, 5]))
-    assert noise_level(gap, Estimate("paper", "√W", power, ("a",))).peak == 1.0
+    assert ", peak 1 " in noise_level(gap, Estimate("paper", "√W", power, ("a",)))
 
 
 @pytest.mark.parametrize(
@@ -545,16 +491,11 @@ def test_noise_that_is_not_finite_names_its_time():
     ],
 )
 def test_a_noise_that_a_run_cannot_have_is_refused(robot, kind, text):
-    from inspector.analysis import estimate
-    from noisemodel import NoiseModelError
-
     with pytest.raises(NoiseModelError, match=text):
         estimate(still_and_fast(robot=robot), kind)
 
 
 def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
-    from inspector.verdict import work_of
-
     (tmp_path / "a.npz").write_bytes(bytes(1_000_000))
     (tmp_path / "b.npz").write_bytes(bytes(500_000))
     found = [tmp_path / "a.npz", tmp_path / "b.npz", tmp_path / "gone.npz", tmp_path]
@@ -562,8 +503,6 @@ def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
 
 
 def test_a_base_that_floats_makes_noise_by_its_own_motion():
-    from inspector.analysis import estimate
-
     robot = Robot.load("solo12")
     time = np.arange(200) / 1000
     still = np.zeros((200, len(robot.joint_names)))
@@ -582,8 +521,6 @@ def test_a_base_that_floats_makes_noise_by_its_own_motion():
 
 
 def test_the_papers_sum_is_given_where_a_robot_and_its_positions_are_known():
-    from inspector.analysis import default_kinds
-
     whole = replace(moving(), robot="panda", position=np.zeros_like(moving().velocity))
     assert default_kinds(whole) == ("simplified", "paper")
     assert default_kinds(replace(whole, position=None)) == ("simplified",)

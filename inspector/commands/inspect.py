@@ -393,7 +393,7 @@ def _print_levels(
         write_csv(recorded, estimates, csv, overwrite=overwrite)
     typer.echo(f"{run}: {recorded.duration:.2f} s at {recorded.rate:g} Hz")
     for each in estimates:
-        typer.echo(str(noise_level(recorded, each)))
+        typer.echo(noise_level(recorded, each))
 
 
 # --- listen
