@@ -247,7 +247,7 @@ def refused(data, output, *more, grid=GRID, code=3):
     ("more", "reason"),
     [
         (("--grid", "C=1"), "holds results of another grid (regularization differs)"),
-        (("--grid", "floor=1e-3"), "holds results of another grid (floor was not in it)"),
+        (("--grid", "floor=1e-3"), "holds results of another grid (floor differs)"),
     ],
 )
 def test_results_of_another_grid_are_refused(data, whole, tmp_path, more, reason):

@@ -19,7 +19,7 @@ from predicted_runs import (
 import noiseclassifier as nc
 from noiseclassifier.assessment import measure, table
 from noiseclassifier.labels import Event
-from noiseclassifier.matching import Unanswered, are_probabilities, failure_score
+from noiseclassifier.matching import Unanswered
 from noiseclassifier.recording import Fault
 
 RATE = 1000.0
@@ -137,17 +137,6 @@ def test_lines_are_short_and_lists_too():
     text = str(measure(many(40, ["ok"] * 47)))
     assert max(map(len, text.splitlines())) <= 120
     assert "and 75 more" in text
-
-
-def test_probabilities_differ_from_margins():
-    above_threshold = np.array([[0.7, 0.1, 0.2, 0.0], [0.0, 0.0, 0.5, 0.5]])
-    assert are_probabilities(above_threshold)
-    assert failure_score(above_threshold, CLASSES).tolist() == pytest.approx([0.3, 1.0])
-    votes = np.array([[3.1, 2.0, 1.0, -0.1]])
-    assert not are_probabilities(votes)
-    assert failure_score(votes, CLASSES).tolist() == pytest.approx([-1.1])
-    assert not are_probabilities(np.array([[1.5, -0.5]]))
-    assert not are_probabilities(np.array([[0.5, 0.5], [0.5, 0.4]]))
 
 
 def sure(name, annotated, labels, confidence, findings, *, cut=None, faults=(), **facts):

@@ -331,7 +331,8 @@ def test_the_score_of_a_run_is_that_which_two_neighbouring_frames_reach():
         scores[frame] = [1.0 - risk, risk, 0.0, 0.0]
     labels = replace(probable([]), scores=scores)
     assert run_score(labels) == pytest.approx(0.5)
-    assert run_score(replace(labels, above_threshold=None)) == pytest.approx(0.9)
+    assert run_score(replace(labels, above_threshold=None)) == pytest.approx(0.9 - 0.1)
+    assert np.isnan(run_score(labels.part(slice(0, 0))))
     scores[0] = [0.2, 0.8, 0.0, 0.0]
     assert run_score(replace(labels, scores=scores)) == pytest.approx(0.8)
 

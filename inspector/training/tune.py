@@ -34,6 +34,7 @@ from noiseclassifier.tuning import (
     Point,
     Trial,
     Validation,
+    Value,
     measure,
     order,
     validate,
@@ -59,47 +60,27 @@ WIDTH = 10
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """The settings of a grid search.
+    """The settings of a grid search."""
 
-    Attributes:
-        training: Annotated runs, folders of them, or NoisyTest folders.
-        validation: Recordings of a validation set; without any, the training set is folded.
-        part: The part of all these recordings to read.
-        folds: Number of folds without a validation set.
-        profile: One of ``inspector.training.train.PROFILES``.
-        rate: Rate of the model, in [Hz], to which faster runs are decimated.
-        grid: Texts that `Grid.of` reads.
-    """
-
-    training: Sequence[Path]
-    validation: Sequence[Path] = ()
-    part: str = "all"
+    training: Sequence[Path]  # annotated runs, folders of them, or NoisyTest folders
+    validation: Sequence[Path] = ()  # without any, the training set is folded
+    part: str = "all"  # of all these recordings
     folds: int = 5
-    profile: str = "noisytest-rbf"
-    rate: float = 10_000.0
-    grid: Sequence[str] = ("paper",)
+    profile: str = "noisytest-rbf"  # one of ``inspector.training.train.PROFILES``
+    rate: float = 10_000.0  # of the model, in [Hz], to which faster runs are decimated
+    grid: Sequence[str] = ("paper",)  # texts that `Grid.of` reads
 
 
 @dataclass(frozen=True, eq=False)
 class Tuned:
-    """The results of a grid search.
-
-    Attributes:
-        search: The settings of the search.
-        grid: The points.
-        profiles: The profile of each point.
-        measures: The measures of each point.
-        untuned: The profile before tuning.
-        reference: The predictions of the untuned profile.
-        trial: The recordings to train on and to measure on.
-    """
+    """The results of a grid search."""
 
     search: Search
     grid: Grid
-    profiles: Sequence[nc.Profile]
-    measures: Sequence[Measures]
+    profiles: Sequence[nc.Profile]  # of each point
+    measures: Sequence[Measures]  # of each point
     untuned: nc.Profile
-    reference: Validation
+    reference: Validation  # the predictions of the untuned profile
     trial: Trial
 
     def ranked(self, criterion: Criterion) -> list[int]:
@@ -132,7 +113,7 @@ class Tuned:
         ]
         widths = [7, *(max(WIDTH, len(name) + 2) for name in names), *(WIDTH for _ in HEADS)]
         lines = ["".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
-        return "\n".join([self._basis(), "", *lines, "", *self._remarks(criterion)])
+        return "\n".join([self._basis(), "", *lines, *self._ends(criterion)])
 
     def as_dict(self, criterion: Criterion, *, rows: int = 10) -> dict[str, Any]:
         """The best points as JSON can hold them."""
@@ -140,46 +121,35 @@ class Tuned:
         return {
             "points": len(points),
             "criterion": criterion,
-            "shared_by": {name: self._shared(name) for name in HEADS},
             "best": [{**points[i], **self.measures[i].as_dict()} for i in ranked[:rows]],
             "profile": self.profiles[ranked[0]].as_dict(),
             "untuned": self.reference.measures()[0].as_dict(),
         }
-
-    def along(self, name: str, criterion: Criterion) -> list[tuple[Any, Measures]]:
-        """Values of a setting and the measures there; all others are the best point's."""
-        points, best = list(self.grid.points()), self.ranked(criterion)[0]
-        others = {key: value for key, value in points[best].items() if key != name}
-        return [
-            (point[name], found)
-            for point, found in zip(points, self.measures, strict=True)
-            if others.items() <= point.items()
-        ]
 
     def draw(self, path: Path, criterion: Criterion, *, overwrite: bool = False) -> None:
         """Draw the accuracy along each setting around the best point, as a PNG file."""
         require()
         from matplotlib.figure import Figure
 
-        best = self.profiles[self.ranked(criterion)[0]]
-        names = list(self.grid.axes)
-        figure = Figure(figsize=(4.0 * len(names), 3.4), dpi=100, layout="constrained")
-        row = figure.subplots(1, len(names), squeeze=False, sharey=True)[0]
-        for axes, name in zip(row, names, strict=True):
-            values, measures = zip(*self.along(name, criterion), strict=True)
+        points = list(self.grid.points())
+        best = points[self.ranked(criterion)[0]]
+        figure = Figure(figsize=(4.0 * len(best), 3.4), dpi=100, layout="constrained")
+        row = figure.subplots(1, len(best), squeeze=False, sharey=True)[0]
+        for axes, name in zip(row, best, strict=True):
+            others = {key: value for key, value in best.items() if key != name}
+            along = [i for i, point in enumerate(points) if others.items() <= point.items()]
+            values = [points[i][name] for i in along]
             words = isinstance(values[0], str)
-            places = list(range(len(values))) if words else list(values)
+            places: list[Any] = list(range(len(values))) if words else values
             for measure_name in ("balanced_accuracy", "subset_accuracy"):
-                shares = [getattr(each, measure_name) for each in measures]
+                shares = [getattr(self.measures[i], measure_name) for i in along]
                 axes.plot(places, shares, ".-", label=measure_name.replace("_", " "))
-            place = values.index(getattr(best, name))
-            axes.axvline(places[place], color="0.6", ls=":")
+            axes.axvline(places[values.index(best[name])], color="0.6", ls=":")
             if words:
                 axes.set_xticks(places, values)
-            elif min(values) > 0 and max(values) >= 100 * min(values):
+            elif min(places) > 0 and max(places) >= 100 * min(places):
                 axes.set_xscale("log")
-            best_value = getattr(best, name)
-            axes.set_xlabel(f"{name}, best: {best_value if words else format(best_value, '.6g')}")
+            axes.set_xlabel(f"{name}, best: {_text(best[name])}")
             axes.grid(alpha=0.4)
         row[0].set_ylabel("share of frames, or mean recall")
         row[0].legend(fontsize=8)
@@ -199,39 +169,14 @@ class Tuned:
             f" {len(self.reference.truth)} frames of {others}"
         )
 
-    def _remarks(self, criterion: Criterion) -> list[str]:
-        best = self.ranked(criterion)[0]
-        lines = []
-        if criterion != "log-loss":
-            name = criterion.replace("-", "_")
-            value, words = getattr(self.measures[best], name), criterion.replace("-", " ")
-            lines.append(
-                f"{self._share(name)} the best {words}, {value:.1%}; the log-loss breaks ties."
-            )
-        if criterion != "subset-accuracy":
-            most = max(measures.subset_accuracy for measures in self.measures)
-            lines.append(
-                f"{self._share('subset_accuracy')} the best subset accuracy, {most:.1%},"
-                " which is the paper's criterion."
-            )
+    def _ends(self, criterion: Criterion) -> Iterator[str]:
+        """Settings of the best point that lie at an end of the grid."""
+        best = self.profiles[self.ranked(criterion)[0]]
         for name, values in self.grid.axes.items():
-            value = getattr(self.profiles[best], name)
             numbers = [each for each in values if not isinstance(each, str)]
+            value = getattr(best, name)
             if len(numbers) > 1 and value in (min(numbers), max(numbers)):
-                end = f"{name} {value:.6g} is an end of the grid"
-                lines.append(f"{end}: a wider one may hold better.")
-        return lines
-
-    def _share(self, name: str) -> str:
-        count = self._shared(name)
-        return f"{count} of {len(self.grid)} points {'has' if count == 1 else 'share'}"
-
-    def _shared(self, name: str) -> int:
-        """Number of points with the best value of a measure."""
-        found = [getattr(measures, name) for measures in self.measures]
-        values = [value for value in found if not isnan(value)]
-        best = min if name in ("log_loss", "false_alarm_rate") else max
-        return values.count(best(values)) if values else 0
+                yield (f"{name} {value:.6g} is an end of the grid: a wider one may hold better.")
 
 
 def tune(
@@ -245,10 +190,7 @@ def tune(
     """Measure the points of a grid that a results file does not have yet.
 
     Args:
-        output: The results file; the search resumes if it exists.
         model: A model file to write afterwards; if it exists, it is refused before the work.
-        jobs: Number of parallel processes, or the address of a Dask scheduler.
-        overwrite: Whether to discard the results in the file.
     """
     if model:
         refuse_existing(model, overwrite=overwrite)
@@ -268,15 +210,14 @@ def tune(
         "software": versions(),
     }
     reference = validate([base], trial)  # first: data that cannot be trained on leave no file
-    with opened(output, facts, points, overwrite=overwrite) as results:
-        done = len(results.measures)
+    with opened(output, facts, points, overwrite=overwrite) as (done, append):
         least = BATCHES * (jobs if isinstance(jobs, int) else WORKERS)
-        batches = _batches(points[done:], profiles[done:], least)
+        batches = _batches(points[len(done) :], profiles[len(done) :], least)
         one, names = partial(measure, trial=trial), list(grid.axes)
         found = in_order(one, batches, jobs=jobs, died=partial(_died, names=names))
         for measures in progress(found, "tune", total=len(batches)):
-            results.add(measures)
-    return Tuned(search, grid, profiles, results.measures, base, reference, trial)
+            append(measures)
+    return Tuned(search, grid, profiles, done, base, reference, trial)
 
 
 def _read_part(search: Search, paths: Sequence[Path], base: nc.Profile) -> list[nc.Recording]:
@@ -335,8 +276,12 @@ def _digests(found: Sequence[nc.Recording]) -> Mapping[str, Any]:
     }
 
 
+def _text(value: Value) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
 def _cells(point: Point, measures: Measures) -> list[str]:
-    cells = [value if isinstance(value, str) else f"{value:.6g}" for value in point.values()]
+    cells = [_text(value) for value in point.values()]
     for name in HEADS:
         value = getattr(measures, name)
         figure = f"{value:.4f}" if name == "log_loss" else f"{value:.1%}"
@@ -347,30 +292,17 @@ def _cells(point: Point, measures: Measures) -> list[str]:
 # --- the results file
 
 
-@dataclass(eq=False)
-class Results:
-    """The measures of the first points of a grid, in their order."""
-
-    points: Sequence[Point]
-    measures: list[Measures]
-    _append: Callable[[Mapping[str, Any]], None]
-
-    def add(self, measures: Sequence[Measures]) -> None:
-        """Append the measures of the next points, each flushed to the disk."""
-        points = self.points[len(self.measures) :][: len(measures)]
-        for point, each in zip(points, measures, strict=True):
-            self._append({**point, **each.as_dict()})
-        self.measures += measures
-
-
 @contextmanager
 def opened(
     path: Path, settings: Mapping[str, Any], points: Sequence[Point], *, overwrite: bool = False
-) -> Iterator[Results]:
+) -> Iterator[tuple[list[Measures], Callable[[Sequence[Measures]], None]]]:
     """Open a results file to resume, or create it.
 
     Args:
         settings: The settings of the search, by name, as JSON can hold them.
+
+    Returns:
+        The measures of the first points, and a function that appends those of the next ones.
     """
     header = {"format": FORMAT, **settings}
 
@@ -379,8 +311,15 @@ def opened(
         return _measures(path, rows, points)
 
     refused = partial(_refused, path)
-    with resumed(path, header, read, refused, afresh=overwrite) as (measures, append):
-        yield Results(points, measures or [], append)
+    with resumed(path, header, read, refused, afresh=overwrite) as (there, write):
+        done = there or []
+
+        def append(measures: Sequence[Measures]) -> None:
+            for each in measures:
+                write({**points[len(done)], **each.as_dict()})
+                done.append(each)
+
+        yield done, append
 
 
 def _refused(path: Path, problem: str) -> InspectorError:
@@ -401,9 +340,7 @@ def _check_header(path: Path, line: bytes, settings: Mapping[str, Any]) -> None:
         difference = f"{other}, not {mine}"
         if isinstance(other, dict) and isinstance(mine, dict):
             name = next(name for name in [*mine, *other] if other.get(name) != mine.get(name))
-            difference = f"{name} was {'in' if name in other else 'not in'} it"
-            if name in other and name in mine:
-                difference = f"{name} differs"
+            difference = f"{name} differs"
         raise _refused(path, f"holds results of another {topic.replace('_', ' ')} ({difference})")
 
 

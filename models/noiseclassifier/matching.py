@@ -294,32 +294,20 @@ def confirmed_at(labels: Labels) -> Index:
 def run_score(labels: Labels) -> float:
     """Largest failure score that two neighbouring frames both reach; NaN without a frame.
 
-    A finding takes two frames. A frame without a neighbour on one side stands alone, as in the rule
-    from frames to findings.
+    The score is 1 - P(ok), or the largest margin of a failure over `ok`. A finding takes two
+    frames. A frame without a neighbour on one side stands alone, as in the rule from frames to
+    findings.
     """
     if not len(labels):
         return nan
-    scores = failure_score(labels.scores, labels.classes)
+    ok = labels.classes.index(OK)
     if labels.above_threshold is None:
-        return float(scores.max())
-    apart = labels.apart
+        failures = np.delete(labels.scores, ok, axis=1).max(axis=1)
+        return float((failures - labels.scores[:, ok]).max())
+    scores, apart = 1.0 - labels.scores[:, ok], labels.apart
     alone = np.append(True, apart) | np.append(apart, True)
     both = np.minimum(scores[1:], scores[:-1])[~apart]
     return float(np.concatenate((scores[alone], both)).max())
-
-
-def failure_score(scores: Array, classes: Sequence[str]) -> Array:
-    """Score of any failure: 1 - P(ok), or the largest score of a failure less the score of `ok`."""
-    ok = list(classes).index(OK)
-    if are_probabilities(scores):
-        return 1.0 - scores[:, ok]
-    return np.asarray(np.delete(scores, ok, axis=1).max(axis=1) - scores[:, ok])
-
-
-def are_probabilities(scores: Array) -> bool:
-    """Whether scores of shape (frames, classes) are probabilities: none below 0, with the sum 1."""
-    whole = np.allclose(scores.sum(axis=1), 1.0, rtol=0.0, atol=1e-6)
-    return bool(whole and (scores >= 0.0).all())
 
 
 def _matches(met: Mask, close: Mask, felt: Mask, same: Mask) -> dict[str, float]:

@@ -1,28 +1,17 @@
 """Measures of a model: its frames, its findings as they are reported, and intervals of both.
 
-**Frames.** `Evaluation` has the paper's measures, and recall and precision.
+`docs/metrics.md` defines the measures, with their sources; `matching` defines the terms.
 
-**Findings.** All figures of the protocol are of one operating point: the findings as they are
-reported. Nothing is chosen on the runs that are measured. `matching` defines the terms;
-`docs/metrics.md` has all measures, each with its source. A measure of a model is the unweighted
-mean over robots, so that neither the robot with most runs nor that with most time decides. Medians
-of delays are averaged likewise. Runs are ranked as task 2 of the DCASE challenge does: by AUC, and
-by partial AUC up to a false positive rate of 0.1, standardised as McClish does (Analyzing a portion
-of the ROC curve, Medical Decision Making 9, 1989), both as harmonic means over all domains.
+A measure of a model is the unweighted mean over robots, so that neither the robot with most runs
+nor that with most time decides. Runs are ranked as task 2 of the DCASE challenge does: by AUC, and
+by partial AUC (McClish, Medical Decision Making 9, 1989), as harmonic means over all domains.
 
-**Intervals.** Frames of a recording and recordings of a group (`recording.group_of`) resemble each
-other, so that only groups are drawn: of 2000 sets of as many groups, drawn with replacement, the
-bounds hold the middle 95 % (percentile bootstrap). With few errors the sets hardly differ, and
-bounds that follow from counting take over:
-
-- *shares*: n recordings without an error are consistent with a share of 0.025^(1/n), so that no
-  interval ends closer to 1, nor closer to 0 than 1 - 0.025^(1/n) (Clopper and Pearson, 1934);
-- *events in a time*: the exact bounds of Garwood (1936), if they are wider; for 0 events the upper
-  one is 3.7 over the time, and 3.0 with 95 % on this one side (the "rule of three").
-
-The mean of rates has the bounds of Fay and Feuer (Confidence intervals for directly standardized
-rates, Statistics in Medicine 16, 1997), if they are wider. With fewer than five groups, shares have
-no interval.
+Recordings of a group (`recording.group_of`) resemble each other, so that groups are drawn: of 2000
+sets of as many, the bounds hold the middle 95 %. With few errors the sets hardly differ, and bounds
+that follow from counting take over where they are wider: n recordings without an error are
+consistent with a share of 0.025^(1/n) (Clopper and Pearson, 1934), and numbers of events have those
+of Garwood (1936), or of Fay and Feuer for means of rates (Statistics in Medicine 16, 1997). With
+fewer than five groups, shares have no interval.
 """
 
 from collections import defaultdict

@@ -12,8 +12,8 @@ that a point costs little more than libsvm's own work.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from itertools import chain, groupby, product
-from math import floor, isfinite, log, prod
+from itertools import accumulate, chain, groupby, product, repeat, takewhile
+from math import floor, isnan, log, nan, prod
 from typing import Any, Literal, Self, TypeAlias
 
 import numpy as np
@@ -72,8 +72,7 @@ class Grid:
             if name not in SETTINGS:
                 raise ProfileError(f"no setting {name!r} to tune; there are {', '.join(SETTINGS)}")
             if not values or len(set(values)) < len(values):
-                state = "a value twice" if values else "no value"
-                raise ProfileError(f"grid has {state} for {name}, expected one or more, each once")
+                raise ProfileError(f"grid of {name} needs one or more values, each once")
         if not self.axes or len(self) > MOST:
             count = len(self) * bool(self.axes)
             raise ProfileError(f"grid of {count} points, expected 1 to {MOST}")
@@ -88,24 +87,17 @@ class Grid:
         (C is 1.0999999999999999 where 1.1 is meant) and the last C and gamma just fall out.
         """
 
-        def added_up(first: float, last: float, step: float) -> Iterator[float]:
-            value = first
-            while value <= last:
-                yield value
-                value += step
+        def added_up(first: float, last: float, step: float) -> tuple[float, ...]:
+            values = accumulate(repeat(step), initial=first)
+            return tuple(takewhile(lambda value: value <= last, values))
 
-        gamma = {"gamma": tuple(added_up(4.5e-4, 6.0e-4, 1.0e-5))} if kernel == "rbf" else {}
+        gamma = {"gamma": added_up(4.5e-4, 6.0e-4, 1.0e-5)} if kernel == "rbf" else {}
         strides = tuple(range(224, 1026, 10))
-        return cls({"stride": strides, "regularization": tuple(added_up(0.5, 2.5, 0.1)), **gamma})
+        return cls({"stride": strides, "regularization": added_up(0.5, 2.5, 0.1), **gamma})
 
     @classmethod
     def of(cls, texts: Iterable[str], kernel: Kernel = "rbf") -> Self:
-        """Read a grid.
-
-        Args:
-            texts: ``paper``, or a setting and its values; a later text replaces the values that
-                an earlier one gave the same setting.
-        """
+        """Read ``paper``, or settings and their values; a later text replaces earlier ones."""
         axes: dict[str, tuple[Value, ...]] = {}
         for text in texts:
             if text == "paper":
@@ -127,12 +119,9 @@ class Grid:
         """Profile of each point; all other settings are as in ``base``."""
         estimator = base.estimator if base.estimator in OWN else "support vector machines"
         for name in self.axes:
-            idle: str = ""
-            if name in ESTIMATOR_SETTINGS and name not in OWN[estimator]:
-                idle = estimator
-            elif name == "gamma" and base.kernel == "linear":
-                idle = "the linear kernel"
-            if idle:
+            linear = name == "gamma" and base.kernel == "linear"
+            if linear or (name in ESTIMATOR_SETTINGS and name not in OWN[estimator]):
+                idle = "the linear kernel" if linear else estimator
                 raise ProfileError(f"{name} does nothing with {idle}; leave it out of the grid")
         for stride in self.axes.get("stride", ()):
             if isinstance(stride, int) and stride > base.length:
@@ -151,46 +140,35 @@ def _values(name: str, text: str) -> tuple[Value, ...]:
     kind = {field.name: field.type for field in fields(Profile)}.get(name)
     if kind not in (int, float):
         return tuple(filter(None, text.split(",")))
-    parts = text.split(":")
-    if len(parts) == 1:
-        numbers = [_number(name, each) for each in text.split(",") if each.strip()]
-    elif len(parts) == 3:
-        numbers = _range(name, *parts)
-    else:
-        raise ProfileError(f"{name} is {text!r}, expected first:last:step or values with commas")
-    if kind is float:
-        return tuple(numbers)
-    if odd := next((each for each in numbers if each != int(each)), None):
-        raise ProfileError(f"{name} is {odd:g}, expected whole samples")
-    return tuple(map(int, numbers))
+    try:
+        given = _range(text) if ":" in text else map(float, filter(str.strip, text.split(",")))
+        numbers = tuple(given)
+        whole = tuple(map(int, numbers))  # refuses what is not finite
+    except (ValueError, OverflowError):
+        numbers, whole = (nan,), ()
+    if isnan(sum(numbers)) or (kind is int and numbers != whole):
+        count = "whole samples" if kind is int else "finite numbers"
+        raise ProfileError(
+            f"{name} is {text!r}, expected {count}: values with commas, first:last:step, or"
+            f" first:last:xfactor, at most {MOST}"
+        )
+    return whole if kind is int else numbers
 
 
-def _range(name: str, first: str, last: str, step: str) -> list[float]:
-    start, stop, by = (_number(name, each) for each in (first, last, step.removeprefix("x")))
+def _range(text: str) -> list[float]:
+    """Values from a first to a last one, both included, by a step or a factor."""
+    first, last, step = text.split(":")
+    start, stop, by = float(first), float(last), float(step.removeprefix("x"))
     times = step.startswith("x")
     if not (by > 1 and start > 0 if times else by > 0):
-        raise ProfileError(
-            f"{name} is {first}:{last}:{step}, expected a step above 0,"
-            " or from a value above 0 by a factor above 1"
-        )
+        raise ValueError
     if stop < start:
         return []
     steps = log(stop / start) / log(by) if times else (stop - start) / by
-    count = floor(steps + 1e-9) + 1
-    if count > MOST:
-        raise ProfileError(f"grid of {count} values of {name}, expected 1 to {MOST}")
-    exact = (start * by**i if times else start + i * by for i in range(count))
+    if not steps < MOST:
+        raise ValueError
+    exact = (start * by**i if times else start + i * by for i in range(floor(steps + 1e-9) + 1))
     return [float(f"{each:.12g}") for each in exact]  # 0.7, and not 0.7000000000000001
-
-
-def _number(name: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = float("nan")
-    if not isfinite(number):
-        raise ProfileError(f"{name} is {text!r}, expected a finite number")
-    return number
 
 
 # --- measures of points
@@ -248,29 +226,22 @@ class Validation:
 
     def measures(self) -> list[Measures]:
         """Measures of each point."""
-        names = (*self.classes, UNKNOWN)
+        names, wanted = (*self.classes, UNKNOWN), [field.name for field in fields(Measures)]
         measures = []
         for chosen, margins in zip(self.chosen, self.margins, strict=True):
             cells = np.zeros((len(names), len(names)), dtype=np.int64)
             np.add.at(cells, (self.truth, chosen), 1)
-            evaluation = Evaluation(names, cells)
-            values = (
-                evaluation.balanced_accuracy,
-                balanced_log_loss(margins, self.truth),
-                evaluation.failure_recall,
-                evaluation.false_alarm_rate,
-                evaluation.subset_accuracy,
-            )
-            measures.append(Measures(*(round(float(value), DIGITS) for value in values)))
+            found = Evaluation(names, cells).as_dict()
+            found["log_loss"] = balanced_log_loss(margins, self.truth)
+            values = (nan if found[name] is None else found[name] for name in wanted)
+            measures.append(Measures(*(round(value, DIGITS) for value in values)))
         return measures
 
 
 def order(criterion: Criterion) -> Callable[[Measures], tuple[float, float]]:
     """Key that sorts points, the best first; the log-loss breaks ties."""
-    if criterion == "log-loss":
-        return lambda measures: (measures.log_loss, 0.0)
-    name = criterion.replace("-", "_")
-    return lambda measures: (-getattr(measures, name), measures.log_loss)
+    name, sign = criterion.replace("-", "_"), 1.0 if criterion == "log-loss" else -1.0
+    return lambda measures: (sign * getattr(measures, name), measures.log_loss)
 
 
 def measure(profiles: Sequence[Profile], trial: Trial) -> list[Measures]:
@@ -367,11 +338,7 @@ def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> A
 
 
 def class_margins(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:
-    """Least decision value in favour of each class, shape (frames, classes).
-
-    One-vs-rest: the decision values. One-vs-one: the least of the pairs of a class, above 0 if it
-    wins all of them.
-    """
+    """Least decision value in favour of each class, above 0 if it wins all of its pairs."""
     if multiclass == "one-vs-rest":
         return decisions
     pairs = np.full((len(decisions), classes, classes), np.inf)
@@ -386,9 +353,8 @@ def balanced_log_loss(margins: Array, truth: Index) -> float:
 
     With margins s, p_k = exp(a s_k) / sum_j exp(a s_j) is the probability of class k, and the loss
     is the mean over classes of the mean over the class's frames of -log p_truth. It is finer than
-    counts of frames: two points hardly ever have the same. The slope a > 0 has the least loss
-    (Platt's scaling without a bias, one for all classes), so that the loss does not depend on the
-    width of the margins; it changes no decision.
+    counts of frames. The slope a > 0 has the least loss (Platt's scaling without a bias), so that
+    the loss does not depend on the width of the margins.
     """
     from scipy.optimize import minimize_scalar
 
