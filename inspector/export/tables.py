@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -39,23 +39,14 @@ from noisemodel.types import Array
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """The noise and the analysis of a run; gaps are left out.
-
-    Attributes:
-        analysis: The run with what was found in it.
-        time: Of each sample, shape (samples,), in [s].
-        simplified: Simplified noise, shape (samples,), in [rad/s].
-        extended: Sound power of all links, shape (samples,), in [W]; None without a robot.
-        kind: Kind of the extended noise.
-        remarks: What is missing and why, a sentence each.
-    """
+    """The noise and the analysis of a run; gaps are left out."""
 
     analysis: Analysis
-    time: Array
-    simplified: Array
-    extended: Array | None
-    kind: str
-    remarks: tuple[str, ...]
+    time: Array  # of each sample, shape (samples,), in [s]
+    simplified: Array  # simplified noise, shape (samples,), in [rad/s]
+    extended: Array | None  # sound power of all links, shape (samples,), in [W]
+    kind: str  # of the extended noise
+    remarks: tuple[str, ...]  # what is missing and why, a sentence each
 
     def __str__(self) -> str:
         """The content in a line."""
@@ -86,26 +77,11 @@ def collect(run: nm.Run, library: Library, *, kind: str = "normal") -> Content:
             extended = estimate(run, kind).power.sum(axis=1)[run.mask]
         except nm.GeometryError as error:
             missing.append(f"No extended noise: {error}.")
-    return Content(
-        analysis=analysis,
-        time=run.time[run.mask],
-        simplified=analysis.noise[run.mask],
-        extended=extended,
-        kind=kind,
-        remarks=tuple(missing),
-    )
+    simplified = analysis.noise[run.mask]
+    return Content(analysis, run.time[run.mask], simplified, extended, kind, tuple(missing))
 
 
-UNITS = {
-    name: {"unit": unit}
-    for name, unit in (
-        ("time", "s"),
-        ("simplified", "rad/s"),
-        ("extended", "W"),
-        ("frame_start", "s"),
-        ("frame_stop", "s"),
-    )
-}
+UNITS = {"time": "s", "simplified": "rad/s", "extended": "W", "frame_start": "s", "frame_stop": "s"}
 """Units of the columns that have one."""
 
 
@@ -118,15 +94,11 @@ def arrow_table(content: Content) -> Any:
     """
     import pyarrow as pa
 
-    columns = dict(_table_columns(content))
-    fields = [
-        pa.field(name, pa.array(values).type, metadata=UNITS.get(name))
-        for name, values in columns.items()
-    ]
+    columns = {name: pa.array(values) for name, values in _table_columns(content)}
+    units = {name: {"unit": UNITS[name]} if name in UNITS else None for name in columns}
+    fields = [pa.field(name, each.type, metadata=units[name]) for name, each in columns.items()]
     about = {"format": "noise-export/1", "model": content.analysis.model, "extended": content.kind}
-    return pa.table(
-        [pa.array(values) for values in columns.values()], pa.schema(fields, metadata=about)
-    )
+    return pa.table(list(columns.values()), pa.schema(fields, metadata=about))
 
 
 def write_parquet(content: Content, path: Path) -> None:
@@ -196,13 +168,15 @@ MEASURED, DESIRED = "/joint_states", "/joint_states/desired"
 LOG_WARNING = 3
 """Level of a ``foxglove.Log``."""
 
-NUMBER, TEXT = {"type": "number"}, {"type": "string"}
-STAMP = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
+NUMBER, INTEGER, TEXT = {"type": "number"}, {"type": "integer"}, {"type": "string"}
+STAMP = {"type": "object", "properties": {"sec": INTEGER, "nsec": INTEGER}}
 SPAN = {"label": TEXT, "start": NUMBER, "stop": NUMBER}
 NANOSECONDS = 10**9
 LATEST = 2**63
 """Stamps from here on are not valid, in [ns]."""
 
+Row = tuple[float, dict[str, Any]]
+"""Time in [s], and a message."""
 Message = tuple[int, str, bytes]
 """Stamp in [ns], topic and serialised content."""
 
@@ -216,30 +190,26 @@ def write_mcap(content: Content, path: Path) -> None:
         raise InspectorError(
             f"MCAP needs the extra `mcap` ({error}); pip install 'noise-inspector[mcap]'"
         ) from error
-    ros = get_typestore(Stores.ROS2_HUMBLE)
-    joints = joint_signals(content)
+    ros, zero = get_typestore(Stores.ROS2_HUMBLE), start_stamp(content)
     with path.open("wb") as stream:
         writer: Any = Writer(stream)
         writer.start(profile="ros2", library="noise-inspector")
-        channels = {}
-        if joints:
+        channels, messages = {}, list[Iterator[Message]]()
+        if joints := joint_signals(content):
             definition, _ = ros.generate_msgdef(JOINT_STATE, ros_version=2)
             schema = writer.register_schema(JOINT_STATE, "ros2msg", definition.encode())
             channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in joints}
-        for topic, fields in _topics(content).items():
+        for topic, (fields, rows) in _topics(content).items():
             data = json.dumps({"type": "object", "properties": fields}).encode()
             name = "foxglove.Log" if topic == "/log" else f"noise.{topic[1:]}"
             schema = writer.register_schema(name, "jsonschema", data)
             channels[topic] = writer.register_channel(topic, "json", schema)
-        messages = _messages(content) + [
-            _states(content, topic, *each, ros) for topic, each in joints.items()
-        ]
+            messages.append(_serialised(topic, rows, zero))
+        messages += [_states(content, topic, *each, ros) for topic, each in joints.items()]
         for stamp, topic, data in heapq.merge(*messages, key=lambda each: each[0]):
             writer.add_message(channels[topic], log_time=stamp, data=data, publish_time=stamp)
-        writer.add_metadata(
-            "noise-inspector",
-            {"model": content.analysis.model, "extended": content.kind, "time": "s"},
-        )
+        about = {"model": content.analysis.model, "extended": content.kind, "time": "s"}
+        writer.add_metadata("noise-inspector", about)
         writer.finish()
 
 
@@ -273,90 +243,68 @@ def start_stamp(content: Content) -> int:
     return max(start if start < LATEST else 0, -first)
 
 
-def _topics(content: Content) -> dict[str, dict[str, Any]]:
-    """JSON properties of the messages of each topic."""
-    noise = {"time": NUMBER, "simplified": NUMBER}
-    topics: dict[str, dict[str, Any]] = {
-        "/noise": noise if content.extended is None else noise | {"extended": NUMBER},
-        "/level": {"level": NUMBER},
+def _topics(content: Content) -> dict[str, tuple[dict[str, Any], Iterator[Row]]]:
+    """JSON properties of the messages of each topic, and the messages in order of time."""
+    analysis = content.analysis
+    noise = {"time": content.time, "simplified": content.simplified}
+    if content.extended is not None:
+        noise["extended"] = content.extended
+    topics: dict[str, tuple[dict[str, Any], Iterator[Row]]] = {
+        "/noise": (dict.fromkeys(noise, NUMBER), _noise(noise)),
+        "/level": ({"level": NUMBER}, _levels(analysis)),
     }
-    if content.analysis.labels is not None:
-        scores = dict.fromkeys(content.analysis.labels.classes, NUMBER)
+    if analysis.labels is not None:
+        scores = dict.fromkeys(analysis.labels.classes, NUMBER)
         parts = {"failure": NUMBER, "scores": {"type": "object", "properties": scores}}
-        if content.analysis.alarm is not None:
+        if analysis.alarm is not None:
             parts["alarm"] = NUMBER
-        topics |= {"/labels": SPAN | parts, "/class": {"label": TEXT}}
-    if content.analysis.findings:
-        numbers = {"level": {"type": "integer"}, "line": {"type": "integer"}}
-        texts = dict.fromkeys(("message", "name", "file"), TEXT)
-        topics["/findings"] = SPAN | {"score": NUMBER}
-        topics["/log"] = {"timestamp": STAMP} | numbers | texts
-    if content.analysis.run.blocks:
-        topics["/annotations"] = SPAN
+        topics["/labels"] = SPAN | parts, _frames(analysis.labels, analysis.alarm)
+        topics["/class"] = {"label": TEXT}, _classes(analysis)
+    if analysis.findings:
+        fields = {"timestamp": STAMP, "level": INTEGER, "line": INTEGER}
+        fields |= dict.fromkeys(("message", "name", "file"), TEXT)
+        topics["/findings"] = SPAN | {"score": NUMBER}, _spans(analysis.findings, "score")
+        topics["/log"] = fields, _lines(analysis, start_stamp(content))
+    if analysis.run.blocks:
+        topics["/annotations"] = SPAN, _spans(analysis.run.blocks)
     return topics
-
-
-Row = tuple[float, dict[str, Any]]
-"""Time in [s], and a message."""
 
 
 def _stamp(zero: int, time: float) -> int:
     return max(0, zero + round(time * NANOSECONDS))
 
 
-def _messages(content: Content) -> list[Iterator[Message]]:
-    """JSON messages of each topic in order of time."""
-    analysis, zero = content.analysis, start_stamp(content)
-
-    def serialised(topic: str, rows: Iterator[Row]) -> Iterator[Message]:
-        for time, message in rows:
-            yield _stamp(zero, time), topic, json.dumps(message, allow_nan=False).encode()
-
-    parts = {
-        "/noise": _noise(content),
-        "/level": _levels(content),
-        "/labels": _frames(content),
-        "/class": _classes(content),
-        "/findings": _spans(analysis.findings, "score"),
-        "/annotations": _spans(analysis.run.blocks),
-        "/log": _lines(content, zero),
-    }
-    return [serialised(topic, rows) for topic, rows in parts.items()]
+def _serialised(topic: str, rows: Iterator[Row], zero: int) -> Iterator[Message]:
+    for time, message in rows:
+        yield _stamp(zero, time), topic, json.dumps(message, allow_nan=False).encode()
 
 
-def _noise(content: Content) -> Iterator[Row]:
-    columns = {"time": content.time, "simplified": content.simplified}
-    if content.extended is not None:
-        columns["extended"] = content.extended
+def _noise(columns: dict[str, Array]) -> Iterator[Row]:
     for row in zip(*(each.tolist() for each in columns.values()), strict=True):
         yield row[0], dict(zip(columns, row, strict=True))
 
 
-def _levels(content: Content) -> Iterator[Row]:
+def _levels(analysis: Analysis) -> Iterator[Row]:
     """The level of the noise above 10 Hz, where it is known."""
-    start, level = content.analysis.noise_level
+    start, level = analysis.noise_level
     for time, each in zip(start.tolist(), level[:, 0].tolist(), strict=True):
         if not math.isnan(each):
             yield time, {"level": each}
 
 
-def _frames(content: Content) -> Iterator[Row]:
-    labels, alarm = content.analysis.labels, content.analysis.alarm
-    if labels is None:
-        return
+def _frames(labels: nc.Labels, alarm: float | None) -> Iterator[Row]:
     rows = zip(labels.start.tolist(), labels.stop.tolist(), labels.debounced.tolist(), strict=True)
     for (start, stop, label), scores in zip(rows, labels.scores.tolist(), strict=True):
         message = {"label": label, "start": start, "stop": stop}
         message |= {} if alarm is None else {"alarm": alarm}
         each = dict(zip(labels.classes, scores, strict=True))
-        failure = 1.0 - each["ok"]
-        yield (start + stop) / 2, message | {"failure": failure, "scores": each}
+        yield (start + stop) / 2, message | {"failure": 1.0 - each["ok"], "scores": each}
 
 
-def _classes(content: Content) -> Iterator[Row]:
+def _classes(analysis: Analysis) -> Iterator[Row]:
     """The class where it changes, and none where frames end."""
-    lane, end = content.analysis.lane, None
-    for start, stop, label in lane:
+    end = None
+    for start, stop, label in analysis.lane:
         if end is not None and start > end:
             yield end, {"label": ""}
         yield start, {"label": label}
@@ -370,9 +318,9 @@ def _spans(spans: Any, *more: str) -> Iterator[Row]:
         yield each.start, {name: getattr(each, name) for name in ("label", "start", "stop", *more)}
 
 
-def _lines(content: Content, zero: int) -> Iterator[Row]:
+def _lines(analysis: Analysis, zero: int) -> Iterator[Row]:
     """A ``foxglove.Log`` for each finding."""
-    for each in content.analysis.findings:
+    for each in analysis.findings:
         sec, nsec = divmod(_stamp(zero, each.start), NANOSECONDS)
         message = f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s"
         log = {"timestamp": {"sec": sec, "nsec": nsec}, "level": LOG_WARNING, "line": 0}
@@ -387,50 +335,84 @@ def _states(
         ros.types[kind]
         for kind in (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
     )
-    columns = {name: parts.get(name) for name in ("position", "velocity", "effort")}
-    zero, none = start_stamp(content), np.zeros(0)
+    none = np.zeros((len(content.time), 0))
+    columns = {name: parts.get(name, none) for name in ("position", "velocity", "effort")}
+    zero = start_stamp(content)
     for sample, at in enumerate(content.time.tolist()):
         stamp = _stamp(zero, at)
         sec, nanosec = divmod(stamp, NANOSECONDS)
-        message = state(
-            header=header(stamp=time(sec=sec, nanosec=nanosec), frame_id=""),
-            name=list(names),
-            **{name: none if rows is None else rows[sample] for name, rows in columns.items()},
-        )
+        head = header(stamp=time(sec=sec, nanosec=nanosec), frame_id="")
+        rows = {name: each[sample] for name, each in columns.items()}
+        message = state(header=head, name=list(names), **rows)
         yield stamp, topic, ros.serialize_cdr(message, JOINT_STATE)
 
+
+# --- layouts
 
 LEVEL_TITLE = "level above 10 Hz [dB re 1 rad/s]"
 LISTED = 12
 """A legend with more lines would cover the plot."""
 
 
+class Line(NamedTuple):
+    """A line of a plot: its message path in Foxglove, its curve in PlotJuggler."""
+
+    path: str
+    curve: str
+    label: str
+    color: str
+
+
+class Plot(NamedTuple):
+    """A plot over time, and its share of the height."""
+
+    title: str
+    share: float
+    lines: list[Line]
+
+
+def _plots(content: Content) -> dict[str, Plot]:
+    """The plots of both layouts, from top to bottom."""
+
+    def line(topic: str, field: str, label: str, color: colors.Color) -> Line:
+        return Line(f"{topic}.{field}", f"{topic}/{field}", label, _hex(color))
+
+    noise = line("/noise", "simplified", "noise, simplified [rad/s]", colors.NOISE)
+    level = line("/level", "level", LEVEL_TITLE, colors.NOISE)
+    plots = {"noise": Plot("Noise", 2.0, [noise]), "level": Plot(LEVEL_TITLE, 1.5, [level])}
+    if content.analysis.labels is not None:
+        name = "probability of a failure"
+        lines = [line("/labels", "failure", name, colors.CLASSES["impact"])]
+        if content.analysis.alarm is not None:
+            lines.append(line("/labels", "alarm", "alarm threshold", colors.THRESHOLD))
+        plots["failure"] = Plot(name.capitalize(), 1.5, lines)
+    for topic, (names, parts) in joint_signals(content).items():
+        if "velocity" in parts:
+            what = "measured" if topic == MEASURED else "desired"
+            lines = [
+                Line(f"{topic}.velocity[{place}]", f"{topic}/{name}/velocity", name, _hex(color))
+                for place, (name, color) in enumerate(
+                    zip(names, colors.of_series(len(names)), strict=True)
+                )
+            ]
+            plots[f"velocities, {what}"] = Plot(f"Velocities, {what} [rad/s]", 2.0, lines)
+    return plots
+
+
 def foxglove(content: Content) -> str:
     """A layout of Foxglove, to be imported there, as JSON."""
-    over_time: dict[str, tuple[dict[str, Any], float]] = {}
+    panels: dict[str, dict[str, Any]] = {}
+    shares: list[tuple[str, float]] = []
     if content.analysis.labels is not None:
         state = {"value": "/class.label", "label": "class", "timestampMethod": "receiveTime"}
-        over_time["StateTransitions!class"] = ({"paths": [state], "isSynced": True}, 1.0)
-    noise = {"/noise.simplified": ("noise, simplified [rad/s]", colors.NOISE)}
-    over_time["Plot!noise"] = (_foxglove_plot("Noise", noise), 2.0)
-    level = {"/level.level": (LEVEL_TITLE, colors.NOISE)}
-    over_time["Plot!level"] = (_foxglove_plot(LEVEL_TITLE, level), 1.5)
-    if content.analysis.labels is not None:
-        failure = {"/labels.failure": ("probability of a failure", colors.CLASSES["impact"])}
-        if content.analysis.alarm is not None:
-            failure["/labels.alarm"] = ("alarm threshold", colors.THRESHOLD)
-        plot = _foxglove_plot("Probability of a failure", failure)
-        over_time["Plot!failure"] = (plot | {"minYValue": 0, "maxYValue": 1}, 1.5)
-    for topic, title, names in _velocities(content):
-        lines = {
-            f"{topic}.velocity[{place}]": (name, color)
-            for place, (name, color) in enumerate(
-                zip(names, colors.of_series(len(names)), strict=True)
-            )
-        }
-        over_time[f"Plot!{title}"] = (_foxglove_plot(f"Velocities, {title} [rad/s]", lines), 2.0)
-    panels = {name: config for name, (config, _) in over_time.items()}
-    layout: Any = _stacked([(name, share) for name, (_, share) in over_time.items()])
+        panels["StateTransitions!class"] = {"paths": [state], "isSynced": True}
+        shares.append(("StateTransitions!class", 1.0))
+    for name, plot in _plots(content).items():
+        panels[f"Plot!{name}"] = _foxglove_plot(plot)
+        shares.append((f"Plot!{name}", plot.share))
+    if "Plot!failure" in panels:
+        panels["Plot!failure"] |= {"minYValue": 0, "maxYValue": 1}
+    layout: Any = _stacked(shares)
     if content.analysis.findings:
         panels["RosOut!findings"] = {"topicToRender": "/log", "minLogLevel": 1}
         parts = {"first": "RosOut!findings", "second": layout, "splitPercentage": 25}
@@ -447,65 +429,36 @@ def foxglove(content: Content) -> str:
 
 def plotjuggler(content: Content) -> str:
     """A layout of PlotJuggler, to be loaded there after the MCAP, as XML."""
-    plots = {
-        "noise": {"/noise/simplified": colors.NOISE},
-        "level": {"/level/level": colors.NOISE},
-    }
-    if content.analysis.labels is not None:
-        plots["failure"] = {"/labels/failure": colors.CLASSES["impact"]}
-        if content.analysis.alarm is not None:
-            plots["failure"]["/labels/alarm"] = colors.THRESHOLD
-    for topic, title, names in _velocities(content):
-        hues = colors.of_series(len(names))
-        curves = (f"{topic}/{name}/velocity" for name in names)
-        plots[f"velocities, {title}"] = dict(zip(curves, hues, strict=True))
-    element = ElementTree.SubElement
+    plots, element = _plots(content), ElementTree.SubElement
     root = ElementTree.Element("root")
     window = element(root, "tabbed_widget", {"parent": "main_window", "name": "Main Window"})
     tab = element(window, "Tab", containers="1", tab_name="noise-inspector")
     splitter = element(element(tab, "Container"), "DockSplitter", orientation="-")
     splitter.set("count", str(len(plots)))
     splitter.set("sizes", ";".join([f"{1 / len(plots):.6f}"] * len(plots)))
-    for name, curves_of in plots.items():
+    for name, each in plots.items():
         area = element(splitter, "DockArea", name=name)
         plot = element(area, "plot", mode="TimeSeries", style="Lines", flip_x="false")
         plot.set("flip_y", "false")
-        for curve, color in curves_of.items():
-            element(plot, "curve", name=curve, color=_hex(color))
+        for line in each.lines:
+            element(plot, "curve", name=line.curve, color=line.color)
     element(window, "currentTabIndex", index="0")
     element(root, "use_relative_time_offset", enabled="1")
     ElementTree.indent(root, " ")
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def _velocities(content: Content) -> list[tuple[str, str, tuple[str, ...]]]:
-    """Topics with velocities, what they are, and their joints."""
-    joints = joint_signals(content)
-    return [
-        (topic, title, joints[topic][0])
-        for topic, title in ((MEASURED, "measured"), (DESIRED, "desired"))
-        if topic in joints and "velocity" in joints[topic][1]
-    ]
-
-
-def _foxglove_plot(title: str, lines: dict[str, tuple[str, colors.Color]]) -> dict[str, Any]:
-    paths = [
-        {
-            "value": value,
-            "label": label,
-            "color": _hex(color),
-            "enabled": True,
-            "showLine": True,
-            "timestampMethod": "receiveTime",
-        }
-        for value, (label, color) in lines.items()
-    ]
+def _foxglove_plot(plot: Plot) -> dict[str, Any]:
+    shown = {"enabled": True, "showLine": True, "timestampMethod": "receiveTime"}
     return {
-        "title": title,
-        "foxglovePanelTitle": title,
-        "paths": paths,
+        "title": plot.title,
+        "foxglovePanelTitle": plot.title,
+        "paths": [
+            {"value": line.path, "label": line.label, "color": line.color, **shown}
+            for line in plot.lines
+        ],
         "isSynced": True,
-        "showLegend": 1 < len(paths) <= LISTED,
+        "showLegend": 1 < len(plot.lines) <= LISTED,
         "legendDisplay": "floating",
         "showXAxisLabels": True,
         "showYAxisLabels": True,
@@ -518,13 +471,9 @@ def _stacked(panels: list[tuple[str, float]]) -> Any:
     (first, share), *rest = panels
     if not rest:
         return first
-    percent = 100 * share / sum(each for _, each in panels)
-    return {
-        "direction": "column",
-        "first": first,
-        "second": _stacked(rest),
-        "splitPercentage": round(percent, 1),
-    }
+    percent = round(100 * share / sum(each for _, each in panels), 1)
+    parts = {"first": first, "second": _stacked(rest), "splitPercentage": percent}
+    return {"direction": "column", **parts}
 
 
 def _hex(color: colors.Color) -> str:
@@ -559,7 +508,6 @@ def export(
     Args:
         path: The file to write, ``.mcap``, ``.csv`` or ``.parquet``.
         kind: Kind of the extended noise, see ``noisemodel.extended``.
-        overwrite: Whether a file that exists may be replaced.
         layouts: Whether to write layouts for Foxglove and PlotJuggler beside it, see `LAYOUTS`.
     """
     write = WRITERS.get(path.suffix.lower())
