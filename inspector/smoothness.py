@@ -1,15 +1,12 @@
-"""How smooth the motion of episodes is: measures, scores, ranking, table and histograms.
+"""How smooth the motion of episodes is: measures, scores, ranking and table.
 
-Conventions: `sparc` and `log_dimensionless_jerk` are dimensionless, at most 0, and higher the
-smoother, as their authors have them; all others are 0 for the smoothest motion, and higher the
-rougher. A measure that a signal does not define (it is too short, stands still, or its rate is too
-low) is None.
+`sparc` and `log_dimensionless_jerk` are dimensionless, at most 0, and higher the smoother, as their
+authors have them; all others are 0 for the smoothest motion, and higher the rougher. A measure that
+a signal does not define (it is too short, stands still, or its rate is too low) is None.
 
 Sources:
     Hogan and Sternad, "Sensitivity of smoothness measures to movement duration, amplitude, and
     arrests", Journal of Motor Behavior 41, 2009.
-    Balasubramanian, Melendez-Calderon and Burdet, "A robust and sensitive metric for quantifying
-    movement smoothness", IEEE Transactions on Biomedical Engineering 59, 2012.
     Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet, "On the analysis of movement
     smoothness", Journal of NeuroEngineering and Rehabilitation 12, 2015.
 """
@@ -21,26 +18,20 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inspector.analysis import analyse
 from inspector.audit.signals import without_placeholder
-from inspector.errors import InspectorError, Status, without_path
+from inspector.errors import Status, without_path
 from inspector.library import Library
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.read import Reading, Source, open_source, sources
-from inspector.report.picture import require
-from inspector.text import cell, counted
+from inspector.text import cell, counted, progress
 from inspector.verdict import EXPECTED
 from noisemodel import Run
-from noisemodel.files import replacing
 from noisemodel.run import stretches
 from noisemodel.types import Array, Real
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 FORMAT = "noise-smoothness/1"
 FAST, TRACKED = 10.0, 4.0
@@ -58,18 +49,11 @@ periods of its frequency, the least ratio of the Nyquist frequency to its freque
 
 
 def level_above(signal: Real, rate: float, frequency: float) -> float | None:
-    """Root mean square of a signal above a frequency, summed over joints.
+    """Root mean square of a signal above a frequency in [Hz], the squares summed over joints.
 
     Of velocities above 10 Hz it is our own measure, the noise of the joints where motion is over.
-    The high-pass has the gain 1/2 at its frequency.
-
-    Args:
-        rate: Sample rate, in [Hz].
-        frequency: Lowest frequency, in [Hz].
-
-    Returns:
-        Root of the sum over joints of mean squares, in the unit of the signal; None if the rate is
-        below 2.4 times the frequency, or the signal shorter than three of its periods.
+    The high-pass has the gain 1/2 at its frequency. None if the rate is below 2.4 times the
+    frequency, or the signal shorter than three of its periods.
     """
     padding = round(PERIODS * rate / frequency)
     if rate < 2 * BAND * frequency or len(signal) <= padding:
@@ -88,15 +72,11 @@ def sparc(speed: Real, rate: float, *, cutoff: float = CUTOFF) -> float | None:
     last frequency below the cut-off at which it is 5 % of its largest value. Frequencies are
     divided by that last one, amplitudes by the largest one, so that neither the amplitude nor the
     duration of the motion counts. It is blind above the cut-off, and made for movements of a few
-    seconds: a longer episode has a more negative one, however smooth it is.
+    seconds: a longer episode has a more negative one, however smooth it is. None if there are
+    fewer than two samples, or no motion.
 
     Args:
-        speed: Not negative, shape (samples,), in any unit: the norm of a velocity.
-        rate: Sample rate, in [Hz].
-        cutoff: Highest frequency, in [Hz].
-
-    Returns:
-        The negative arc length; None if there are fewer than two samples, or no motion.
+        speed: Norm of a velocity, shape (samples,), in any unit.
     """
     if len(speed) < 2 or not np.any(speed):
         return None
@@ -118,13 +98,8 @@ def log_dimensionless_jerk(velocity: Real, rate: float) -> float | None:
 
     -ln(T³ / v_peak² ∫ |d²v/dt²|² dt), with the norms over joints. A minimum-jerk movement from rest
     to rest has -ln(204.8) = -5.32. Jerk grows with the third power of frequency: noise counts as
-    far up as the rate goes, so only logs of one rate and one kind of sensor can be compared.
-
-    Args:
-        rate: Sample rate, in [Hz].
-
-    Returns:
-        The negative logarithm; None if there are fewer than three samples, no motion, or no jerk.
+    far up as the rate goes, so only logs of one rate and one kind of sensor can be compared. None
+    if there are fewer than three samples, no motion, or no jerk.
     """
     if len(velocity) < 3:
         return None
@@ -141,10 +116,8 @@ def squared_difference(action: Real, *, order: int = 1) -> float | None:
     """Mean square of the differences of successive actions, summed over joints.
 
     The first difference is the "action rate" that policies are penalised by in reinforcement
-    learning; the second one passes constant rates. Both are per action, not per second.
-
-    Returns:
-        In the square of the unit; None if there are no more than ``order`` actions.
+    learning; the second one passes constant rates. Both are per action, not per second. None if
+    there are no more than ``order`` actions.
     """
     if len(action) <= order:
         return None
@@ -162,21 +135,13 @@ def speed_of(velocity: Real) -> Array:
 
 @dataclass(frozen=True)
 class Score:
-    """A column of the table.
+    """A column of the table."""
 
-    Attributes:
-        name: Its name in CSV, JSON and ``--by``.
-        title: Head of its column.
-        unit: Empty without one.
-        meaning: What it is, in a few words.
-        smooth: 1 if higher is smoother, -1 if higher is rougher.
-    """
-
-    name: str
-    title: str
+    name: str  # in CSV, JSON and ``--by``
+    title: str  # head of its column
     unit: str
-    meaning: str
-    smooth: int = -1
+    meaning: str  # what it is, in a few words
+    smooth: int = -1  # 1 if higher is smoother, -1 if higher is rougher
 
 
 _SCORES = (
@@ -196,30 +161,17 @@ ORDERS = ("action_curvature", "level", "ldlj", "tracking", "action_rate", "sparc
 
 @dataclass(frozen=True)
 class Episode:
-    """An episode and its scores.
+    """An episode and its scores."""
 
-    Attributes:
-        log: Path of its log.
-        episode: Its name within a data set, empty in a log of its own.
-        source: The argument of the command that it came from.
-        duration: Of what was scored, in [s].
-        rate: Of what was scored, in [Hz].
-        scores: By name, in the order of ``SCORES``; None where there is none.
-        reasons: Why a score is missing, by its name.
-        quantities: What the scores of actions and of tracking are of, positions or velocities, by
-            their names.
-        remarks: What was decided, a sentence each.
-    """
-
-    log: str
-    episode: str
-    source: str
-    duration: float
-    rate: float
-    scores: Mapping[str, float | None]
-    reasons: Mapping[str, str] = field(default_factory=dict)
+    log: str  # path of its log
+    episode: str  # its name within a data set, empty in a log of its own
+    duration: float  # of what was scored, in [s]
+    rate: float  # of what was scored, in [Hz]
+    scores: Mapping[str, float | None]  # in the order of ``SCORES``
+    reasons: Mapping[str, str] = field(default_factory=dict)  # why a score is missing
+    # What the scores of actions and of tracking are of, positions or velocities.
     quantities: Mapping[str, str] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what was decided, a sentence each
 
     @property
     def name(self) -> str:
@@ -227,9 +179,7 @@ class Episode:
         return f"{self.log} episode {self.episode}" if self.episode else self.log
 
 
-def scored(
-    run: Run, log: str, *, episode: str = "", source: str = "", library: Library | None = None
-) -> Episode:
+def scored(run: Run, log: str, *, episode: str = "", library: Library | None = None) -> Episode:
     """Scores of a run; one that it does not define is None, with the reason.
 
     The longest stretch without a gap is scored, of a log with held values at the rate of its
@@ -237,8 +187,6 @@ def scored(
     differences of the positions: the smoothing would take the chatter away.
 
     Args:
-        episode: Its name within a data set, empty in a log of its own.
-        source: The argument of the command that it came from.
         library: Models to choose from; None for no labels.
     """
     flagged = (None, "not classified (--no-labels)") if library is None else _flagged(run, library)
@@ -281,9 +229,7 @@ def scored(
         found["tracking"] = level_above(error, rate, TRACKED), reason
     scores = {name: found[name][0] for name in SCORES}
     missing = {name: found[name][1] for name, score in scores.items() if score is None}
-    return Episode(
-        log, episode, source, duration, rate, scores, missing, quantities, tuple(remarks)
-    )
+    return Episode(log, episode, duration, rate, scores, missing, quantities, tuple(remarks))
 
 
 def _length(part: slice) -> int:
@@ -358,31 +304,27 @@ class Failed:
     problem: str
 
 
-def episodes_of(
-    paths: Sequence[Path], reading: Reading
-) -> tuple[list[tuple[Source, Path]], list[Failed]]:
-    """List the episodes of logs and folders, each with its path as named; and what is no log."""
-    found, failed = list[tuple[Source, Path]](), list[Failed]()
+def scored_episodes(
+    paths: Sequence[Path], reading: Reading, library: Library | None
+) -> list[Episode | Failed]:
+    """Read and score the episodes of logs and folders; one that cannot be read stops no other."""
+    found, failed = list[Source](), list[Episode | Failed]()
     for path in paths:
         try:
-            found += [(each, path) for each in sources([path], reading)[0]]
+            found += sources([path], reading)[0]
         except EXPECTED as error:
             failed.append(Failed(str(path), without_path(error, path)))
-    return found, failed
 
-
-def scored_episodes(
-    episodes: Iterable[tuple[Source, Path]], reading: Reading, library: Library | None
-) -> Iterator[Episode | Failed]:
-    """Read and score episodes; one that cannot be read never stops the rest."""
-    for each, path in episodes:
+    def score(each: Source) -> Episode | Failed:
         log, name = str(each.path), each.episode
         try:
             run = open_source(each, reading).run
-            yield scored(run, log, episode=name, source=str(path), library=library)
+            return scored(run, log, episode=name, library=library)
         except EXPECTED as error:
             shown = f"{log} episode {name}" if name else log
-            yield Failed(shown, without_path(error, each.path))
+            return Failed(shown, without_path(error, each.path))
+
+    return [*progress(map(score, found), "score", total=len(found)), *failed]
 
 
 # --- ranking
@@ -390,17 +332,11 @@ def scored_episodes(
 
 @dataclass(frozen=True)
 class Ranking:
-    """Episodes in order.
+    """Episodes in order."""
 
-    Attributes:
-        by: The score that they are ordered by.
-        episodes: The smoothest first; those without this score last.
-        failed: What could not be read.
-    """
-
-    by: str
-    episodes: tuple[Episode, ...]
-    failed: tuple[Failed, ...] = ()
+    by: str  # the score that they are ordered by
+    episodes: tuple[Episode, ...]  # the smoothest first; those without this score last
+    failed: tuple[Failed, ...] = ()  # what could not be read
 
     @property
     def ranks(self) -> tuple[int | None, ...]:
@@ -431,11 +367,7 @@ def default_order(episodes: Sequence[Episode]) -> str:
 
 
 def ranked(found: Iterable[Episode | Failed], *, by: str = "") -> Ranking:
-    """Order episodes from the smoothest to the roughest.
-
-    Args:
-        by: One of ``SCORES``; by default as `default_order` has it.
-    """
+    """Order episodes from the smoothest to the roughest, by default as `default_order` has it."""
     each = tuple(found)
     episodes = [one for one in each if isinstance(one, Episode)]
     by = by or default_order(episodes)
@@ -574,14 +506,11 @@ def _roughest(ranking: Ranking) -> Iterator[str]:
     if len(ordered) < 2:
         return
     title, last = SCORES[ranking.by].title, ordered[-1]
-    worst = [each for each in ordered if each.scores[ranking.by] == last.scores[ranking.by]]
-    if len(worst) == len(ordered):
+    if ordered[0].scores[ranking.by] == last.scores[ranking.by]:
         yield f"All are equal by {title}: `--by` orders them by another score."
         return
     command = f"inspector import {last.log} --episode {last.episode} -o roughest.npz"
-    equal = f" ({len(worst)} are equal)" if len(worst) > 1 else ""
-    command = command if last.episode else f"inspector view {last.log}"
-    yield f"The roughest by {title}{equal}: {command}"
+    yield f"The roughest by {title}: {command if last.episode else f'inspector view {last.log}'}"
 
 
 def _short(names: Sequence[str]) -> list[str]:
@@ -599,66 +528,3 @@ def _cell(name: str, value: float | None) -> str:
     if name == "flagged":
         return f"{100 * value:.0f} %"
     return f"{value:.2f}" if name in ("sparc", "ldlj") else f"{value:.3g}"
-
-
-# --- histograms
-
-COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-PER_ROW, BINS, DPI = 3, 20, 100
-WIDTH, HEIGHT = 3.6, 2.4
-"""Of one histogram, in [inch]."""
-SPREAD = 20.0
-"""Ratio of the largest to the median of positive values beyond which the axis is logarithmic."""
-
-
-def draw(episodes: Sequence[Episode], path: Path, *, overwrite: bool = False) -> None:
-    """Draw a histogram of each score that an episode has as a PNG file, a colour for each input."""
-    require()
-    from matplotlib.figure import Figure
-
-    shown = [
-        score
-        for score in SCORES.values()
-        if any(episode.scores[score.name] is not None for episode in episodes)
-    ]
-    if not shown:
-        raise InspectorError(f"{path}: there are no scores to draw")
-    rows = -(-len(shown) // PER_ROW)
-    figure = Figure(figsize=(PER_ROW * WIDTH, rows * HEIGHT + 0.4), dpi=DPI, layout="constrained")
-    axes = figure.subplots(rows, PER_ROW, squeeze=False).ravel()
-    for one, score in zip(axes, shown, strict=False):
-        _histogram(one, episodes, score)
-    for one in axes[len(shown) :]:
-        one.set_axis_off()
-    handles, labels = axes[0].get_legend_handles_labels()
-    if len(labels) > 1:
-        figure.legend(handles, labels, loc="outside upper left", ncols=PER_ROW, frameon=False)
-    with replacing(path, overwrite=overwrite) as temporary:
-        figure.savefig(temporary, format="png")
-
-
-def _histogram(axes: "Axes", episodes: Sequence[Episode], score: Score) -> None:
-    sources = sorted({episode.source for episode in episodes})
-    together = len(sources) > len(COLORS)
-    groups: dict[str, list[float]] = {source: [] for source in ([""] if together else sources)}
-    for episode in episodes:
-        value = episode.scores[score.name]
-        if value is not None:
-            groups["" if together else episode.source].append(value)
-    values = np.concatenate([np.array(group) for group in groups.values()])
-    low, high = float(values.min()), float(values.max())
-    logarithmic = low > 0 and high > max(low, SPREAD * float(np.median(values)))
-    if low == high:
-        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
-    edges = np.geomspace(low, high, BINS + 1) if logarithmic else np.linspace(low, high, BINS + 1)
-    for (name, group), color in zip(groups.items(), COLORS, strict=False):
-        axes.hist(group, edges.tolist(), color=color, alpha=0.6, label=name)
-    if logarithmic:
-        axes.set_xscale("log")
-    better = "right" if score.smooth > 0 else "left"
-    unit = f" [{score.unit}]" if score.unit else ""
-    axes.set_title(score.meaning, fontsize=8)
-    axes.set_xlabel(f"{score.title}{unit}; smoother to the {better}", fontsize=8)
-    axes.set_ylabel("episodes", fontsize=8)
-    axes.locator_params(axis="y", integer=True)
-    axes.tick_params(labelsize=7)

@@ -40,7 +40,6 @@ FILES = {
     "labels": ("export", "run.npz", "--labels", "annotated", "-o", "out/labels.txt"),
     "classify": ("classify", "good", "--write", "json=out/verdicts.json"),
     "resume": ("classify", "good", "--resume", "out/state.jsonl"),
-    "smoothness": ("smoothness", "good", "--picture", "out/smoothness.png"),
     "simulate": ("simulate", "run", "panda", "--duration", "3", "-o", "out/simulated.npz"),
     "live": ("live", "--rate", "1000", "--save", "out/live.rrd"),
 }

@@ -378,14 +378,3 @@ def test_a_run_at_a_higher_rate_has_a_share_of_time_flagged():
     (episode,) = json.loads(out)["episodes"]
     assert 0.0 < episode["flagged"] < 1.0
     assert episode["missing"] == {}
-
-
-def test_the_picture_has_a_histogram_of_each_score(folder, tmp_path):
-    pytest.importorskip("matplotlib")
-    picture = tmp_path / "out.png"
-    status, _, err = call("smoothness", folder, "--picture", picture, "--no-labels")
-    assert (status, err) == (0, f"{picture}\n")
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    status, _, err = call("smoothness", folder, "--picture", picture)
-    assert status == 3
-    assert "choose another name" in err

@@ -1,5 +1,4 @@
 import io
-import struct
 import subprocess
 import sys
 import wave
@@ -103,7 +102,6 @@ def test_standstill_is_silent_and_reported_so():
 def test_the_chosen_gain_does_not_clip_and_uses_the_full_scale():
     sound = sonify(run_of(0.01 * tone(440)))
     gain = common_gain([sound])
-    assert sound.clipped(gain) == 0.0
     assert "clipped" not in sound.description(gain)
     assert 0.85 < np.abs(read(sound.file(gain))[0]).max() < 0.9  # 1 dB of headroom
 
@@ -111,14 +109,7 @@ def test_the_chosen_gain_does_not_clip_and_uses_the_full_scale():
 def test_clipping_is_reported():
     sound = sonify(run_of(0.01 * tone(440)))
     assert np.abs(read(sound.file(46.0))[0]).max() == 1.0
-    assert "% of it exceeds full scale, by 6.1 dB at most" in sound.description(46.0)
-
-
-def test_a_sound_file_states_its_contents_and_gain():
-    data = sonify(run_of(0.01 * tone(440))).file(20.0)
-    assert struct.unpack("<I", data[4:8])[0] == len(data) - 8
-    assert b"simplified noise, gain +20.0 dB: full scale is 0.1 rad/s" in data
-    assert b"ISFT" in data
+    assert sound.description(46.0).endswith("; clipped: it exceeds full scale by 6.1 dB")
 
 
 def test_gaps_are_silent_without_ringing():
@@ -151,7 +142,7 @@ def test_playing_faster_makes_low_frequencies_audible():
     data = sound.file(-6.0)
     assert len(read(data)[0]) / 48_000 == pytest.approx(0.4, abs=0.01)
     assert pitch(data)[0] == pytest.approx(120, abs=3)
-    assert b"played 10 times as fast" in data
+    assert "Played 10 times as fast: frequencies are 10 times as high." in sound.remarks
 
 
 def test_a_log_at_a_low_rate_has_a_remark_on_its_bandwidth():
@@ -204,9 +195,9 @@ def test_the_power_of_a_links_sound_is_that_of_the_extended_noise(arm, kind):
         (Settings(kind="paper"), "'paper' has no signed signals to play; there are simplified"),
         (Settings(joint="knee"), "no joint 'knee' in the run; it has joint1, joint2"),
         (Settings(link="knee"), "no link 'knee' that makes noise; there are link1, link2"),
-        (Settings(kind="normal", joint="joint1"), "of links, not of joints"),
-        (Settings(link="link1", joint="joint1"), "name no joint with it"),
-        (Settings(kind="simplified", link="link1"), "of the kinds normal and rms"),
+        (Settings(kind="normal", joint="joint1"), "kind 'normal': name a joint of simplified"),
+        (Settings(link="link1", joint="joint1"), "or a link of kinds normal and rms"),
+        (Settings(kind="simplified", link="link1"), "kind 'simplified': name a joint"),
         (Settings(speed=0.0), "a speed of 0, expected 0.01 to 1000"),
     ],
 )
@@ -248,20 +239,11 @@ def test_the_command_writes_runs_at_one_gain(tmp_path):
 
 def test_the_command_refuses_wrong_settings_in_one_line(tmp_path):
     run_of(tone(440)).save(tmp_path / "run.npz")
-    for wrong, code in (
-        (["--joint", "knee"], 3),
-        (["--kind", "A"], 2),
-        (["--kind", "A", "--link", "hand"], 2),
-        (["--kind", "simplified", "--link", "hand"], 2),
-        (["--kind", "normal", "--joint", "knee"], 2),
-        (["--link", "hand"], 3),
-        (["--speed", "0"], 2),
-    ):
-        status, out, err = inspector(
-            "listen", tmp_path / "run.npz", "-o", tmp_path / "o.wav", *wrong
-        )
+    output = tmp_path / "o.wav"
+    for wrong, code in ((["--joint", "knee"], 3), (["--kind", "A"], 2), (["--link", "hand"], 3)):
+        status, out, err = inspector("listen", tmp_path / "run.npz", "-o", output, *wrong)
         assert (status, out, err.count("\n")) == (code, "", 1)
-    assert not (tmp_path / "o.wav").exists()
+    assert not output.exists()
 
 
 def test_a_clip_has_the_whole_run_or_the_part_around_its_worst_moment(monkeypatch):

@@ -37,7 +37,6 @@ TABLE = [
     ("classify", RUN, "--resume {}", OF_RUN),
     ("diff", FOLDERS, "--write json={}", OF_FOLDERS),
     ("merge", ("result.json",), "--write json={}", ("result.json",)),
-    ("smoothness", ("good",), "--picture {}.png", ("good/0.npz",)),
     ("import", LOG, "-o {}.npz", OF_LOG),
     ("import", (*LOG, "-o", "new.npz"), "--save-mapping {}", OF_LOG),
     ("export", RUN, "-o {}.csv", OF_RUN),
@@ -46,10 +45,9 @@ TABLE = [
     ("tune", ("good", "--validation", "run.npz"), "-o {}", ("run.npz",)),
     ("tune", ("good", "--validation", "run.npz", "-o", "new"), "--train {}.npz", ("run.npz",)),
     ("evaluate", ("model.npz", "run.npz"), "-o {}.json", ("run.npz", "model.npz")),
-    ("evaluate", ("model.npz", "run.npz"), "--picture {}.png", ("run.npz", "model.npz")),
 ]
 """Commands, what they read, an output, and the files that it must not replace."""
-WITHOUT = {"robots", "audit", "simulate", "help", "accept"}
+WITHOUT = {"robots", "audit", "simulate", "smoothness", "help", "accept"}
 """Commands that write nothing, or read nothing, or are tested elsewhere."""
 STATES = ("--resume {}", "-o {}")
 """Outputs that a command goes on with, where they are its own."""

@@ -394,14 +394,10 @@ def smoothness(
         option("The score to order by; by default level, action_curvature for data sets."),
     ] = None,
     format: Annotated[Literal["text", "csv", "json"], option("Output format.")] = "text",  # noqa: A002
-    picture: Annotated[
-        Path | None, option("Write histograms of the scores as PNG (needs the extra `report`).")
-    ] = None,
     labels: Annotated[
         bool, option("Classify episodes from 80 Hz on.", "--labels/--no-labels")
     ] = True,
     model: ModelFiles = None,
-    overwrite: Overwrite = False,
 ) -> None:
     """Rank episodes of policies and demonstrations by smoothness.
 
@@ -409,19 +405,10 @@ def smoothness(
     """
     from inspector import smoothness as ranking
 
-    if picture:
-        refuse_existing(picture, overwrite=overwrite)
-        require()
     library = load_library(model) if labels else None
-    episodes, failed = ranking.episodes_of(logs, ctx.obj)
-    scored = ranking.scored_episodes(episodes, ctx.obj, library)
-    found = progress(scored, "score", total=len(episodes))
-    order = ranking.ranked([*found, *failed], by=by or "")
+    order = ranking.ranked(ranking.scored_episodes(logs, ctx.obj, library), by=by or "")
     write = {"text": ranking.as_text, "csv": ranking.as_csv, "json": ranking.as_json}
     typer.echo(write[format](order))
-    if picture and order.episodes:
-        ranking.draw(order.episodes, picture, overwrite=overwrite)
-        typer.echo(f"{picture}", err=True)
     for each in order.failed:
         typer.echo(f"inspector: {each.name}: {each.problem}", err=True)
     raise typer.Exit(3 if order.failed else 0)

@@ -15,10 +15,11 @@ powers of the signals are added in every window and frequency bin, with the phas
 signal there. A single signal is not changed.
 """
 
-import struct
+import io
+import wave
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from string import ascii_lowercase
 
@@ -63,44 +64,26 @@ MOST_VELOCITIES = 4_000_000
 
 @dataclass(frozen=True)
 class Settings:
-    """What is made audible.
+    """What is made audible."""
 
-    Attributes:
-        kind: "simplified", "normal" or "rms"; empty takes "normal" with a link, else "simplified".
-        joint: One joint, of the simplified noise; all if empty.
-        link: One link, of the extended noise; all if empty.
-        speed: Factor of the playing speed, and of all frequencies.
-    """
-
-    kind: str = ""
-    joint: str = ""
-    link: str = ""
-    speed: float = 1.0
+    kind: str = ""  # of `PLAYABLE`; empty takes "normal" with a link, else "simplified"
+    joint: str = ""  # one joint, of the simplified noise; all if empty
+    link: str = ""  # one link, of the extended noise; all if empty
+    speed: float = 1.0  # factor of the playing speed, and of all frequencies
 
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """A signed noise signal that can be played.
-
-    Attributes:
-        what: Short description.
-        signal: Shape (samples,), in [unit].
-        rate: Sampling rate of the signal, in [Hz].
-        start: Time of its first sample in the run, in [s].
-        speed: Factor of the playing speed.
-        unit: "rad/s" or "√W".
-        remarks: What is inaudible and why, a sentence each.
-        playing: Sampling rate of the file, in [Hz].
-    """
+    """A signed noise signal that can be played."""
 
     what: str
-    signal: Array
-    rate: float
-    start: float
-    speed: float
-    unit: str
-    remarks: tuple[str, ...] = ()
-    playing: int = RATE
+    signal: Array  # shape (samples,), in [unit]
+    rate: float  # of the signal, in [Hz]
+    start: float  # of its first sample in the run, in [s]
+    speed: float  # factor of the playing speed
+    unit: str  # "rad/s" or "√W"
+    remarks: tuple[str, ...] = ()  # what is inaudible and why, a sentence each
+    playing: int = RATE  # sampling rate of the file, in [Hz]
 
     @cached_property
     def played(self) -> Array:
@@ -121,39 +104,33 @@ class Sound:
         """Whether its peak is below ``SILENCE``."""
         return self.peak < SILENCE
 
-    def clipped(self, gain: float) -> float:
-        """Share of the samples that exceed full scale at a gain in [dB]."""
-        return float(np.mean(np.abs(self.played) * _factor(gain) > 1.0))
-
-    def scale(self, gain: float) -> str:
-        """A gain in [dB] as text, with the value of full scale."""
-        return f"gain {gain:+.1f} dB: full scale is {1.0 / _factor(gain):.3g} {self.unit}"
-
     def description(self, gain: float) -> str:
-        """Duration and gain of the sound, and whether it is silent or clipped."""
-        text = f"{len(self.signal) / self.rate / self.speed:.2f} s, {self.scale(gain)}"
+        """Duration and gain in [dB] of the sound, and whether it is silent or clipped."""
+        factor, seconds = _factor(gain), len(self.signal) / self.rate / self.speed
+        scale = f"gain {gain:+.1f} dB: full scale is {1.0 / factor:.3g} {self.unit}"
+        over = 20.0 * np.log10(max(self.peak * factor, SILENCE))
+        state = f"; clipped: it exceeds full scale by {over:.1f} dB" if over > 0.0 else ""
         if self.silent:
-            return f"{text}; silent: nothing reaches {SILENCE:g} {self.unit}"
-        if clipped := self.clipped(gain):
-            over = 20.0 * np.log10(self.peak) + gain
-            return (
-                f"{text}; clipped: {clipped:.2%} of it exceeds full scale, by {over:.1f} dB at most"
-            )
-        return text
+            state = f"; silent: nothing reaches {SILENCE:g} {self.unit}"
+        return f"{seconds:.2f} s, {scale}{state}"
 
     def file(self, gain: float, *, lead: float = 0.0) -> bytes:
-        """WAV file whose metadata state the gain.
+        """WAV file of one channel of 16 bits, clipped above full scale.
 
         Args:
             gain: At 0 dB, full scale is 1 of the unit, in [dB].
             lead: Duration of silence before it, in [s].
         """
-        comment = f"{self.what}, {self.scale(gain)}"
-        if self.speed != 1.0:
-            comment += f", played {self.speed:g} times as fast"
-        notes = {"INAM": self.what, "ISFT": "noise-inspector", "ICMT": comment}
+        scaled = np.clip(self.played * _factor(gain), -1.0, 1.0) * FULL_SCALE
         silence = np.zeros(round(lead * self.playing))
-        return _wav(np.concatenate((silence, self.played * _factor(gain))), self.playing, notes)
+        samples = np.round(np.concatenate((silence, scaled))).astype("<i2")
+        stream = io.BytesIO()
+        with wave.open(stream, "wb") as file:
+            file.setnchannels(1)
+            file.setsampwidth(2)
+            file.setframerate(self.playing)
+            file.writeframes(samples.tobytes())
+        return stream.getvalue()
 
     def __str__(self) -> str:
         rms = float(np.sqrt(np.mean(np.square(self.signal))))
@@ -164,19 +141,12 @@ class Sound:
 
 @dataclass(frozen=True)
 class Clip:
-    """A sound of 16 kHz to be embedded in a recording or a page.
+    """A sound of 16 kHz to be embedded in a recording or a page."""
 
-    Attributes:
-        data: WAV file.
-        start: Start in the run, in [s].
-        stop: End in the run, in [s].
-        description: What it is, at which gain.
-    """
-
-    data: bytes
-    start: float
-    stop: float
-    description: str
+    data: bytes  # a WAV file
+    start: float  # start in the run, in [s]
+    stop: float  # end in the run, in [s]
+    description: str  # what it is, at which gain
 
 
 def sonify(run: nm.Run, settings: Settings | None = None) -> Sound:
@@ -266,12 +236,10 @@ def clip(run: nm.Run, *, around: float = 0.0, lead: bool = False) -> Clip | None
 def mix(
     signals: Iterable[Array], *, valid: Mask, rate: float, lowest: float = LOWEST_AUDIBLE
 ) -> Array:
-    """Audible part of several signals, mixed to one so that their powers add.
+    """Audible part of several signals, taken one by one, mixed to one so that their powers add.
 
     Args:
-        signals: Each of shape (samples,), taken one by one.
         valid: False in gaps, which are silent, shape (samples,).
-        rate: Sampling rate, in [Hz].
         lowest: Cutoff of the high-pass filter, in [Hz].
     """
     if rate <= 2.5 * lowest:
@@ -322,29 +290,19 @@ def _high_passed(signal: Array, rate: float, lowest: float) -> Array:
 
     By its spectrum rather than `scipy.signal`, which takes a fifth of a second to import.
     """
+    from scipy.fft import next_fast_len
+
     reach = min(round(3 * rate / lowest), len(signal) - 1)
     # odd reflection at both ends, without a step
     before = 2 * signal[0] - signal[reach:0:-1]
     after = 2 * signal[-1] - signal[-2 : -reach - 2 : -1]
     extended = np.concatenate((before, signal, after))
     extended -= np.linspace(extended[0], extended[-1], len(extended))
-    size = _fast_length(len(extended))
-    high_passed: Array = fft.irfft(fft.rfft(extended, size) * _gain(size, rate, lowest), size)
-    return high_passed[reach : reach + len(signal)]
-
-
-@lru_cache(maxsize=1)
-def _gain(size: int, rate: float, lowest: float) -> Array:
+    size = next_fast_len(len(extended), real=True)
     frequency = fft.rfftfreq(size, 1 / rate)
-    gain: Array = 1 / (1 + (lowest / np.maximum(frequency, lowest / 100)) ** (2 * ORDER))
-    return gain
-
-
-@lru_cache(maxsize=1)
-def _fast_length(least: int) -> int:
-    """The next length that is a product of 2, 3 and 5, for a fast transform."""
-    odd: list[int] = [3**threes * 5**fives for threes in range(20) for fives in range(14)]
-    return min(each << (-(-least // each) - 1).bit_length() for each in odd)
+    gain = 1 / (1 + (lowest / np.maximum(frequency, lowest / 100)) ** (2 * ORDER))
+    high_passed: Array = fft.irfft(fft.rfft(extended, size) * gain, size)
+    return high_passed[reach : reach + len(signal)]
 
 
 def _components(run: nm.Run, settings: Settings) -> tuple[str, str, Iterator[Array]]:
@@ -355,10 +313,10 @@ def _components(run: nm.Run, settings: Settings) -> tuple[str, str, Iterator[Arr
         raise OptionError(
             f"kind {kind!r} has no signed signals to play; there are {', '.join(PLAYABLE)}"
         )
-    if link and (joint or kind == "simplified"):
-        raise OptionError(f"link {link!r} is of the kinds normal and rms; name no joint with it")
-    if joint and kind != "simplified":
-        raise OptionError(f"kind {kind!r} is of links, not of joints; name a link")
+    if (joint and link) or (link if kind == "simplified" else joint):
+        raise OptionError(
+            f"kind {kind!r}: name a joint of simplified noise, or a link of kinds normal and rms"
+        )
     if kind == "simplified":
         what = f"simplified noise of {joint}" if joint else "simplified noise"
         return what, "rad/s", _velocities(run, joint)
@@ -428,22 +386,3 @@ def _remarks(run: nm.Run, speed: float) -> Iterator[str]:
 
 def _factor(gain: float) -> float:
     return float(10.0 ** (gain / 20.0))
-
-
-def _wav(signal: Array, rate: int, notes: Mapping[str, str]) -> bytes:
-    """One channel of 16 bits as RIFF WAVE (IBM and Microsoft, 1991).
-
-    Args:
-        signal: Shape (samples,); 1 is full scale, above which it is clipped.
-        rate: Sampling rate, in [Hz].
-        notes: Texts by their RIFF names: INAM a title, ISFT the software, ICMT a comment.
-    """
-
-    def chunk(name: bytes, content: bytes) -> bytes:
-        return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
-
-    samples = np.round(np.clip(signal, -1.0, 1.0) * FULL_SCALE).astype("<i2").tobytes()
-    form = struct.pack("<HHIIHH", 1, 1, rate, 2 * rate, 2, 16)  # PCM, one channel, 2 bytes each
-    texts = (chunk(name.encode(), text.encode() + b"\0") for name, text in notes.items())
-    info = chunk(b"LIST", b"INFO" + b"".join(texts))
-    return chunk(b"RIFF", b"WAVE" + chunk(b"fmt ", form) + info + chunk(b"data", samples))
