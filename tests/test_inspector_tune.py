@@ -83,15 +83,11 @@ def counted(monkeypatch):
 
 def test_each_point_has_a_line_after_the_header(whole):
     question, *points = lines(whole[0])
-    assert question["format"] == "noise-tuning/1"
-    assert question["grid"] == {
-        "stride": [25, 50],
-        "gamma": [0.001, 0.01],
-        "regularization": [0.1, 1.0, 10.0],
-    }
+    axes = {"stride": [25, 50], "gamma": [0.001, 0.01], "regularization": [0.1, 1.0, 10.0]}
+    assert (question["format"], question["grid"]) == ("noise-tuning/1", axes)
     assert sorted(question["training_set"]) == ["walk0", "walk1", "walk2", "walk3"]
     assert len(points) == 12
-    assert [points[1][name] for name in question["grid"]] == [25, 0.001, 1.0]
+    assert [points[1][name] for name in axes] == [25, 0.001, 1.0]
     assert all(0.0 <= point["balanced_accuracy"] <= 1.0 for point in points)
 
 
@@ -107,6 +103,10 @@ def test_the_best_points_are_printed_as_a_table(whole):
     assert first.split()[:4] == ["1", *(f"{best[name]:g}" for name in names.split()[:3])]
     assert f"{best['log_loss']:.4f}" in first
     assert "untuned        25" in out
+    ends = [line for line in out.splitlines() if line.endswith("a wider one may hold better.")]
+    at_end = {"stride": best["stride"], "gamma": best["gamma"]}
+    at_end |= {"C": best["regularization"]} if best["regularization"] != 1.0 else {}
+    assert [line.split()[1] for line in ends] == [f"{value:.6g}" for value in at_end.values()]
 
 
 def test_json_is_printed_for_programs(data, whole):
@@ -209,22 +209,16 @@ def test_a_killed_search_resumes(data, whole, tmp_path, counted):
     assert lines(output) == lines(whole[0])
 
 
-def test_without_a_validation_set_recordings_are_folded(data, tmp_path):
-    output = tmp_path / "tuned.jsonl"
-    options = (*OPTIONS, *GRID, "--folds", 2, "-o", output)
+def test_without_a_validation_set_a_part_of_the_recordings_is_folded(data, tmp_path):
+    held_out = [f"walk{n}" for n in range(4) if nc.held_out(f"walk{n}")]
+    options = (*OPTIONS, *GRID, "--folds", 2, "--part", "training", "-o", tmp_path / "a.jsonl")
     status, out, err = call("tune", data / "training", *options)
     assert (status, err) == (0, "")
     assert "frames of the same, in 2 folds" in out
-    assert lines(output)[0]["number_of_folds"] == 2
-
-
-def test_a_part_of_the_recordings_can_be_selected(data, tmp_path):
-    held_out = [f"walk{n}" for n in range(4) if nc.held_out(f"walk{n}")]
-    options = (*OPTIONS, *GRID, "--folds", 2, "--part", "training", "-o", tmp_path / "a.jsonl")
-    assert call("tune", data / "training", *options)[0] == 0
-    kept = lines(tmp_path / "a.jsonl")[0]["training_set"]
+    header = lines(tmp_path / "a.jsonl")[0]
+    assert header["number_of_folds"] == 2
     assert held_out
-    assert sorted([*kept, *held_out]) == ["walk0", "walk1", "walk2", "walk3"]
+    assert sorted([*header["training_set"], *held_out]) == ["walk0", "walk1", "walk2", "walk3"]
 
 
 def test_a_validation_set_without_a_recording_is_refused(data, tmp_path):

@@ -72,23 +72,17 @@ def test_a_run_that_is_flagged_throughout_has_all_of_its_ok_time_flagged():
     assert found.alike["class_f1"].value == pytest.approx(2 * 4 / (12 + 8))
 
 
-def test_a_robot_with_ten_times_as_many_runs_weighs_the_same():
+def test_robots_weigh_alike_however_many_runs_and_hours_they_have():
     deaf = [reporting(f"go2/blow-{seed:03d}", IMPACT, []) for seed in range(2)]
-    few, lots = measured([*perfect(2), *deaf]), measured([*perfect(20), *deaf])
+    few, lots = (measured([*perfect(seeds), *deaf]) for seeds in (2, 20))
     assert few.alike["recall_injected"].value == lots.alike["recall_injected"].value == 0.5
     assert few.pooled["recall_injected"].value < lots.pooled["recall_injected"].value
-
-
-def test_how_much_time_a_robot_has_does_not_change_its_weight():
-    def runs(hours):
+    loud = reporting("go2/good-000", GOOD, [("impact", 1.0, 1.5)])
+    for hours, pooled in ((1, 3600 / 10), (19, 3600 / 100)):
         long = blocks((0.0, 5.0 * hours, "ok"))
-        calm = [reporting("panda/good-000", long, [], seconds=5.0 * hours)]
-        return [*calm, reporting("go2/good-000", GOOD, [("impact", 1.0, 1.5)])]
-
-    one, other = measured(runs(1)), measured(runs(20))
-    assert one.alike["false_alarms_per_hour"].value == pytest.approx(3600.0 / 5.0 / 2)
-    assert other.alike["false_alarms_per_hour"].value == pytest.approx(3600.0 / 5.0 / 2)
-    assert other.pooled["false_alarms_per_hour"].value < one.pooled["false_alarms_per_hour"].value
+        found = measured([reporting("panda/good-000", long, [], seconds=5.0 * hours), loud])
+        assert found.alike["false_alarms_per_hour"].value == pytest.approx(3600 / 5 / 2)
+        assert found.pooled["false_alarms_per_hour"].value == pytest.approx(pooled)
 
 
 def test_two_findings_on_one_fault_are_one_found_and_one_false():

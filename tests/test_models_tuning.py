@@ -123,37 +123,18 @@ def test_the_margin_of_a_class_is_the_least_of_its_pairs():
     assert margins.tolist() == [[1.0, -2.0, -3.0]]
 
 
-def test_certain_and_right_margins_have_no_loss():
-    truth = np.array([0, 1, 2, 1])
-    assert balanced_log_loss(np.eye(3)[truth], truth) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_equal_margins_have_the_logarithm_of_the_classes_as_their_loss():
-    assert balanced_log_loss(np.zeros((6, 3)), np.arange(6) % 3) == pytest.approx(log(3))
-
-
 def sample(frames=200, classes=4):
     truth = np.arange(frames) % classes
     return np.eye(classes)[truth] + RANDOM.standard_normal((frames, classes)), truth
 
 
-def test_the_width_of_margins_does_not_matter():
-    margins, truth = sample()
-    assert balanced_log_loss(7.0 * margins, truth) == pytest.approx(
-        balanced_log_loss(margins, truth)
-    )
+OFTEN = np.concatenate([np.arange(200), *[np.flatnonzero(np.arange(200) % 4 == 2)] * 9])
 
 
-def test_each_class_counts_the_same_however_many_frames_it_has():
-    margins, truth = sample()
-    often = np.concatenate([np.arange(len(truth)), *[np.flatnonzero(truth == 2)] * 9])
-    assert balanced_log_loss(margins[often], truth[often]) == pytest.approx(
-        balanced_log_loss(margins, truth)
-    )
-
-
-def test_the_slope_is_the_best_one():
-    margins, truth = sample()
+@pytest.mark.parametrize("frames", [slice(None), OFTEN, slice(199)])
+@pytest.mark.parametrize("width", [1.0, 7.0, 0.0])
+def test_the_loss_is_the_mean_of_the_classes_at_the_best_slope(frames, width):
+    margins, truth = (each[frames] for each in sample())
 
     def loss(power):
         shares = np.exp(2.0**power * margins)
@@ -161,7 +142,13 @@ def test_the_slope_is_the_best_one():
         return np.mean([-np.log(own[truth == each]).mean() for each in range(4)])
 
     best = minimize_scalar(loss, bounds=(-6, 6), method="bounded", options={"xatol": 1e-6})
-    assert balanced_log_loss(margins, truth) == pytest.approx(best.fun, abs=1e-8)
+    expected = best.fun if width else log(4)
+    assert balanced_log_loss(width * margins, truth) == pytest.approx(expected, abs=1e-8)
+
+
+def test_certain_and_right_margins_have_no_loss():
+    truth = np.array([0, 1, 2, 1])
+    assert balanced_log_loss(np.eye(3)[truth], truth) == pytest.approx(0.0, abs=1e-12)
 
 
 SMALL = {"rate": 1000.0, "length": 400, "hop": 100, "window": 256, "stride": 48}
@@ -310,15 +297,20 @@ def test_the_log_loss_breaks_ties():
     assert min(worse_calibrated, above_threshold, key=order("log-loss")) is above_threshold
 
 
-def test_recordings_without_any_annotation_cannot_be_tuned():
-    trial = Trial.against([replace(recording(0), blocks=())], [recording(1)])
-    with pytest.raises(nc.DatasetError, match="no annotated frame in 1 recordings; annotate"):
-        measure([PROFILES["paper"]], trial)
+LACKS = "no frame of highaccelerations to learn from where those of walk-{} are checked"
 
 
-def test_a_test_class_without_training_frames_is_named():
-    trial = Trial.against([recording(0, ("ok", "impact"))], [recording(1)])
-    reason = "no frame of highaccelerations to learn from where those of walk-1 are checked"
+@pytest.mark.parametrize(
+    ("learn", "check", "reason"),
+    [
+        ([], 1, "no annotated frame in 1 recordings; annotate"),
+        (["ok", "impact"], 1, LACKS.format(1)),
+        (["ok"], 0, "all frames are ok; tuning takes two classes"),
+    ],
+)
+def test_a_class_without_training_frames_is_named(learn, check, reason):
+    fresh = recording(1, nc.CLASSES if check else ("ok",))
+    trial = Trial.against([recording(0, tuple(learn))], [fresh])
     with pytest.raises(nc.DatasetError, match=reason):
         measure([PROFILES["paper"]], trial)
 
@@ -326,8 +318,7 @@ def test_a_test_class_without_training_frames_is_named():
 def test_a_class_of_a_single_recording_cannot_be_folded():
     recordings = [recording(n, nc.CLASSES if n == 2 else ("ok", "impact")) for n in range(4)]
     trial = Trial(recordings, folds([each.name for each in recordings], 2))
-    reason = "of walk-2 are checked; give more recordings of it, or take other folds"
-    with pytest.raises(nc.DatasetError, match=reason):
+    with pytest.raises(nc.DatasetError, match=f"{LACKS.format(2)}; give more recordings of it"):
         measure([PROFILES["paper"]], trial)
 
 

@@ -12,7 +12,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import pairwise
+from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
 from typing import NamedTuple
@@ -36,51 +36,51 @@ Entry = tuple[Block, str]
 def write_labels(
     spans: Sequence[Span], path: Path, *, format_name: str = "", overwrite: bool = False
 ) -> None:
-    """Write annotated blocks or findings to a file.
-
-    Args:
-        format_name: "noisytest", "csv" or "audacity"; by default by the suffix.
-        overwrite: Whether a file that exists may be replaced.
-    """
+    """Write annotated blocks or findings to a file, in a format by name or by its suffix."""
     text = format_of(path, format_name).render(spans, path)
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(text.encode())
 
 
-def read_labels(path: Path, run: Run, *, format_name: str = "") -> tuple[Block, ...]:
-    """Annotated blocks of a run, read from a file and checked, in order of time.
-
-    Args:
-        format_name: "noisytest", "csv" or "audacity"; by default by the suffix.
-    """
-    chosen = format_of(path, format_name)
+def read_labels(path: Path, run: Run) -> tuple[Block, ...]:
+    """Annotated blocks of a run, read from a file and checked, in order of time."""
+    chosen = format_of(path)
     try:
-        entries = sorted(chosen.parse(text_of(path), path))
+        return _checked(sorted(chosen.parse(text_of(path))), run)
     except OSError as error:
         raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
     except AnnotationError as error:
         where = error.where and f", {error.where}"
         raise InspectorError(f"{path}{where}: {error.problem}") from error
-    except InspectorError:
-        raise
     except ValueError as error:
         raise InspectorError(f"{path}: not a file of labels: {error}") from error
+
+
+def _checked(entries: Sequence[Entry], run: Run) -> tuple[Block, ...]:
+    """The blocks of a run, which lie within it and overlap by a sample at most."""
     begin, last = float(run.time[0]), float(run.time[-1])
     step = (last - begin) / (len(run.time) - 1)
-    blocks = [
-        Block(block.start, last + step if block.stop == inf else block.stop, block.label)
-        for block, _ in entries
-    ]
-    places = [f"{path}, {where}" for _, where in entries]
-    for block, where in zip(blocks, places, strict=True):
-        if problem := _problem(block, begin - step, last + 2 * step):
-            raise InspectorError(f"{where}: {problem}")
-    for (before, after), where in zip(pairwise(blocks), places[1:], strict=False):
-        if after.start < before.stop - step:
-            raise InspectorError(
-                f"{where}: blocks overlap: {after.label!r} starts at {after.start:g} s, before"
-                f" {before.label!r} stops at {before.stop:g} s"
+    earliest, latest = begin - step, last + 2 * step
+    blocks = list[Block]()
+    for block, where in entries:
+        label = block.label
+        if block.stop == inf:
+            block = replace(block, stop=last + step)
+        if not label or not label.isprintable():
+            raise AnnotationError(f"{label!r} is empty or cannot be printed", where)
+        if not earliest <= block.start < block.stop <= latest:
+            raise AnnotationError(
+                f"{label!r} from {block.start:g} s to {block.stop:g} s is empty, or lies outside of"
+                f" the run, {earliest:g} s to {latest:g} s",
+                where,
             )
+        if blocks and block.start < blocks[-1].stop - step:
+            raise AnnotationError(
+                f"blocks overlap: {label!r} starts at {block.start:g} s, before"
+                f" {blocks[-1].label!r} stops at {blocks[-1].stop:g} s",
+                where,
+            )
+        blocks.append(block)
     return tuple(sorted(blocks))
 
 
@@ -116,26 +116,14 @@ def write_findings(
             write_labels(verdict.events, targets[verdict.path], overwrite=overwrite)
 
 
-def _problem(block: Block, earliest: float, latest: float) -> str:
-    """Why a label is refused: it is not printable, reversed, or outside of the run."""
-    label = f"{block.label!r} from {block.start:g} s to {block.stop:g} s"
-    if not block.label or not block.label.isprintable():
-        return f"{block.label!r} is not a label; it is empty or cannot be printed"
-    if not block.start < block.stop:
-        return f"{label} stops before it starts, or has no duration"
-    if block.start < earliest or block.stop > latest:
-        return f"{label} lies outside of the run, {earliest:g} s to {latest:g} s"
-    return ""
-
-
-def _time(text: str, place: str) -> float:
+def _time(text: str, where: str) -> float:
     """A finite time parsed from text, in [s]."""
     try:
         value = float(text)
     except ValueError:
         value = inf
     if not isfinite(value):
-        raise InspectorError(f"{place}: {text!r} is not a time in seconds")
+        raise AnnotationError(f"{text!r} is not a time in seconds", where)
     return value
 
 
@@ -143,17 +131,16 @@ def _render_audacity(spans: Sequence[Span], _path: Path) -> str:
     return "".join(f"{span.start!r}\t{span.stop!r}\t{span.label}\n" for span in spans)
 
 
-def _parse_audacity(text: str, path: Path) -> Iterator[Entry]:
+def _parse_audacity(text: str) -> Iterator[Entry]:
     for row, line in enumerate(text.split("\n"), start=1):
-        where = f"line {row}"
-        place, cells = f"{path}, {where}", line.removesuffix("\r").split("\t", maxsplit=2)
+        where, cells = f"line {row}", line.removesuffix("\r").split("\t", maxsplit=2)
         if cells == [""] or cells[0] == "\\":  # frequencies of a spectral selection
             continue
         if len(cells) != 3:
-            raise InspectorError(
-                f"{place}: expected start, stop and label between tabs, not {line[:80]!r}"
-            )
-        yield Block(_time(cells[0], place), _time(cells[1], place), cells[2]), where
+            expected = "expected start, stop and label between tabs"
+            raise AnnotationError(f"{expected}, not {line[:80]!r}", where)
+        start, stop, label = cells
+        yield Block(_time(start, where), _time(stop, where), label), where
 
 
 def _render_csv(spans: Sequence[Span], _path: Path) -> str:
@@ -167,27 +154,23 @@ def _render_csv(spans: Sequence[Span], _path: Path) -> str:
     return text.getvalue()
 
 
-def _parse_csv(text: str, path: Path) -> Iterator[Entry]:
+def _parse_csv(text: str) -> Iterator[Entry]:
     rows = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         header = [name.strip().lower() for name in next(rows, [])]
         if missing := [name for name in COLUMNS if name not in header]:
-            raise InspectorError(
-                f"{path}, line 1: there is no column {missing[0]!r}; expected {', '.join(COLUMNS)}"
-            )
+            expected = f"expected {', '.join(COLUMNS)}"
+            raise AnnotationError(f"there is no column {missing[0]!r}; {expected}", "line 1")
         for cells in rows:
             where = f"line {rows.line_num}"
-            place = f"{path}, {where}"
-            if not cells:
-                continue
-            if len(cells) != len(header):
-                raise InspectorError(
-                    f"{place}: {len(cells)} cells where the header names {len(header)} columns"
-                )
-            start, stop, label = (cells[header.index(name)] for name in COLUMNS)
-            yield Block(_time(start, place), _time(stop, place), uncell(label)), where
+            if cells and len(cells) != len(header):
+                there = f"{len(cells)} cells where the header names {len(header)} columns"
+                raise AnnotationError(there, where)
+            if cells:
+                start, stop, label = (cells[header.index(name)] for name in COLUMNS)
+                yield Block(_time(start, where), _time(stop, where), uncell(label)), where
     except csv.Error as error:
-        raise InspectorError(f"{path}, line {rows.line_num}: not CSV ({error})") from error
+        raise AnnotationError(f"not CSV ({error})", f"line {rows.line_num}") from error
 
 
 def _render_noisytest(spans: Sequence[Span], path: Path) -> str:
@@ -203,9 +186,9 @@ def _render_noisytest(spans: Sequence[Span], path: Path) -> str:
     return f"[data]\nchunk_ranges = [\n{ranges}]\nchunk_labels = [\n{labels}]\n"
 
 
-def _parse_noisytest(text: str, _path: Path) -> Iterator[Entry]:
+def _parse_noisytest(text: str) -> Iterator[Entry]:
     for count, block in enumerate(parse_annotations(text), start=1):
-        yield Block(block.start, block.stop, block.label), f"chunk {count}"
+        yield Block(*block), f"chunk {count}"
 
 
 class Format(NamedTuple):
@@ -213,7 +196,7 @@ class Format(NamedTuple):
 
     suffix: str
     render: Callable[[Sequence[Span], Path], str]
-    parse: Callable[[str, Path], Iterator[Entry]]
+    parse: Callable[[str], Iterator[Entry]]
 
 
 FORMATS = {
