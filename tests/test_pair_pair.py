@@ -9,7 +9,6 @@ from inspector.compare.pair import (
     align,
     alike,
     by_band,
-    by_class,
     by_link,
     changes,
     compare,
@@ -25,7 +24,7 @@ from inspector.compare.pair import (
 )
 from inspector.compare.recording import write
 from inspector.library import demo_run, load_library, model_files
-from noiseclassifier import Event, Labels
+from noiseclassifier import Event
 from noisemodel import Block, Run
 
 LOUDER = 20 * np.log10(2)
@@ -196,24 +195,6 @@ def test_annotated_failures_are_matched_where_no_model_fits(tmp_path):
         )
         for remark in pair.remarks
     )
-
-
-def test_a_class_is_as_long_and_as_loud_as_its_findings(tmp_path):
-    pair = compared(tmp_path, panda(), panda(), robot=False)
-    start = np.arange(0.0, 1.6, 0.1)
-    labels = Labels(
-        start, start + 0.4, np.full(16, "ok"), np.zeros((16, 2)), ("ok", "oscillations")
-    )
-    events = (Event("oscillations", 0.5, 0.8, 0.9), Event("unknown", 1.2, 1.3, 0.1, novel=True))
-    before = dataclasses.replace(pair.before, labels=labels)
-    after = dataclasses.replace(before, findings=events, spans=events)
-    ok, found, unknown = by_class(dataclasses.replace(pair, before=before, after=after))
-    assert ok.seconds == pytest.approx((1.9, 1.5))
-    assert found.seconds == pytest.approx((0.0, 0.3))
-    assert unknown.seconds == pytest.approx((0.0, 0.1))
-    assert np.isnan(found.before)
-    during = pair.vibration[0][2500:4000]
-    assert found.after == pytest.approx(10 * np.log10(np.mean(during**2)), abs=1e-6)
 
 
 def test_motions_that_have_nothing_in_common_are_laid_start_to_start():

@@ -175,16 +175,6 @@ def kinds(tree):
     return [kind for shapes in scene.shapes_by_link(tree).values() for _, kind in shapes]
 
 
-def test_a_robot_without_shapes_is_drawn_as_sticks_from_joint_to_joint(tmp_path):
-    path = urdf(tmp_path, "")
-    (tmp_path / "out").mkdir()
-    tree = scene.load(str(path), tmp_path / "out")
-    assert set(kinds(tree)) == {"Ellipsoids3D", "Cylinders3D"}
-    outermost = scene.outermost(scene.drawn_file(str(path), tmp_path / "out"))
-    stick = outermost["a"]
-    assert (stick @ [0.0, 0.6, 0.8]).max() == pytest.approx(0.5)  # ends at the next joint
-
-
 def test_a_link_without_visual_shapes_is_drawn_as_it_collides(tmp_path):
     (tmp_path / "out").mkdir()
     tree = scene.load(str(urdf(tmp_path, BAR.replace("visual", "collision"))), tmp_path / "out")

@@ -108,8 +108,6 @@ COLUMNS = {
     r"/joints/(velocity|velocity_desired|position)/0": LINE,
     r"/detail/0/(noise|velocity)": LINE,
     r"/(spectrogram|orders)/bands/\d\d": ROW,
-    r"/spectrum/now": {"BarChart:values", "BarChart:abscissa", "BarChart:color"}
-    | {"BarChart:widths"},
     r"/axis/(class|noise|level|probability|spectrogram|orders|joints|links)/(left|right)": LABELS,
     r"/axis/key/right": LABELS,
     r"/axis/(spectrogram|orders|joints|links|key)/right/scale": STRIP,
@@ -307,19 +305,6 @@ def test_the_colours_of_a_row_change_where_the_joint_begins_to_vibrate(tmp_path)
     loud = time[(rgb != colors.HEAT[0]).any(axis=1)]  # ends of segments
     assert loud.min() == pytest.approx(1.05, abs=0.051)
     assert loud.max() == pytest.approx(1.5, abs=0.051)
-
-
-def test_the_spectrum_at_the_cursor_is_that_of_the_noise(whole):
-    path, _ = whole
-    _, (hertz,) = read(path, "/spectrum/now", "BarChart:abscissa")
-    time, bars = read(path, "/spectrum/now", "BarChart:values")
-    heights = np.array([bar[0]["buffer"] for bar in bars])
-    hertz = np.array(hertz[0]["buffer"])
-    rattling = np.abs(time - 0.75) < 0.1
-    audible = hertz > 20.0
-    loudest = hertz[audible][heights[rattling][:, audible].argmax(axis=1)]
-    assert np.abs(loudest % 120.0 - 60.0).min() > 45.0  # 120 Hz, or as noise is a root, 240 Hz
-    assert heights.min() >= 0.0
 
 
 def test_a_tone_is_brightest_at_its_tick(tmp_path):
@@ -587,7 +572,7 @@ def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):
     np.savez(tmp_path / "bare.npz", time=np.arange(300) / 250, velocity=np.ones((300, 2)))
     write(analyse_file(tmp_path / "bare.npz", {}), path)
     found = entities(path)
-    assert {"/noise/simplified", "/spectrum/now", "/joints/velocity/0"} <= found
+    assert {"/noise/simplified", "/joints/velocity/0"} <= found
     assert {f"/spectrogram/bands/{band:02d}" for band in range(48)} <= found
     assert not any(entity.startswith(("/robot", "/class")) for entity in found)
     _, (text,) = read(path, "/report", "TextDocument:text")

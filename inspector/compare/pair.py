@@ -53,24 +53,14 @@ class Align(StrEnum):
 
 @dataclass(frozen=True)
 class Alignment:
-    """Where the run after starts on the time axis of the run before.
+    """Where the run after starts on the time axis of the run before."""
 
-    Attributes:
-        how: "auto" where their motions were laid over each other, "start" where their starts were,
-            "none" where their clocks were taken as they are.
-        lag: Samples that the run after starts later; negative if it starts earlier.
-        seconds: The same in [s].
-        correlation: Of the envelopes of their motions, at most 1; NaN where it was not computed.
-        rival: That at the next best lag.
-        refused: Whether "auto" was requested, and its correlation is too low or ambiguous.
-    """
-
-    how: Align
-    lag: int
-    seconds: float
-    correlation: float = float("nan")
-    rival: float = float("nan")
-    refused: bool = False
+    how: Align  # what was done, which is START where the motions determine no lag
+    lag: int  # samples that the run after starts later; negative if it starts earlier
+    seconds: float  # the same
+    correlation: float = float("nan")  # of the envelopes of their motions; NaN if not computed
+    rival: float = float("nan")  # that at the next best lag
+    refused: bool = False  # whether the motions determine no lag
 
     @property
     def alike(self) -> bool:
@@ -364,8 +354,6 @@ class Level:
     name: str
     before: float
     after: float
-    seconds: tuple[float, float] = (0.0, 0.0)
-    """How long a class lasts before and after, in [s]; where it does not, its level is NaN."""
 
     @property
     def change(self) -> float:
@@ -408,26 +396,6 @@ def within(pair: Pair, start: float, stop: float, name: str = "") -> Level:
 def whole(pair: Pair) -> Level:
     """The level of both noises, above 10 Hz, in all of the time that they share."""
     return within(pair, float(pair.time[0]), float(pair.time[-1]) + 1 / pair.rate, "whole")
-
-
-def by_class(pair: Pair) -> tuple[Level, ...]:
-    """How long and how loud each class is; nothing unless both runs were labelled."""
-    if pair.before.labels is None or pair.after.labels is None:
-        return ()
-    others = {name for _, side in pair.sides for *_, name in side.lane}
-    names = pair.before.labels.classes
-    found = []
-    for name in (*names, *sorted(others - set(names))):
-        seconds, levels = [], []
-        for (_, side), fast in zip(pair.sides, pair.vibration, strict=True):
-            own = np.array([each[:2] for each in side.lane if each[2] == name]).reshape(-1, 2)
-            first, last = _samples(pair, own[:, 0]), _samples(pair, own[:, 1])
-            energy = np.concatenate(([0.0], np.cumsum(fast**2)))
-            power = np.sum(energy[last] - energy[first]) / max(int(np.sum(last - first)), 1)
-            seconds.append(float(np.sum(own[:, 1] - own[:, 0])))
-            levels.append(_noise_level(float(power)) if len(own) else float("nan"))
-        found.append(Level(name, levels[0], levels[1], (seconds[0], seconds[1])))
-    return tuple(found)
 
 
 def by_band(pair: Pair) -> tuple[Level, ...]:
@@ -620,24 +588,13 @@ def _parts(pair: Pair) -> Iterator[str]:
         yield _table(("", title, "time [s]", "before [dB]", "after [dB]", "change"), events)
     yield _largest(pair)
     yield f"Aligned {pair.alignment}. Changes in dB; positive is louder after."
-    if classes := by_class(pair):
-        yield "#### Classes"
-        rows = [
-            (spoken(each.name), *(f"{seconds:.1f}" for seconds in each.seconds), *_numbers(each))
-            for each in classes
-            if any(each.seconds)
-        ]
-        head = ("class", "before [s]", "after [s]", "before", "after", "change")
-        yield _table(head, rows)
     yield "#### Bands"
     yield _levels("octave", by_band(pair))
-    yield "Levels of the noise in dB re 1 rad/s; of events and classes, above 10 Hz."
+    yield "Levels of the noise in dB re 1 rad/s; of events, above 10 Hz."
     if links := by_link(pair):
         yield "#### Links"
         yield _levels("link", links[:SHOWN_LINKS])
         yield "Sound power of the vibration above 10 Hz, in dB re 1 pW; the largest changes first."
-    yield "#### Runs"
-    yield _table(("", "before", "after"), list(_facts(pair)))
     if pair.remarks:
         yield "#### Remarks"
         yield "\n".join(f"- {remark}" for remark in pair.remarks)
@@ -662,32 +619,15 @@ def _largest(pair: Pair) -> str:
     return f"Largest change of level: **{change[place]:+.0f} dB at {time[place]:.2f} s**{links}."
 
 
-def _facts(pair: Pair) -> Iterator[tuple[str, str, str]]:
-    before, after = pair.before, pair.after
-    yield "run", before.name, after.name
-    yield "robot", before.run.robot or "not named", after.run.robot or "not named"
-    yield "model", before.model or "none", after.model or "none"
-    yield "joints", str(len(before.run.joint_names)), str(len(after.run.joint_names))
-    for key in ("scenario", "seed"):
-        if key in before.run.meta or key in after.run.meta:
-            yield key, str(before.run.meta.get(key, "")), str(after.run.meta.get(key, ""))
-    shared = f"{before.run.duration:.2f} s at {pair.rate:g} Hz"
-    yield "compared", shared, shared
-
-
 def _levels(head: str, rows: Sequence[Level]) -> str:
     return _table((head, "before", "after", "change"), [(r.name, *_numbers(r)) for r in rows])
 
 
 def _numbers(level: Level) -> tuple[str, str, str]:
-    change = f"{level.change:+.1f}" if np.isfinite(level.change) else ""
-    return _number(level.before), _number(level.after), change
-
-
-def _number(value: float) -> str:
-    if np.isnan(value):
-        return ""
-    return f"{value:.1f}" if np.isfinite(value) else "silent"
+    before, after = (
+        f"{value:.1f}" if np.isfinite(value) else "silent" for value in (level.before, level.after)
+    )
+    return before, after, f"{level.change:+.1f}"
 
 
 def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

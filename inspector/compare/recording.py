@@ -85,7 +85,7 @@ def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change
     axes.log_beside(recording, CHANGED, left, right)
     return [
         axes.timed(LEVEL, title="Level", between=(LOW_DB, HIGH_DB)),
-        axes.timed(CHANGED, title="Change", between=(-reach, reach), paths=CHANGE_PATHS),
+        axes.timed(CHANGED, title="Change", between=(-reach, reach)),
     ]
 
 
@@ -115,12 +115,9 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[P
 
 
 def log_noise(recording: rr.RecordingStream, pair: Pair) -> Part:
-    """Log both noises, and the sound powers of all links."""
+    """Log both noises."""
     sides, shades = dict(pair.sides), list(SIDE_COLORS.values())
     ends = panels.log_noise(recording, NOISE_PANEL, sides, shades, _sides(), NOISE_POINTS)
-    for (name, side), shade in zip(sides.items(), shades, strict=True):
-        if side.links is not None:
-            panels.log_power(recording, f"/power/{name}", side.links, side.links.total, shade)
     return axes.timed(NOISE_PANEL, title="Noise", name="Noise", between=ends)[0]
 
 
@@ -215,62 +212,30 @@ def _difference(before: Signal | None, after: Signal | None) -> Signal | None:
 
 SHOWN_LINKS = 8
 """Links that have a row, those that changed most."""
-LINK_LINES = 3
-"""Lines of a row, since thick ones have round ends."""
-BOTH = 4
-"""Links whose power before and after is shown."""
 KEY = Panel("key", 260.0)
 """The scale beside the robots."""
 
 
-def log_links(
-    recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair: Pair
-) -> tuple[Part, list[Part]]:
-    """Colour both robots by their links' noise; parts of its changes, powers and levels."""
+def log_links(recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair: Pair) -> Part:
+    """Colour both robots by their links' noise; the changes of those that changed most."""
     assert pair.links is not None
     scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
     for tree, noise in zip(trees.values(), pair.links, strict=True):
         panels.log_robot_levels(recording, tree, noise, scale)
     axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
-    names = [level.name for level in by_link(pair)]
-    for (side, _), noise in zip(pair.sides, pair.links, strict=True):
-        for name in names[:BOTH]:
-            power = noise.vibration[:, noise.links.index(name)]
-            path, shade = f"/links/{name}/{side}", SIDE_COLORS[side]
-            panels.log_power(recording, path, noise, power, shade)
-    own = names[:SHOWN_LINKS]
+    own = [level.name for level in by_link(pair)[:SHOWN_LINKS]]
     time, change = link_steps(pair, own)
-    panel = Panel("links", DETAILS)
-    if own:
-        end = float(pair.time[-1]) + 1.0 / pair.rate
-        axes.log_levels(
-            recording,
-            panel,
-            np.append(time, max(end, float(time[-1]))),
-            change.T,
-            CHANGE,
-            axes.row_labels(own),
-            path="/change/links",
-            names=[f"{name}, change [dB]" for name in own],
-            width=(DETAILS - axes.AXIS) / len(own) / (LINK_LINES + 1) + 2.0,
-            lines=LINK_LINES,
-            shades=panels.SHADES,
-        )
-    else:
-        axes.log_beside(recording, panel, [Label(0.5, "no links")], CHANGE)
-    parts = [unstable.plot("Sound power [dB re 1 pW]", "/power", axes.ALL, legend=True)]
-    if names:
-        both = [
-            unstable.plot(f"{name} [dB re 1 pW]", f"/links/{name}", axes.ALL, legend=True)
-            for name in names[:BOTH]
-        ]
-        parts.append(unstable.tabs(*both, name="Links, before and after"))
-    return axes.timed(panel, "/change/links", name="Links, change")[0], parts
+    edges = np.append(time, max(float(pair.time[-1]) + 1.0 / pair.rate, float(time[-1])))
+    panel, title, unit = Panel("links", DETAILS), "Links, change", ", change [dB]"
+    every = range(len(own))
+    shades = panels.SHADES
+    return panels.log_strip(
+        recording, panel, title, edges, change, own, every, CHANGE, unit, shades=shades
+    )[0]
 
 
 ABOVE = 240.0
 """Least height of the report and the robots."""
-CHANGE_PATHS = ("/change/noise", "/change/none", "/change/finding/**", axes.SPAN)
 TITLES = 28.0
 """Height of a row of tabs."""
 
@@ -320,12 +285,8 @@ def _log_details(
     recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree], around: float
 ) -> Part:
     """Log what lies behind each other: links, spectra, noise, sounds, signals of joints."""
-    parts, of_links = list[Part](), list[Part]()
-    if trees:
-        changed, of_links = log_links(recording, trees, pair)
-        parts.append(changed)
-    parts += log_spectra(recording, pair, _joint(pair))
-    parts += [log_noise(recording, pair), *of_links]
+    parts = [log_links(recording, trees, pair)] if trees else []
+    parts += [*log_spectra(recording, pair, _joint(pair)), log_noise(recording, pair)]
     for name, sound in _sounds(pair, around).items():
         unstable.log_audio(recording, f"/sound/{name}", sound, float(pair.time[0]))
         parts.append(unstable.audio(f"Listen {name}", f"/sound/{name}"))

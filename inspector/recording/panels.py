@@ -17,9 +17,9 @@ from rerun.urdf import UrdfTree
 
 from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps, orders
-from inspector.levels import RANGE_DB, WINDOW, Scale, Spectrogram, extremes, in_bands
+from inspector.levels import WINDOW, Scale, Spectrogram, extremes, in_bands
 from inspector.recording import axes, robot, unstable
-from inspector.recording.axes import Label, Panel, Timed, at
+from inspector.recording.axes import Label, Panel, Timed
 from inspector.recording.unstable import Camera, Part
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
@@ -470,7 +470,7 @@ def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> list[
     edges = np.append(time, float(run.time[-1]) + 1.0 / run.rate)
     scale, which = levels.JOINTS.following(level), chosen(analysis, time, level)
     title, names = "Joints above 10 Hz", run.joint_names
-    return [_log_strip(recording, "joints", title, edges, level, names, which, scale)]
+    return [log_strip(recording, _strip("joints", which), title, edges, level, names, which, scale)]
 
 
 BEFORE, AFTER, SAME = (86, 180, 233), (240, 160, 30), (62, 68, 80)
@@ -495,8 +495,9 @@ def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
     edges = np.append(beside.time - HOP / 2, beside.time[-1] + HOP / 2)
     which, title, unit = beside.loudest(SHOWN), "Over the reference", ", over the reference [dB]"
     level, names = beside.by_joint, beside.joints
-    return _log_strip(
-        recording, "over", title, edges, level, names, which, CHANGE, unit, shades=SHADES
+    panel = _strip("over", which)
+    return log_strip(
+        recording, panel, title, edges, level, names, which, CHANGE, unit, shades=SHADES
     )
 
 
@@ -518,7 +519,8 @@ def log_links(
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
     edges = np.append(time, noise.time[-1] + width / 2)
     title, which = "Links above 10 Hz", chosen(analysis, time, level)
-    return _log_strip(recording, "links", title, edges, level, noise.links, which, scale)
+    panel = _strip("links", which)
+    return log_strip(recording, panel, title, edges, level, noise.links, which, scale)
 
 
 def log_robot_levels(
@@ -531,9 +533,14 @@ def log_robot_levels(
     robot.log_colours(recording, tree, time, colours, rest=scale.colours(np.array([-np.inf])))
 
 
-def _log_strip(
+def _strip(name: str, which: Sequence[int]) -> Panel:
+    """A panel with a row for each."""
+    return Panel(name, STRIP_ROW * len(which) + axes.AXIS)
+
+
+def log_strip(
     recording: rr.RecordingStream,
-    name: str,
+    panel: Panel,
     title: str,
     edges: Array,
     level: Real,
@@ -545,8 +552,7 @@ def _log_strip(
     shades: int = axes.SHADES,
 ) -> Timed:
     """Log levels, shape (columns, rows), of some rows."""
-    own = [names[index] for index in which]
-    panel, path = Panel(name, STRIP_ROW * len(own) + axes.AXIS), f"/strips/{name}"
+    own, path = [names[index] for index in which], f"/strips/{panel.name}"
     axes.log_levels(
         recording,
         panel,
@@ -579,10 +585,7 @@ def log_power(
     axes.log_line(recording, path, noise.time, level, color)
 
 
-TOP_HZ = 2000.0
-"""Highest frequency that is shown, in [Hz]."""
 BANDS = 48
-BARS = 60
 LINE_WIDTH = 5.0
 HEIGHT = 160.0
 """Height of a spectrogram, in points."""
@@ -671,21 +674,6 @@ def band_axis(
         for tick in axes.ticks(low, max(high, 1.01 * low), panel)
     ]
     return [Label(0.5, title, -22.0), *marks]
-
-
-def log_bars(recording: rr.RecordingStream, path: str, spectrum: Spectrogram) -> None:
-    """Log the spectrum of each moment as bars."""
-    shown = spectrum.frequency <= max(TOP_HZ, spectrum.frequency[0])
-    step = -(-len(spectrum.time) // BARS)
-    bars = spectrum.level[shown, ::step].T + RANGE_DB  # bars grow from the floor
-    unstable.log_bars(
-        recording,
-        path,
-        at(spectrum.time[::step]),
-        bars.astype(np.float32),
-        places=spectrum.frequency[shown],
-        color=colors.NOISE,
-    )
 
 
 DETAIL = 0.5

@@ -236,8 +236,6 @@ def log_colours(
             recording.send_columns(path, indexes=index, columns=columns)
 
 
-STICK = 0.1
-"""Size of the balls of a robot without shapes, by the distance from joint to joint."""
 DRAWN = {".stl", ".dae", ".obj", ".glb", ".gltf"}
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -255,15 +253,13 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
 
     Textures and simulator extensions are left out, addresses of meshes become absolute: rerun
     refuses empty textures and needs an environment variable for ``package://``. For a link without
-    visual shapes the collision shapes are drawn; a robot without any shape is drawn as sticks.
+    visual shapes the collision shapes are drawn.
     """
     tree = ET.parse(urdf).getroot()  # noqa: S314
     for link in tree.iter("link"):
         if link.find("visual") is None:
             for shape in link.findall("collision"):
                 shape.tag = "visual"
-    if tree.find("link/visual") is None:
-        _add_sticks(tree)
     for parent in list(tree.iter()):
         for child in list(parent):
             empty = child.tag == "texture" and not child.get("filename")
@@ -272,38 +268,6 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
     for mesh in tree.iter("mesh"):
         mesh.set("filename", f"file://{_checked(mesh.get('filename', ''), urdf, roots, folder)}")
     return ET.tostring(tree, encoding="unicode")
-
-
-def _add_sticks(tree: ET.Element) -> None:
-    """Give a URDF without shapes a ball at each joint, and a stick from each to the next."""
-    joints = []
-    for joint in tree.iter("joint"):
-        origin, parent = joint.find("origin"), joint.find("parent")
-        if parent is not None:
-            xyz = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
-            joints.append((parent.get("link"), np.array(xyz.split(), dtype=np.float64)))
-    lengths = [length for _, place in joints if (length := float(np.linalg.norm(place))) > 0.0]
-    thickness = STICK * (float(np.median(lengths)) if lengths else 1.0)
-    for link in tree.iter("link"):
-        _add_visual(link, ET.Element("sphere", radius=repr(thickness)))
-        for parent_link, place in joints:
-            length = float(np.linalg.norm(place))
-            if parent_link == link.get("name") and length > 0.0:
-                x, y, z = place
-                turn = (0.0, np.arctan2(np.hypot(x, y), z), np.arctan2(y, x))
-                sizes = {"radius": repr(thickness / 2), "length": repr(length)}
-                _add_visual(link, ET.Element("cylinder", sizes), xyz=place / 2, rpy=turn)
-
-
-def _add_visual(
-    link: ET.Element,
-    shape: ET.Element,
-    xyz: Iterable[float] = (0.0, 0.0, 0.0),
-    rpy: Iterable[float] = (0.0, 0.0, 0.0),
-) -> None:
-    visual = ET.SubElement(link, "visual")
-    ET.SubElement(visual, "origin", xyz=_numbers(xyz), rpy=_numbers(rpy))
-    ET.SubElement(visual, "geometry").append(shape)
 
 
 def drawable_mjcf(moved: Robot, folder: Path) -> str:
@@ -530,9 +494,12 @@ def reached(
         angles: Of joints that move, each of shape (frames,), in [rad] or [m].
         pose: x, y, z and quaternion x, y, z, w of a base that moves, shape (frames, 7).
     """
+    from scipy.spatial.transform import Rotation
+
     at_root = np.eye(3), np.zeros(3)
     if pose is not None:
-        at_root = _turns(pose[:, 3:]), pose[:, :3] * (1.0 - ON_FLOOR)
+        turned = Rotation.from_quat(pose[:, 3:]).as_matrix()
+        at_root = turned, pose[:, :3] * (1.0 - ON_FLOOR)
     poses = {tree.root_link().name: at_root}
     for joint in outwards(tree):
         turned, shifted = poses[joint.parent_link]
@@ -549,35 +516,13 @@ def reached(
 
 def _pose(joint: UrdfJoint, angle: Array) -> tuple[Array, Array]:
     """Pose of a joint's child in the axes of its parent, for each angle in [rad] or [m]."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(joint.origin_rpy), np.sin(joint.origin_rpy)
-    origin = np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_euler("xyz", joint.origin_rpy)
     place, axis = np.array(joint.origin_xyz), np.array(joint.axis)
     if joint.joint_type == "fixed":
-        return origin, place
-    axis = axis / np.linalg.norm(axis)
+        return turn.as_matrix(), place
+    along = angle[..., None] * axis / np.linalg.norm(axis)
     if joint.joint_type == "prismatic":
-        return origin, place + angle[..., None] * (origin @ axis)
-    across = _across(axis)
-    sine, versine = np.sin(angle)[..., None, None], 1.0 - np.cos(angle)[..., None, None]
-    return origin @ (np.eye(3) + sine * across + versine * across @ across), place  # Rodrigues
-
-
-def _turns(quaternion: Array) -> Array:
-    """Rotation matrices of quaternions x, y, z, w, shape (frames, 3, 3)."""
-    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    across = _across(unit[:, :3])
-    return np.asarray(np.eye(3) + 2.0 * (unit[:, 3, None, None] * across + across @ across))
-
-
-def _across(vector: Array) -> Array:
-    """The matrix that crosses this vector with another, shape (..., 3, 3)."""
-    x, y, z = np.moveaxis(vector, -1, 0)
-    nothing = np.zeros_like(x)
-    rows = ((nothing, -z, y), (z, nothing, -x), (-y, x, nothing))
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+        return turn.as_matrix(), place + along @ turn.as_matrix().T
+    return (turn * Rotation.from_rotvec(along)).as_matrix(), place

@@ -158,9 +158,6 @@ def _log_spectra(
     panels.log_gaps(recording, "/spectrogram", run, (0.0, axes.TOP))
     parts = [axes.timed(panel, name=title)[0]]
     parts += panels.log_orders(recording, analysis, scale)
-    panels.log_bars(recording, "/spectrum/now", spectrum)
-    top = min(panels.TOP_HZ, run.rate / 2)
-    parts.append(unstable.bars(f"At the cursor, 0-{top:.0f} Hz [dB]", "/spectrum/now"))
     if links is not None:
         paths = ["/power/total", axes.SPAN]
         parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", paths))

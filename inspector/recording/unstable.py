@@ -1,20 +1,10 @@
-"""Every API of rerun that is marked unstable: views, their arrangement, panels, audio, bars.
+"""Every API of rerun that is marked unstable: views, their arrangement, panels, audio, bands.
 
-What changes between versions, as of 0.41:
-
-- ``rerun.blueprint`` as a whole: names and arguments of views and axes change between minor
-  versions, and so do the defaults of views, hence everything here is explicit;
-- ``AudioView`` and ``AssetAudio`` are new. Audio has to lie on a timeline to be played, from the
-  time that it is logged at; a static asset is not played;
-- ``ViewCoordinates``;
-- ``Measurements``, whose band shades findings;
-- ``rerun.experimental``, by which a viewer returns pictures and what its views report;
-- the end of a recording's file, and what rerun waits for if it cannot be written;
-- columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
-
-Stable, and used where it is needed: streams, columns, ``Scalars``, ``SeriesLines``,
-``StateChange``, ``TextLog``, ``TextDocument``, ``Tensor``, ``BarChart``, ``UrdfTree``.
-When rerun moves on, this module follows and no other.
+As of 0.41, these change between versions: ``rerun.blueprint`` and the defaults of its views, all
+explicit here; ``AudioView`` and ``AssetAudio``, which has to lie on a timeline to be played;
+``ViewCoordinates``; ``Measurements``, whose band shades findings; ``rerun.experimental``; the end
+of a recording's file, and what rerun waits for if it cannot be written. When rerun moves on, this
+module follows and no other.
 """
 
 import ctypes
@@ -26,10 +16,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
 from inspector import colors
-from noisemodel.types import Array, Real
+from noisemodel.types import Array
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -99,11 +88,6 @@ def drawing(origin: str) -> Part:
         background=rrb.Background(color=PLOTS),
         titlebar=False,
     )
-
-
-def bars(name: str, origin: str) -> Part:
-    """Draw the bar chart that holds at the time cursor."""
-    return rrb.BarChartView(origin=origin, name=name, plot_legend=rrb.PlotLegend(visible=False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,26 +194,6 @@ def log_audio(recording: rr.RecordingStream, path: str, sound: bytes, start: flo
     )
 
 
-def log_bars(
-    recording: rr.RecordingStream,
-    path: str,
-    index: rr.TimeColumn,
-    bars: NDArray[np.float32],
-    *,
-    places: Array,
-    color: tuple[int, int, int],
-) -> None:
-    """Log a bar chart, shape (times, bars), for each of several times."""
-    widths = np.diff(places, prepend=0.0)
-    heights, stands = _tensors(bars), _tensors(places[None])
-    style = rr.BarChart(heights[:1], abscissa=stands, color=color, widths=widths)
-    changing = rr.BarChart.descriptor_values()
-    batches = style.as_component_batches()
-    lasting = [batch for batch in batches if batch.component_descriptor() != changing]
-    recording.log(path, lasting, static=True)
-    recording.send_columns(path, indexes=[index], columns=rr.BarChart.columns(values=heights))
-
-
 COPIES = 12
 """Bands upon each other that are all but opaque."""
 
@@ -301,39 +265,6 @@ def client(address: str) -> "ViewerClient":
 
 def _nanoseconds(seconds: float) -> int:
     return round(seconds * 1e9)
-
-
-def _tensors(values: Real) -> Any:
-    """An Arrow array of tensors, as rerun's columns hold them.
-
-    Rerun makes tensors one by one, by casts for which Arrow loads its functions for computing: a
-    tenth of a second, for what is a few offsets.
-    """
-    import pyarrow as pa
-
-    count, shape = len(values), values.shape[1:]
-    kinds = {field.name: field for field in rr.components.TensorData.arrow_type()}
-    union = kinds["buffer"].type
-    flat = pa.array(np.ascontiguousarray(values).ravel())
-    used = [field.name for field in union].index(f"F{8 * values.itemsize}")
-    children = [pa.nulls(0, field.type) for field in union]
-    children[used] = _lists(union[used].type, flat, count)
-    codes, places = np.full(count, used, dtype=np.int8), np.arange(count, dtype=np.int32)
-    buffer = pa.Array.from_buffers(
-        union, count, [None, pa.py_buffer(codes), pa.py_buffer(places)], children=children
-    )
-    sizes = pa.array(np.tile(np.array(shape, dtype=np.uint64), count))
-    unnamed = pa.nulls(count, kinds["names"].type)
-    columns = [_lists(kinds["shape"].type, sizes, count), unnamed, buffer]
-    return pa.StructArray.from_arrays(columns, fields=list(kinds.values()))
-
-
-def _lists(kind: Any, flat: Any, count: int) -> Any:
-    """Cut a flat array into lists of one length."""
-    import pyarrow as pa
-
-    offsets = np.arange(count + 1, dtype=np.int32) * np.int32(len(flat) // count)
-    return pa.Array.from_buffers(kind, count, [None, pa.py_buffer(offsets)], children=[flat])
 
 
 def abandon(recording: rr.RecordingStream) -> None:
