@@ -37,14 +37,6 @@ def test_events_of_a_stream_are_those_of_all_labels(text, sizes, gaps):
     assert found.events == whole.events()
 
 
-def test_labels_come_back_when_their_parts_are_joined():
-    whole = labels("..IIu.ooO.")
-    parts = [whole.part(slice(0, 3)), whole.part(slice(3, None))]
-    joined = Labels.concatenated(parts)
-    assert joined.events() == whole.events()
-    assert joined.novel.tolist() == whole.novel.tolist()
-
-
 def test_what_is_over_is_forgotten_but_for_its_events():
     whole, found = labels(100 * "....II....."), Findings()
     for first in range(0, len(whole), 10):

@@ -98,12 +98,6 @@ def test_all_ways_of_reading_agree():
         np.testing.assert_array_equal(rows["time"], table[:, 0])
 
 
-def test_lines_may_end_as_on_windows():
-    (rows,), warned = read(CsvReader(b"t;a.velocity\r\n", ()), b"0;1.5\r\n1;2.5\r\n")
-    assert rows["velocity"].tolist() == [[1.5], [2.5]]
-    assert warned == []
-
-
 def test_rows_of_wrong_lengths_that_add_up_are_reported_too():
     (rows,), warned = read(CsvReader(HEAD, ()), b"0,1,2,3,4\n1,1,2,3,4,9,9\n2,1,2,3,4,9\n")
     assert rows["time"].tolist() == [2.0]

@@ -365,15 +365,6 @@ def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(tmp_path):
     assert (status, "aligned from the start, as requested" in out) == (0, True)
 
 
-def test_what_takes_two_runs_or_one_is_wrong_usage_with_the_other(tmp_path):
-    panda(robot=None).save(tmp_path / "a.npz")
-    run = tmp_path / "a.npz"
-    status, _, err = inspector("view", run, "--align", "start")
-    assert (status, "--align takes two runs" in err) == (2, True)
-    status, _, err = inspector("view", run, run, "--terms")
-    assert (status, "--terms takes one run" in err) == (2, True)
-
-
 def test_runs_that_share_no_time_end_with_one_line(tmp_path):
     run = panda(robot=None, blocks=())
     run.save(tmp_path / "a.npz")
