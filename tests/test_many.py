@@ -68,10 +68,7 @@ def test_runs_of_one_file_name_are_told_apart(tmp_path):
     assert names[2] == f"{names[0]} (2)"
 
 
-def test_names_that_are_too_long_are_shortened_where_they_are_alike():
-    assert shortened(["a", "b"]) == ["a", "b"]
-    long = ["panda-obstacle-full-7000", "panda-obstacle-full-7001"]
-    assert shortened(long) == ["7000", "7001"]
+def test_names_that_are_too_long_show_their_end():
     assert shortened(["x", "panda-obstacle-full-7001"]) == ["x", "…tacle-full-7001"]
 
 

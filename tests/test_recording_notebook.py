@@ -1,4 +1,3 @@
-import subprocess
 import sys
 import types
 from pathlib import Path
@@ -154,11 +153,3 @@ def test_plain_python_is_no_notebook_and_a_kernel_is(monkeypatch):
     assert viewer.in_notebook()
     ipython.get_ipython = object  # a terminal's shell has no kernel
     assert not viewer.in_notebook()
-
-
-def test_importing_the_package_loads_no_viewer():
-    code = "import sys, inspector; print('rerun' in sys.modules, callable(inspector.show))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split() == ["False", "True"]

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,6 @@ from inspector.recording import axes, panels, unstable
 from inspector.recording.axes import Label, Panel, Timed
 from inspector.recording.panels import HIGH_DB, LOW_DB
 from inspector.recording.run import log_report, writing
-from inspector.recording.unstable import Part
 from inspector.report.findings import spoken
 from noiseclassifier import Event
 from noisemodel import Block, Run
@@ -98,14 +96,9 @@ CURVES = 8
 COLUMNS = 1500
 """Columns of the levels; of long runs, the highest level in each is shown."""
 WHOLE, CURVE, TITLES = 832.0, 190.0, 28.0
-"""Height of all parts, of the curves, and of a row of tabs, in points, at 1440 x 900."""
-LOWEST = 20.0
-"""Height of a run's row below which classes and levels lie behind each other in tabs."""
-HIGHEST = 36.0
-"""Height of a row at most; the rest is for the table, above all panels."""
-TABLE, ENTRY = 142.0, 23.0
-"""Height of the table with its title, and of each run in it; with less room above the panels, it
-stands at their left."""
+"""Height of all parts, of the curves at least, and of a row of tabs, in points, at 1440 x 900."""
+LOWEST, HIGHEST = 20.0, 36.0
+"""Height of a run's row; below it, classes and levels lie behind each other in tabs."""
 NAMED = 16.0
 """Least distance of two names."""
 LINE = 8.0
@@ -127,33 +120,28 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         failing = sum(bool(side.findings) for side in several.sides)
         told = f"FAIL   {failing} of {len(several.names)} runs" if failing else "PASS   no finding"
         axes.log_verdict(recording, "findings" if failing else "ok", told)
-        height = _height(len(several.names))
-        tall = height * len(several.names) + axes.AXIS
-        found = _log_classes(recording, several, Panel("class", tall))
-        loud = _log_levels(recording, several, Panel("levels", tall), (begin, end))
-        curves = _log_curves(recording, several, Panel("curves", CURVE))
+        count = len(several.names)
+        row = (WHOLE - CURVE - 2 * axes.AXIS) / 2 / count
+        apart = row >= LOWEST
+        row = min(row, HIGHEST) if apart else (WHOLE - CURVE - TITLES - axes.AXIS) / count
+        tall = row * count + axes.AXIS
+        rows = [
+            _log_classes(recording, several, Panel("class", tall)),
+            _log_levels(recording, several, Panel("levels", tall), (begin, end)),
+        ]
+        if not apart:
+            rows = [(unstable.tabs(*(part for part, _ in rows)), tall + TITLES)]
+        rest = WHOLE - sum(size for _, size in rows)
+        curves = _log_curves(recording, several, Panel("curves", rest))
         properties = {"runs": len(several.names), "model": several.sides[0].model}
         title = f"{several.names[0]} and {len(several.names) - 1} more"
         log_report(recording, title, report(several), properties)
-        whole = layout(len(several.names), [found, loud], curves)
+        table = (unstable.text("Runs", "/report", titled=False), WHOLE - axes.VERDICT)
+        left = unstable.above((unstable.drawing("/verdict"), axes.VERDICT), table)
+        whole = unstable.beside((left, 30.0), (unstable.above(*rows, curves), 70.0))
         event = several.longest
         loop = None if event is None else (event.start, event.stop)
         recording.send_blueprint(unstable.blueprint(whole, loop))
-
-
-def layout(runs: int, rows: Sequence[Timed], curves: Timed) -> Part:
-    """Lay several runs out: a table above or at the left, everything over time below or beside."""
-    over_time = list(rows)
-    if sum(height for _, height in rows) > WHOLE - CURVE:
-        over_time = [(unstable.tabs(*(part for part, _ in rows)), rows[0][1] + TITLES)]
-    over_time.append(curves)
-    table = unstable.text("Runs", "/report", titled=False)
-    verdict = (unstable.drawing("/verdict"), axes.VERDICT)
-    rest = WHOLE - sum(height for _, height in over_time)
-    if rest > TABLE + ENTRY * runs - 1.0:
-        return unstable.above(verdict, (table, rest - axes.VERDICT), *over_time)
-    text = unstable.above(verdict, (table, WHOLE - axes.VERDICT))
-    return unstable.beside((text, 30.0), (unstable.above(*over_time), 70.0))
 
 
 def report(several: Several) -> str:
@@ -182,28 +170,9 @@ def report(several: Several) -> str:
     return "\n".join([*lines, *(["", "**Remarks**", "", *told] if told else [])]) + "\n"
 
 
-def _height(count: int) -> float:
-    """Height of a run's row."""
-    both = (WHOLE - CURVE - 2 * axes.AXIS) / 2 / count
-    below = both - (TABLE + ENTRY * count) / 2 / count  # the table
-    if both >= LOWEST:
-        return min(below if below >= LOWEST else both, HIGHEST)
-    return (WHOLE - CURVE - TITLES - axes.AXIS) / count
-
-
 def shortened(names: Sequence[str]) -> list[str]:
-    """Names of runs, without what all begin with if they are too long to stand beside a row."""
-    longest = max(map(len, names))
-    if longest <= LETTERS:
-        return list(names)
-    pairs = zip(min(names), max(names), strict=False)  # all begin with what these two share
-    same = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
-    cut = max(same.rfind(mark) for mark in "-_./ ") + 1
-    return [_ending(name[cut:] if len(names) > 1 else name) for name in names]
-
-
-def _ending(name: str) -> str:
-    return name if len(name) <= LETTERS else f"\u2026{name[1 - LETTERS :]}"
+    """Names of runs, as long as they may stand beside a row."""
+    return [name if len(name) <= LETTERS else f"\u2026{name[1 - LETTERS :]}" for name in names]
 
 
 def _lines(several: Several, panel: Panel) -> tuple[float, int]:
