@@ -397,24 +397,24 @@ def _estimated(
         {track.signal: track for track in reversed(tracks) if not track.is_desired},
         {track.quantity: track for track in reversed(tracks) if track.stamps in own},
     )
-    if found is None and apart:
-        raise LogError(path, f"{apart}no joint moves in both; {HOW}")
-    if found is None:
+    unknown = "no joint moves in both"
+    if found is None and not apart:
         return 0.0, 0.0, ""
-    seconds, drift, correlation, next_best = found
-    said = (
-        f"offset {seconds:+.4f} s{f', drift {drift * 1e6:+.0f} ppm' if drift else ''}"
-        f" (correlation {correlation:.2f}, next best {next_best:.2f})"
-    )
-    if correlation < CORRELATION or next_best > NEXT_BEST * correlation:
+    if found is not None:
+        seconds, drift, correlation, next_best = found
+        said = (
+            f"offset {seconds:+.4f} s{f', drift {drift * 1e6:+.0f} ppm' if drift else ''}"
+            f" (correlation {correlation:.2f}, next best {next_best:.2f})"
+        )
+        if correlation >= CORRELATION and next_best <= NEXT_BEST * correlation:
+            if not drift and abs(seconds) <= LAG:
+                return 0.0, 0.0, f"{said}: a controller's lag, the stamps are not changed"
+            return seconds, drift, f"{said}: its stamps are shifted by that"
         unknown = f"the offset cannot be estimated ({said})"
-        if apart:
-            raise LogError(path, f"{apart}{unknown}; {HOW}")
-        assumed = "its clock is assumed to be the measured one's, since"
-        return 0.0, 0.0, f"{assumed} {unknown}; {HOW}"
-    if not drift and abs(seconds) <= LAG:
-        return 0.0, 0.0, f"{said}: a controller's lag, the stamps are not changed"
-    return seconds, drift, f"{said}: its stamps are shifted by that"
+    if apart:
+        raise LogError(path, f"{apart}{unknown}; {HOW}")
+    assumed = "its clock is assumed to be the measured one's, since"
+    return 0.0, 0.0, f"{assumed} {unknown}; {HOW}"
 
 
 def no_overlap(desired: Stamps, measured: Stamps) -> str:
@@ -430,9 +430,9 @@ def no_overlap(desired: Stamps, measured: Stamps) -> str:
 def _estimate(
     measured: Mapping[str, Track], desired: Mapping[str, Track]
 ) -> tuple[float, float, float, float] | None:
-    """Offset in [s] and drift in [s/s] of the desired clock, and two normalised correlations.
+    """Offset in [s] and drift in [s/s] of the desired clock, and the correlations there and next.
 
-    These are the one at this offset, and the one at the next best. None if no joint moves in both.
+    These are normalised; None if no joint moves in both.
     """
     pair = _common_tracks(measured, desired)
     if pair is None:
@@ -603,8 +603,7 @@ def hold_length(signal: Real, valid: Mask | None = None) -> float:
 def updates(signal: Real, valid: Mask | None = None) -> Indices | None:
     """Samples at which the values of a signal with a zero-order hold were set; None without one.
 
-    They come at the distance of the hold also where a value was set to what it was before; the
-    first may be negative, as the first value was set before the first sample.
+    The first may be negative: its value was set before the first sample.
     """
     hold, changed = _hold(signal, valid)
     if hold <= 1:

@@ -89,10 +89,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 
 def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str, ...]]:
-    """Name of the group that holds a group for each episode, and names of these.
-
-    The name is empty where the episodes are in the file itself, one after the other or alone.
-    """
+    """Name of the group with a group for each episode, empty without one, and their names."""
     for home in (EPISODES, "/"):
         group = _own(path, file.get(home), file)
         if isinstance(group, h5py.Group) and not is_matlab:
@@ -189,10 +186,7 @@ def _values(path: Path, file: Any, datasets: Mapping[str, Any]) -> dict[str, NDA
 
 
 def _wanted(group: Any, options: ReadOptions) -> tuple[dict[str, Any], list[str]]:
-    """Numeric datasets of up to two dimensions, or three of joint states, by name in the group.
-
-    Besides, the names of large ones that nothing is known of.
-    """
+    """Numeric datasets that may hold motion, by name, and names of large unknown ones."""
     mapped = {entry.part()[0] for entry in options.entries}
     found: dict[str, Any] = {}
     left_out: list[str] = []

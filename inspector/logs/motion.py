@@ -434,9 +434,8 @@ def _without_held_targets(tracks: Sequence[Track], remarks: list[str]) -> list[T
     """Tracks whose held desired positions are interpolated between the samples that set them.
 
     A policy sets targets 10 to 100 times a second, and a faster log holds each until the next: its
-    velocity would be a pulse at each target, which no joint was ever told to follow. Positions
-    with a logged desired velocity are left as they are, and so are those of a log that holds its
-    measured values as long. What follows the last target is cut off.
+    velocity would be a pulse at each target. Positions with a logged desired velocity are left as
+    they are, and so are those of a log that holds its measured values as long.
     """
     logged = {joint for t in tracks if t.signal == "velocity_desired" for joint in t.joints}
     moving = [track for track in tracks if track.signal in ("position", "velocity")]
@@ -617,16 +616,13 @@ def _of_clock(stamps: Stamps) -> Iterator[str]:
         yield stamps.remark
     if not clock.uniform:
         yield (
-            f"resampled to {clock.rate:g} Hz (the stamps' nominal rate is"
-            f" {clock.nominal:g} Hz; their jitter is {clock.jitter_rms * 1e3:.3g} ms rms,"
-            f" {clock.jitter_max * 1e3:.3g} ms at most){_lost(clock.nominal, clock.rate)}"
+            f"resampled to {clock.rate:g} Hz (stamps of {clock.nominal:g} Hz, jitter"
+            f" {clock.jitter_rms * 1e3:.3g} ms rms){_lost(clock.nominal, clock.rate)}"
         )
     if clock.gaps:
         total = sum(stop - start for start, stop in clock.gaps)
-        yield (
-            f"{counted(len(clock.gaps), 'gap')}, {total:.3g} s in all, the first at"
-            f" {clock.gaps[0][0]:.6g} s, marked as not valid"
-        )
+        what = f"{counted(len(clock.gaps), 'gap')}, {total:.3g} s in all"
+        yield f"{what}, the first at {clock.gaps[0][0]:.6g} s, marked as not valid"
 
 
 def _lost(before: float, after: float) -> str:

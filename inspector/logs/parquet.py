@@ -181,10 +181,7 @@ UNPACKED, PACKED = 2, 3
 
 
 def unpacked_size(path: Path, columns: Collection[str]) -> tuple[int, int]:
-    """Bytes that columns unpack to, by what states more, their pages or the end of the file.
-
-    Besides, the most numbers that they hold in a row.
-    """
+    """Bytes that columns unpack to, as pages or the end state, and the most numbers in a row."""
     stated = held = width = 0
     with path.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as data:
         length = int.from_bytes(data[-8:-4], "little")

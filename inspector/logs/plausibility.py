@@ -194,9 +194,8 @@ def contradictions(run: Run) -> Iterator[str]:
             f" positions (correlation {float(correlation[strange].max()):.2g})"
         )
     if wrong.any():
-        sizes = factor[wrong]
-        alike = float(np.ptp(sizes)) <= AGREE * abs(float(sizes.mean()))
-        size = f"{float(sizes.mean()):.3g}" if alike else f"{sizes.min():.3g} to {sizes.max():.3g}"
+        least, most = (f"{each:.3g}" for each in (factor[wrong].min(), factor[wrong].max()))
+        size = least if least == most else f"{least} to {most}"
         yield (
             f"velocities of {_joints(run, wrong)} are {size} times the slopes of their positions:"
             " another unit, or another rate?"

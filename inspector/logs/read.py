@@ -170,12 +170,9 @@ def read_logs(
     episodes: Sequence[str] | None = None,
     progress: Progress = without_progress,
 ) -> Iterator[Imported]:
-    """Runs of a log, an episode each, read one after the other; errors as of `read_log`.
+    """Runs of a log, an episode each, read one after the other; arguments and errors of `read_log`.
 
-    Args:
-        desired: Another log with the desired motion.
-        episodes: Which episodes to read, all unless given.
-        progress: Wraps what is read, to show how much is done.
+    ``progress`` wraps what is read, to show how much is done.
     """
     readers = readers_of(
         Path(path),
