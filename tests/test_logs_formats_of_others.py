@@ -363,13 +363,6 @@ def test_a_log_without_a_header_shows_the_line_to_type(tmp_path):
     assert "such as --columns time,q1,q2,dq1,dq2 (without stamps: no time, but --rate HZ)" in err
 
 
-def test_a_log_without_stamps_shows_the_option_to_type(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text(table("q1,q2", (P,), stamp=None))
-    with pytest.raises(LogError, match="there are no stamps; .* --rate HZ"):
-        read_log(path)
-
-
 def test_a_listing_tells_what_each_column_is_taken_for(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("Time [ms];q1;elbow_vel [deg/s];qd;velocity;temperature;\n0;1;2;3;4;5;\n")

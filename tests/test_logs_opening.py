@@ -159,15 +159,6 @@ def test_a_desired_log_belongs_to_one_log(tmp_path, run):
     assert (status, "belongs to one log, 2 are given" in err) == (2, True)
 
 
-def test_a_missing_extra_is_named_with_the_line_to_type(tmp_path, monkeypatch):
-    (tmp_path / "a.hdf5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
-    monkeypatch.setattr("inspector.logs.read.find_spec", lambda name: None)
-    status, _, err = call("classify", tmp_path / "a.hdf5")
-    assert status == 3
-    assert "pip install 'noise-inspector[hdf5]'" in err
-    assert err.count("\n") == 1
-
-
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_of_a_mixed_folder_the_unreadable_is_named_and_the_rest_is_done(tmp_path, jobs):
     shutil.copy(demo_run(), tmp_path / "demo.npz")

@@ -42,12 +42,6 @@ def test_a_desired_column_is_recognised_by_its_name(tmp_path, column, signal):
     assert run.joint_names == ("elbow",)
 
 
-def test_columns_without_a_known_signal_are_listed(tmp_path):
-    path = log(tmp_path, target_moment_0=TIME, actual_current_0=TIME, comment=["fine"] * len(TIME))
-    text = "log.csv: 3 columns not read: target_moment_0, actual_current_0, comment"
-    assert read_log(path).remarks == (text,)
-
-
 def test_errors_and_outputs_of_a_controller_are_no_motion(tmp_path):
     ones = np.ones(len(TIME))
     state = "/arm/controller_state"

@@ -17,6 +17,7 @@ from noisemodel import Robot, RobotError, Run, RunFileError, meshes
 from noisemodel.surface import LinkSurface, fine
 from noisemodel.types import MeshError
 
+READERS = ((Run.load, RunFileError), (read_log, LogError))
 LAUGHS = "".join(f'<!ENTITY l{n + 1} "{f"&l{n};" * 10}">' for n in range(9))
 
 
@@ -175,7 +176,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):
             for _ in range(600):
                 member.write(zeros)
         archive.writestr("time.npy", b"")
-    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+    for read, error in READERS:
         with pytest.raises(error, match=r"unpacks to 0.629 GB from 0.6\d+ MB, .*--max-unpacked"):
             read(path)
 
@@ -199,7 +200,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):
 )
 def test_a_broken_header_of_an_array_is_one_line(tmp_path, header):
     path = npz(tmp_path / "run.npz", time=header, velocity=header)
-    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+    for read, error in READERS:
         with pytest.raises(error, match="time") as caught:
             read(path)
         assert "\n" not in str(caught.value)
@@ -212,7 +213,7 @@ def test_a_second_member_of_one_name_is_refused(tmp_path):
         again = archive.read("velocity.npy")
     with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(path, "a") as archive:
         archive.writestr("velocity.npy", again)
-    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+    for read, error in READERS:
         with pytest.raises(error, match="two arrays named 'velocity'"):
             read(path)
 
@@ -222,7 +223,7 @@ def test_an_array_whose_name_has_control_characters_is_refused(tmp_path, method)
     path = tmp_path / "run.npz"
     with zipfile.ZipFile(path, "w", method) as archive:
         archive.writestr("a\n\x1b[31m.npy", b"")
-    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+    for read, error in READERS:
         with pytest.raises(error, match=r"has an array named 'a\\n\\x1b\[31m'"):
             read(path)
 
@@ -250,7 +251,7 @@ def test_a_device_is_no_model():
 
 
 def test_a_device_is_no_log():
-    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+    for read, error in READERS:
         with pytest.raises(error, match="no regular file"):
             read(Path("/dev/zero"))
 

@@ -62,6 +62,8 @@ def test_episodes_have_whole_numbers(tmp_path, index, problem):
     ("text", "problem"),
     [
         ("[" * 100_000, "cannot be read .nested too deeply"),
+        ("{", "cannot be read"),
+        ("[]", "has no table of features"),
         (json.dumps(INFO | {"fps": 10**400}), "an integer of more than 20 digits"),
         (json.dumps(INFO | {"fps": "x"}), "fps is 'x', expected 0.001 to 1e"),
         (json.dumps(INFO | {"fps": [1]}), "fps is .1., expected"),

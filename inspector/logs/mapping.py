@@ -253,7 +253,7 @@ def tracks_of(
     log: Log, options: ReadOptions, robot: Robot | None
 ) -> tuple[tuple[Track, ...], tuple[str, ...], tuple[str, ...]]:
     """Tracks of a log; the mapping takes precedence over the names of columns."""
-    log, converted = _in_si(log, options)
+    log, converted = _without_units(log, options)
     names = [field.name for field in log.fields]
     options = options.for_columns(log.path, [name for name in names if name != log.time])
     joints = robot.joint_names if robot else ()
@@ -264,7 +264,10 @@ def tracks_of(
         raise no_motion(log.path, [*names, *log.not_read])
     read = {id(choice.field) for choice in kept}
     not_read = tuple(field.name for field in log.fields if id(field) not in read)
-    remarks = [f"{listed(n)}: converted from {u}, as their names say" for u, n in converted.items()]
+    remarks = []
+    for unit, of_unit in converted.items():
+        if taken := [name for name in of_unit if name not in not_read]:
+            remarks.append(f"{listed(taken)}: converted from {unit}, as their names say")
     if naming.qd_is_desired:
         remarks.append("qd is the desired position, since dq is the velocity (else --map)")
     if naming.remark and any(not c.explicit and c.field.name in naming.bare for c in kept):
@@ -274,7 +277,7 @@ def tracks_of(
     return (*_base_tracks(log, kept), *_joint_tracks(kept)), (*log.not_read, *not_read), (*remarks,)
 
 
-def _in_si(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[str]]]:
+def _without_units(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[str]]]:
     """Log with columns in the units of a run, and the names of the others by their unit."""
     found: dict[str, list[str]] = {}
     fields = []
