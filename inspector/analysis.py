@@ -384,11 +384,6 @@ class Moment:
     stop: float  # [s]
     peak: float  # middle of its loudest 50 ms, in [s]
 
-    @property
-    def failure(self) -> bool:
-        """Whether it was found, or annotated, to be one."""
-        return self.label != LOUDEST
-
 
 def gaps(run: Run) -> list[tuple[float, float]]:
     """Start and stop of each gap, in [s]."""

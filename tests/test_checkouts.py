@@ -184,9 +184,6 @@ def test_a_result_or_an_array_that_one_checkout_lacks_is_a_difference(checkouts,
     assert str(noise) == "different  demo, noise: not computed by the checkout after"
     assert checkouts.closing([equal, model]) == ("2 compared: 1 the same, 1 different", 1)
     assert checkouts.closing([equal]) == ("1 compared: 1 the same, 0 different", 0)
-
-
-def test_a_comparison_of_nothing_fails(checkouts):
     assert checkouts.closing([]) == ("nothing was compared", 1)
 
 
@@ -262,15 +259,14 @@ def test_checkouts_are_timed_in_turns_after_a_warm_up(checkouts, commands, tmp_p
     assert all(spent > 0.0 for spent in found.values())
 
 
-def test_findings_are_no_failure_of_a_command(checkouts, commands, tmp_path):
-    found = checkout_of(checkouts, tmp_path, "print('impact'); raise SystemExit(1)")
-    assert commands.measure(found, ["classify"]) > 0.0
-
-
 @pytest.mark.parametrize(
     ("script", "text"), [("import nothing_there", "No module named"), ("exit(3)", "exit 3")]
 )
-def test_a_command_that_fails_is_not_timed(checkouts, commands, tmp_path, script, text):
-    broken = checkout_of(checkouts, tmp_path, script)
+def test_a_command_that_fails_is_not_timed_and_one_with_findings_is(
+    checkouts, commands, tmp_path, script, text
+):
+    broken = checkout_of(checkouts, tmp_path / "broken", script)
     with pytest.raises(SystemExit, match=text):
         commands.measure(broken, ["classify", "run.npz"])
+    found = checkout_of(checkouts, tmp_path / "found", "print('impact'); raise SystemExit(1)")
+    assert commands.measure(found, ["classify"]) > 0.0

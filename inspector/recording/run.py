@@ -12,7 +12,7 @@ import rerun as rr
 from rerun.urdf import UrdfTree
 
 from inspector import levels
-from inspector.analysis import Analysis, worst, worst_joint, worst_signal
+from inspector.analysis import LOUDEST, Analysis, worst, worst_joint, worst_signal
 from inspector.levels import spectrogram
 from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.unstable import Part
@@ -125,7 +125,7 @@ def write(
         whole = unstable.beside(
             (unstable.above(*left, (details, DETAILS)), 36.0), (unstable.above(*over_time), 64.0)
         )
-        failures = [(moment.start, moment.stop) for moment in moments if moment.failure]
+        failures = [(moment.start, moment.stop) for moment in moments if moment.label != LOUDEST]
         loop = failures[0] if failures else None
         recording.send_blueprint(unstable.blueprint(whole, loop))  # instead of an older run's
 

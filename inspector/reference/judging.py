@@ -147,7 +147,7 @@ class Scenario:
 
     @property
     def robot(self) -> str:
-        """The robot of the newest repetition."""
+        """That the newest repetition names."""
         return self.repetitions[-1].robot
 
 
@@ -275,10 +275,7 @@ class Comparison:
 
     @property
     def by_joint(self) -> Real32:
-        """Loudest exceedance of each joint, shape (frames, joints), in [dB]; NaN without reference.
-
-        A heat map of it shows where the run is louder than its reference.
-        """
+        """Loudest exceedance of each joint, shape (frames, joints), in [dB]; NaN without any."""
         return _largest(self.over.reshape(*self.over.shape[:2], prod(self.over.shape[2:])))
 
     @property
@@ -416,15 +413,11 @@ def _common(
 ) -> tuple[Cells, list[str]]:
     """Joints and octaves that can be compared, and what cannot."""
     if not known:
-        newest = [each.repetitions[-1] for each in accepted]
-        robots, own = {each.robot for each in newest} - {""}, run.robot
-        if not own or not robots or own in robots:  # then the joints are others
-            own, *others = (
-                f"joints {', '.join(each.joints[:3])}{', …' * (len(each.joints) > 3)}"
-                for each in (run, *newest)
-            )
-            robots = set(others)
-        there = ", ".join(sorted(robots)) or "nothing"
+        own, *others = (
+            f"{each.robot or 'a robot'} with joints {', '.join(each.joints[:3])}"
+            for each in (run, *(scenario.repetitions[-1] for scenario in accepted))
+        )
+        there = " or ".join(sorted(set(others))) or "nothing"
         return Cells((), ()), [f"no reference: it is of {there}, and the run of {own}"]
     every = _repetitions(known)
     cells = Cells(
@@ -690,18 +683,13 @@ def _exceedances(
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """Where each frame of a run lies in a repetition.
+    """Where each frame of a run lies in a repetition."""
 
-    Attributes:
-        frame: Frame of the repetition, shape (frames,).
-        residual: Largest difference of positions in any joint, in standard deviations of the
-            motion, shape (frames,); infinite where the speeds differ too much.
-        inside: Whether the frame is one of the repetition, not before its start or after its end.
-    """
-
-    frame: NDArray[np.int64]
+    frame: NDArray[np.int64]  # of the repetition, shape (frames,)
+    # Largest difference of positions in any joint, in standard deviations of the motion, shape
+    # (frames,); infinite where the speeds differ too much.
     residual: Array
-    inside: NDArray[np.bool_]
+    inside: NDArray[np.bool_]  # whether it is not before the repetition's start or after its end
 
     @property
     def same(self) -> NDArray[np.bool_]:
@@ -743,9 +731,7 @@ def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> li
 def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:
     """Find the frames of repetitions that belong to each frame of a run.
 
-    Args:
-        run: Slow positions, shape (frames, joints).
-        repetitions: The same of each repetition, with the same joints.
+    Slow positions have shape (frames, joints), with the same joints in all runs.
     """
     if not len(repetitions):
         return []

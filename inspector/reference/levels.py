@@ -159,10 +159,9 @@ class LevelStream:
     def push(
         self, time: float, signals: Mapping[str, Array], valid: NDArray[np.bool_], lost: Array
     ) -> None:
-        """Take samples.
+        """Take samples from a time on, in [s].
 
         Args:
-            time: That of the first one, in [s].
             signals: Velocities, desired ones and positions, each of shape (samples, joints).
             valid: Which samples are known, shape (samples,).
             lost: How many samples are missing before each, shape (samples,).

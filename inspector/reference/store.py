@@ -166,8 +166,7 @@ def find(run: Path) -> Path | None:
 def scenario_of(run: Run, path: Path, root: Path | None = None) -> str:
     """Name of the scenario of a run: from its meta, or its file without a number at the end.
 
-    Args:
-        root: The folder that it was found in; names below it contain their folders.
+    Below the root in which it was found, its folders belong to the name.
     """
     known = run.meta.get("scenario")
     if isinstance(known, str) and known.strip() and not known.strip().isdigit():
@@ -182,14 +181,14 @@ def scenario_of(run: Run, path: Path, root: Path | None = None) -> str:
 
 def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Levels]:
     """Measure the levels of runs."""
-    found = []
-    for path in paths:
-        for source in sources([path], reading)[0]:
-            try:
-                found.append(levels_of(source, path if path.is_dir() else None, reading))
-            except NoiseModelError as error:
-                raise InspectorError(str(error)) from error
-    return found
+    try:
+        return [
+            levels_of(source, path if path.is_dir() else None, reading)
+            for path in paths
+            for source in sources([path], reading)[0]
+        ]
+    except NoiseModelError as error:
+        raise InspectorError(str(error)) from error
 
 
 def levels_of(source: Source, root: Path | None, reading: Reading | None = None) -> Levels:
@@ -243,11 +242,8 @@ def accept_into(
     """Accept runs into a store: their scenarios are added or replaced, all others stay.
 
     Runs of an accepted scenario that are as it is join its repetitions, of which the newest ten
-    stay; runs that differ replace them. A scenario whose motion has another name is renamed.
-
-    Args:
-        folder: The store, which is made if it does not exist.
-        renames: Whether a scenario whose logs are gone may have got another name.
+    stay; runs that differ replace them. A scenario whose logs are gone and whose motion has another
+    name is renamed, if ``renames``.
 
     Returns:
         The store as it is now, and by the names of scenarios what changed.
@@ -521,10 +517,7 @@ def _read(folder: Path) -> Reference:
     if content or not isinstance(rows, list) or len(rows) > MOST_SCENARIOS:
         raise StoreError(path, "expected a format and entries [[scenario]] alone")
     every = enumerate(rows, 1)
-    try:
-        scenarios = tuple(_scenario(path, f"[[scenario]] {n}", row) for n, row in every)
-    except OverflowError as error:
-        raise StoreError(path, f"a number is too large ({error})") from error
+    scenarios = tuple(_scenario(path, f"[[scenario]] {place}", row) for place, row in every)
     if len({each.name for each in scenarios}) < len(scenarios):
         raise StoreError(path, "two scenarios have one name")
     return Reference(folder, scenarios, stored=True)

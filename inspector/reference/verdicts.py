@@ -182,8 +182,7 @@ def beside(
 
     A moment that is louder than its reference is a finding, with the class that the general model
     gives it, or ``louder``. What the general model finds where the run is as loud as its reference
-    is excused. Where no reference covers the run, the general model decides. Labels of the frames
-    name what no finding does.
+    is excused. Where no reference covers the run, the general model decides.
     """
     events = _events(verdict.events, labels, comparison)
     margins = comparison.margins
@@ -332,11 +331,7 @@ def judge(
     gate: Gate | None = None,
     today: date,
 ) -> Verdict:
-    """Apply what a reference wants and waives on a day, and a gate, to what was found in a run.
-
-    Args:
-        gate: The findings that fail a run, all unless given; missing ones always do.
-    """
+    """Apply what a reference wants and waives on a day, and a gate, to what was found in a run."""
     if verdict.status in UNREAD:
         return verdict
     missing: list[Missing] = []
