@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from simulated import simulated
+from simulated import PLAIN, simulated
 
 from noiseclassifier.scenarios.dataset import Folder, Task
-from noiseclassifier.scenarios.domains import Logger
 from noiseclassifier.scenarios.faults import Imperfections
 from noiseclassifier.scenarios.logs import logged, visible
 from noiseclassifier.scenarios.motions import PUSH, DatasetError
@@ -27,11 +26,7 @@ from noisemodel import Run
 SECONDS = 1.5
 STANDS = 10_004
 """A seed of which the Panda stands for so long, on elastic gears."""
-PLAIN = Logger(
-    rate=1000.0, velocity="measured", bits=23, cutoff=700.0, noise=0.001, jitter=0.0, lost=0.0,
-    repeated=0.0, hold=1, ripple=0.0, roughness=0.0, gear=100.0, resonances=(),
-    desired="commanded", effort="torque", effort_noise=0.0, effort_bits=24,
-)  # fmt: skip
+TORQUE = replace(PLAIN, effort="torque", noise=0.001)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +58,7 @@ def test_efforts_are_those_of_the_drives_in_the_runs_form_and_may_be_missing(twi
     assert twin.meta["effort_limit"] == pytest.approx(limit)
     assert (np.abs(twin.effort) <= limit * 1.001).all()
     without = replace(twin, effort=None, meta={**twin.meta, "recipe": "domains 1"})
-    assert logged(without, without, PLAIN, seed=1).effort is None
+    assert logged(without, without, TORQUE, seed=1).effort is None
 
 
 def test_the_effort_of_a_standing_arm_is_its_gravity_torque_within_friction(twin):
@@ -121,23 +116,23 @@ def test_a_blow_from_outside_is_not_among_the_torques_of_the_drives():
 
 def test_a_push_that_velocities_do_not_show_has_a_label_where_efforts_show_it(twin, pushed):
     (event,) = pushed.meta["events"]
-    found = logged(pushed, twin, PLAIN, seed=1)
+    found = logged(pushed, twin, TORQUE, seed=1)
     labels = [block for block in found.blocks if block.label == "impact"]
     assert sum(block.stop - block.start for block in labels) > 0.3 * (
         event["stop"] - event["start"]
     )
     assert all(event["start"] <= b.start < b.stop <= event["stop"] for b in labels)
     assert found.meta["events"][0]["labelled"] > 0
-    blind = logged(pushed, twin, replace(PLAIN, effort="missing"), seed=1)
+    blind = logged(pushed, twin, replace(TORQUE, effort="missing"), seed=1)
     assert blind.effort is None
     assert {block.label for block in blind.blocks} == {"ok"}
     assert blind.meta["events"][0]["labelled"] == 0
-    noisy = logged(pushed, twin, replace(PLAIN, effort_noise=2.0), seed=1)
+    noisy = logged(pushed, twin, replace(TORQUE, effort_noise=2.0), seed=1)
     assert noisy.blocks == blind.blocks
 
 
 def test_a_logger_of_efforts_leaves_velocities_as_they_are(twin):
-    rough = replace(PLAIN, jitter=0.1, lost=0.02, repeated=0.02, hold=3, velocity="filtered")
+    rough = replace(TORQUE, jitter=0.1, lost=0.02, repeated=0.02, hold=3, velocity="filtered")
     kinds = [
         logged(twin, twin, replace(rough, effort=kind, current=8.0), seed=4)
         for kind in ("missing", "torque", "current")
@@ -155,21 +150,21 @@ def test_a_logger_of_efforts_leaves_velocities_as_they_are(twin):
 
 def test_currents_are_torques_by_the_torque_constant_of_each_joint(twin):
     limit = np.array(twin.meta["effort_limit"])
-    torque = logged(twin, twin, PLAIN, seed=1).effort
-    current = logged(twin, twin, replace(PLAIN, effort="current", current=10.0), seed=1).effort
+    torque = logged(twin, twin, TORQUE, seed=1).effort
+    current = logged(twin, twin, replace(TORQUE, effort="current", current=10.0), seed=1).effort
     np.testing.assert_allclose(current * limit / 10.0, torque, atol=1e-3)
 
 
 def test_efforts_have_steps_noise_and_are_held_as_velocities_are(twin):
     limit = np.array(twin.meta["effort_limit"])
-    fine = logged(twin, twin, PLAIN, seed=1).effort
-    coarse = logged(twin, twin, replace(PLAIN, effort_bits=8), seed=1).effort
+    fine = logged(twin, twin, TORQUE, seed=1).effort
+    coarse = logged(twin, twin, replace(TORQUE, effort_bits=8), seed=1).effort
     step = 2 * limit / 2**8
     np.testing.assert_allclose(coarse / step, np.rint(coarse / step), atol=1e-3)
     assert (np.abs(coarse - fine) <= 0.51 * step).all()
-    noisy = logged(twin, twin, replace(PLAIN, effort_noise=0.01), seed=1).effort
+    noisy = logged(twin, twin, replace(TORQUE, effort_noise=0.01), seed=1).effort
     np.testing.assert_allclose((noisy - fine).std(axis=0), 0.01 * limit, rtol=0.1)
-    held = logged(twin, twin, replace(PLAIN, hold=10), seed=1).effort
+    held = logged(twin, twin, replace(TORQUE, hold=10), seed=1).effort
     assert np.array_equal(held[::10], held[9::10])
 
 
@@ -188,7 +183,8 @@ def test_a_slow_change_is_visible_beside_a_weight_only_where_means_are_left_out(
 
 def test_folders_of_older_recipes_are_read_and_not_added_to(tmp_path, twin):
     folder = Folder.opened(tmp_path / "data", wide=True)
-    folder.save(Task("panda", GOOD, STANDS), replace(twin, effort=None))
+    (folder.path / "panda").mkdir()
+    replace(twin, effort=None).save(folder.file(Task("panda", GOOD, STANDS)))
     manifest = folder.path / "dataset.json"
     settings = json.loads(manifest.read_text())
     assert settings["recipe"] == WIDE_RECIPE

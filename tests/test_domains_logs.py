@@ -4,28 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import simulated
 
-from noiseclassifier.scenarios.domains import Logger
 from noiseclassifier.scenarios.logs import logged, visible
 from noisemodel import Block, Run
 
 RATE = 2000.0
-PLAIN = Logger(
-    rate=RATE,
-    velocity="measured",
-    bits=23,
-    cutoff=700.0,
-    noise=0.0,
-    jitter=0.0,
-    lost=0.0,
-    repeated=0.0,
-    hold=1,
-    ripple=0.0,
-    roughness=0.0,
-    gear=100.0,
-    resonances=(),
-    desired="commanded",
-)
+PLAIN = replace(simulated.PLAIN, rate=RATE)
 FAULT = (2.0, 3.0)
 
 

@@ -118,12 +118,6 @@ def test_it_walks_upright_to_where_its_steps_lead(straight):
     assert np.abs(turn[:3]).max() < 0.03
 
 
-def test_the_drives_stay_far_from_their_limits(straight):
-    assert np.abs(straight.effort).max() < 0.6 * max(TALOS.drives.torque)
-    error = straight.velocity - straight.velocity_desired
-    assert error.std() < 0.02
-
-
 def test_an_obstacle_is_an_early_contact_and_an_impact(obstacle):
     (event, *_) = obstacle.meta["events"]
     assert event["label"] == "impact"

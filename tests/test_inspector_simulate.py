@@ -1,23 +1,19 @@
 """`inspector simulate`: one run, or a data set that resumes."""
 
 import json
-import os
-import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from commandline import call as inspector
+from simulated import nothing, stub
 
 from inspector.training.train import classified
 from noiseclassifier import scenarios
-from noiseclassifier.scenarios import dataset
-from noiseclassifier.scenarios.simulation import scenario_of
-from noisemodel import Block, Run, decimated
+from noiseclassifier.scenarios.dataset import Task
+from noisemodel import Run, decimated
 
 ROOT = Path(__file__).parents[1]
 JOINTS = scenarios.ROBOTS["panda"].drives.joints
@@ -25,39 +21,7 @@ JOINTS = scenarios.ROBOTS["panda"].drives.joints
 
 @pytest.fixture
 def simulated(monkeypatch):
-    """Let nothing be simulated, and list what would have been."""
-    calls, falls = [], set()
-
-    def simulate(robot, scenario, seed, *, duration=None):
-        name = scenario_of(scenario).name
-        calls.append((robot, name, seed))
-        if (name, seed) in falls:
-            raise scenarios.SimulationError(1.25, "it fell")
-        return stub(robot, name, seed, duration or 7.0)
-
-    simulate.calls, simulate.falls = calls, falls
-    monkeypatch.setattr(dataset, "simulate", simulate)
-    monkeypatch.setattr(scenarios, "simulate", simulate)
-    return simulate
-
-
-def stub(robot: str, scenario: str, seed: int, duration: float) -> Run:
-    """A run of two seconds that swings in the second one."""
-    generator = np.random.default_rng(seed)
-    when = np.arange(20_000) * 1e-4
-    speed = 1 + 0.01 * generator.normal(size=(20_000, len(JOINTS)))
-    speed[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * when[10_000:, None])
-    speed = speed.astype(np.float32)
-    return Run(
-        time=when,
-        joint_names=JOINTS,
-        velocity=speed,
-        position=speed,
-        velocity_desired=np.ones_like(speed),
-        robot="panda",
-        blocks=(Block(0.0, 1.0, "ok"), Block(1.0, 2.0, "oscillations")),
-        meta={"scenario": scenario, "seed": seed, "duration": duration, "events": []},
-    )
+    return nothing(monkeypatch)
 
 
 def many(*arguments):
@@ -93,12 +57,12 @@ def test_one_run_is_made_by_name_or_number(simulated, tmp_path, command, scenari
     )
     assert (status, err) == (0, "")
     assert "oscillations from 1.00 s to 2.00 s" in out
-    assert simulated.calls == [("panda", "obstacle-toe", 3)]
+    assert simulated.calls == [Task("panda", "obstacle-toe", 3)]
     assert Run.load(output).meta["seed"] == 3
 
 
 def test_a_data_set_is_made_once_and_its_statistics_are_printed(simulated, tmp_path):
-    simulated.falls.add(("obstacle-toe", 5))
+    simulated.falls.add(Task("panda", "obstacle-toe", 5))
     call = many("--seeds", 2, "--first-seed", 4, "--scenarios", "1,7", "-o", tmp_path)
     status, out, err = inspector(*call)
     assert (status, err) == (0, "")
@@ -176,7 +140,7 @@ def test_a_model_is_trained_on_a_folder_of_runs_and_one_without_a_block_is_skipp
 
 
 def test_a_data_set_keeps_the_signals_of_its_runs_at_its_rate(simulated, tmp_path):
-    run = stub("panda", "straight", 0, 7.0)
+    run = stub("panda", "straight", 0)
     for rate in (10_000, 1000):
         data = tmp_path / str(rate)
         inspector(*many("--seeds", 1, "--scenarios", "1", "--rate", rate, "-o", data))
@@ -187,28 +151,3 @@ def test_a_data_set_keeps_the_signals_of_its_runs_at_its_rate(simulated, tmp_pat
         assert kept.rate == pytest.approx(rate)
         ((recording, _),) = classified([data], rate)
         assert recording.name == "panda/straight-000"
-
-
-@pytest.mark.slow
-def test_a_data_set_that_is_killed_resumes(tmp_path):
-    data = tmp_path / "data"
-    call = [
-        *(sys.executable, "-m", "inspector"),
-        *many("--seeds", "1", "--scenarios", "1,2,7,8", "--duration", "3"),
-        *("-j", "2", "-o", str(data), "--json"),
-    ]
-    settings = {"cwd": ROOT, "env": {**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'models'}"}}
-    killed = subprocess.Popen(call, start_new_session=True, **settings)
-    while killed.poll() is None and not list(data.glob("panda/*.npz")):
-        time.sleep(0.05)
-    os.killpg(killed.pid, signal.SIGKILL)
-    killed.wait()
-    there = {path: path.stat().st_mtime_ns for path in data.glob("panda/*.npz")}
-    assert 1 <= len(there) <= 4
-    assert all(Run.load(path) for path in there)
-    done = subprocess.run(call, capture_output=True, check=True, **settings)
-    upright = json.loads(done.stdout)["upright"]["panda"]
-    assert all(runs == {"upright": 1, "runs": 1} for runs in upright.values())
-    assert len(upright) == 4
-    assert {path: path.stat().st_mtime_ns for path in there} == there
-    assert len([path for path in data.glob("panda/*") if not path.name.startswith(".")]) == 4

@@ -10,7 +10,7 @@ from noiseclassifier.scenarios import simulation
 from noiseclassifier.scenarios.domains import LIMITS, quadruped_motion, steady
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import no_defect
-from noiseclassifier.scenarios.motions import RATE, SimulationError, Trot
+from noiseclassifier.scenarios.motions import RATE, Trot
 from noiseclassifier.scenarios.quadruped import SHIFT, TILT, poses, stand
 from noiseclassifier.scenarios.quadruped import plan as planned
 from noiseclassifier.scenarios.robots import WIDE
@@ -37,24 +37,6 @@ def run(robot, motion, seed=1, duration=3.0):
 def upright(trial):
     _, x, y, _ = trial.motion.base_pose[:, 3:].T
     return 2 * np.hypot(x, y).max() < 0.2
-
-
-def touchdowns(trial, robot):
-    """Downward speed of each foot 2 ms before it touches the ground after a swing, in [m/s]."""
-    motion, model = trial.motion, reduced_model(robot)
-    data, axes, out = model.createData(), pin.LOCAL_WORLD_ALIGNED, []
-    for foot, touching in zip(robot.effectors, motion.contact.T > 0, strict=True):
-        frame = model.getFrameId(foot.frame)
-        for sample in np.flatnonzero(np.diff(np.flatnonzero(touching)) > 500):
-            before = np.flatnonzero(touching)[sample + 1] - 20
-            pose, velocity = motion.base_pose[before], motion.base_velocity[before]
-            quaternion = pose[[4, 5, 6, 3]]
-            turn = pin.Quaternion(quaternion).toRotationMatrix()
-            q = np.concatenate((pose[:3], quaternion, motion.position[before]))
-            v = np.concatenate((turn.T @ velocity[:3], velocity[3:], motion.velocity[before]))
-            pin.forwardKinematics(model, data, q, v)
-            out.append(-pin.getFrameVelocity(model, data, frame, axes).linear[2])
-    return out
 
 
 @pytest.mark.parametrize("robot", SIMILAR, ids=lambda robot: robot.name)
@@ -88,9 +70,6 @@ def test_a_target_robot_walks_upright_and_where_it_is_planned(robot, gait):
     way_of = planned(robot, motion, rng, 3.0)
     way = trial.motion.base_pose[::10, :2] - trial.motion.base_pose[0, :2]
     assert np.abs(way - way_of.centre[:, :2]).max() < 0.12 * way_of.size
-    speeds = touchdowns(trial, robot)
-    assert len(speeds) >= 4
-    assert max(speeds) < 1.5  # m/s; a foot that falls from its lift lands at 1 m/s
 
 
 @pytest.mark.slow
@@ -204,15 +183,3 @@ def test_go2_trots_on_the_softest_drives(monkeypatch):
     assert upright(trial)
     error = trial.motion.velocity - trial.motion.velocity_desired
     assert 0.5 < np.sqrt((error**2).mean()) < 4
-
-
-@pytest.mark.slow
-def test_four_of_five_quadrupeds_stay_upright_on_the_softest_drives(monkeypatch):
-    monkeypatch.setattr(simulation, "Drives", Soft)
-    fallen = []
-    for robot, gait in zip(QUADRUPEDS, cycle(("trot", "walk")), strict=False):
-        try:
-            run(robot, steady(Trot(gait=gait)), duration=2.0)
-        except SimulationError as error:
-            fallen.append((robot.name, gait, str(error)))
-    assert len(fallen) <= 0.2 * len(QUADRUPEDS), fallen

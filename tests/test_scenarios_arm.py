@@ -16,10 +16,7 @@ from noiseclassifier.scenarios.motions import (
     JointStop,
     Payload,
     Picks,
-    Push,
     Reach,
-    bump,
-    minimum_jerk,
 )
 from noiseclassifier.scenarios.robots import WIDE, Arm
 from noiseclassifier.scenarios.simulation import FAULTS, ON_DRIVES, Start, Trial, _trial, suited
@@ -53,14 +50,6 @@ def trial(arm: str, motion: Picks | Reach, defect: Defect = no_defect) -> Trial:
     return _trial(Start(arm, 1, motion), defect, 2.0)
 
 
-def test_paths_start_and_end_at_rest_and_a_bend_returns():
-    share = np.linspace(0, 1, 1001)
-    assert minimum_jerk(share)[[0, -1]] == pytest.approx([0, 1])
-    assert bump(share)[[0, 500, -1]] == pytest.approx([0, 1, 0])
-    for path in (minimum_jerk, bump):
-        assert np.diff(path(share))[[0, -1]] == pytest.approx(0, abs=2e-5)
-
-
 @pytest.mark.parametrize("way", WAYS)
 def test_picks_never_jump(way):
     for seed in range(5):
@@ -92,14 +81,6 @@ def test_short_picks_are_the_beginning_of_long_ones_and_press_for_half_a_second(
     assert all(pick(seed, 3.0).contacts[0].start <= 2.5 for seed in range(200))
 
 
-def test_a_plan_that_begins_later_rests_before():
-    one = pick(3, 3.0)
-    later = one.after(100)
-    assert later.duration == pytest.approx(one.duration + 0.1)
-    np.testing.assert_array_equal(later.places[:101], np.tile(one.places[0], (101, 1, 1)))
-    assert later.contacts[0].start == pytest.approx(one.contacts[0].start + 0.1)
-
-
 def test_on_the_spot_all_contacts_are_at_one_place_and_in_all_directions_there_are_none():
     assert len({contact.place for contact in pick(4, 12.0, "spot").contacts}) == 1
     assert len({contact.place for contact in pick(4, 12.0).contacts}) > 1
@@ -123,14 +104,6 @@ def test_a_plan_stays_within_limits_and_speed(arm, kind):
 def test_a_smooth_plan_has_no_jump_of_its_velocity(kind):
     joints = reach(kind=kind, acceleration=8.0).joints
     assert np.abs(np.diff(joints, 2, axis=0)).max() / TICK**2 < 12.0
-
-
-def test_a_trapezoid_jumps_from_no_acceleration_to_a_constant_one():
-    acceleration = np.diff(reach(kind="trapezoid").joints[:, :], 2, axis=0) / TICK**2
-    fastest = np.abs(acceleration).max(axis=1)
-    assert np.mean(fastest < 1e-6) > 0.3  # constant speed, or at rest
-    changes = np.flatnonzero(np.abs(np.diff(fastest)) > 0.05)
-    assert 4 <= len(changes) < 60
 
 
 def test_a_short_plan_is_the_beginning_of_a_long_one():
@@ -272,18 +245,6 @@ def test_pushes_are_drawn_while_the_tool_stands_or_is_slow():
         ]
 
 
-def test_a_push_begins_and_ends_when_it_says():
-    still = Reach(speed=(0.001, 0.001), spread=0.001)
-    push = Push(along=1.0, start=0.4, stop=1.2, rise=0.2, fall=0.3, force=(0.0, 20.0, 0.0))
-    bare = trial("panda", still).motion.torque
-    held = trial("panda", still, given(push)).motion.torque
-    first, last = round(push.start * 10_000), round(push.stop * 10_000)
-    np.testing.assert_array_equal(held[:first], bare[:first])
-    change = np.abs(held - bare).max(axis=1)
-    assert change[first + 2000 : last - 3000].min() > 3.0
-    assert change[-3000:].max() < 2 * 1.5 * max(PANDA.drives.friction)
-
-
 def test_an_arm_stands_for_as_long_as_it_says():
     one = reach(stand=2.0, duration=4.0)
     moves = np.flatnonzero(np.abs(one.joints - one.joints[0]).max(axis=1) > 1e-9)
@@ -291,13 +252,6 @@ def test_an_arm_stands_for_as_long_as_it_says():
     drawn = [arm_motion(RNG(seed), 0.5, PANDA) for seed in range(300)]
     stands = [one.stand > 1.0 for one in drawn if isinstance(one, Reach)]
     assert np.mean(stands) == pytest.approx(0.3, abs=0.08)
-
-
-def test_nothing_is_drawn_for_an_arm_that_stands():
-    still = reach(speed=(0.001, 0.001), spread=0.001)
-    for name in ("collision-hard", "joint-stop", "obstacle"):
-        found = OWN[name](RNG(0), still)
-        assert (found.loads, found.boxes, found.events) == ((), (), ())
 
 
 def test_wild_motions_are_faster_than_mild_ones_and_one_third_are_picks():
@@ -314,12 +268,3 @@ def test_wild_motions_are_faster_than_mild_ones_and_one_third_are_picks():
     assert np.mean([isinstance(one, Picks) for one in drawn[1]]) == pytest.approx(0.35, abs=0.08)
     assert {one.kind for one in drawn[1] if isinstance(one, Reach)} == set(KINDS)
     assert not any(isinstance(arm_motion(RNG(seed), 1.0, SO101), Picks) for seed in range(30))
-
-
-def test_a_scaled_arm_has_all_lengths_scaled():
-    large = PANDA.scaled(1.1)
-    assert large.tool.length == pytest.approx(1.1 * PANDA.tool.length)
-    assert large.table == pytest.approx(1.1 * PANDA.table)
-    assert large.reach[0][1] == pytest.approx(1.1 * PANDA.reach[0][1])
-    assert large.length_scale == 1.1
-    assert PANDA.scaled(1.0) == PANDA

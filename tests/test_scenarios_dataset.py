@@ -6,10 +6,10 @@ import sys
 from dataclasses import replace
 from itertools import islice
 
-import numpy as np
 import pytest
 import workers
 from numpy.lib import format as npy
+from simulated import nothing, stub
 
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
@@ -23,43 +23,14 @@ from noiseclassifier.scenarios.dataset import (
     statistics,
 )
 from noiseclassifier.scenarios.simulation import RECIPE
-from noisemodel import Block, Run, parallel
+from noisemodel import Run, parallel
 
 ALL = scenario_tasks(["panda", "ur5"], ["1", "2", "7"], seeds=2)
 
 
 @pytest.fixture
 def simulated(monkeypatch):
-    """Replace the simulation; `calls` lists its calls, `falls` has the runs that fall."""
-    calls, falls = [], set()
-
-    def simulate(robot, scenario, seed, *, duration=None):
-        task = Task(robot, scenario, seed)
-        calls.append(task)
-        if task in falls:
-            raise scenarios.SimulationError(1.25, "it fell")
-        return stub(task, duration or 7.0)
-
-    simulate.calls, simulate.falls = calls, falls
-    monkeypatch.setattr(dataset, "simulate", simulate)
-    return simulate
-
-
-def stub(task: Task, duration: float) -> Run:
-    """A random run of one second."""
-    generator = np.random.default_rng(task.seed)
-    joints = scenarios.ROBOTS[task.robot].drives.joints
-    signal = generator.normal(size=(10_000, len(joints))).astype(np.float32)
-    return Run(
-        time=np.arange(10_000) * 1e-4,
-        joint_names=joints,
-        velocity=signal,
-        position=signal,
-        velocity_desired=signal,
-        robot=task.robot,
-        blocks=(Block(0.0, 0.5, "ok"), Block(0.6, 0.7, "impact")),
-        meta={"scenario": task.scenario, "seed": task.seed, "duration": duration},
-    )
+    return nothing(monkeypatch)
 
 
 def files(path) -> set[str]:
@@ -142,18 +113,18 @@ def test_a_run_that_fell_is_recorded_and_not_simulated_again(simulated, tmp_path
     found = json.loads(json.dumps(statistics(place)))
     assert found["upright"]["panda"]["obstacle-toe"] == {"upright": 1, "runs": 2}
     assert found["upright"]["ur5"]["obstacle-toe"] == {"upright": 2, "runs": 2}
-    assert found["classes"]["ur5"]["ok"] == {"blocks": 6, "seconds": 3.0}
-    assert found["motion"] == pytest.approx(11.0, abs=0.01)
+    assert found["classes"]["ur5"]["ok"] == {"blocks": 6, "seconds": 6.0}
+    assert found["motion"] == pytest.approx(22.0, abs=0.01)
     assert found["bytes"] == sum((tmp_path / name).stat().st_size for name in files(tmp_path))
     text = described(found)
-    assert text.startswith("12 runs, 1 of which fell and are left out; 0.00 h of motion, ")
+    assert text.startswith("12 runs, 1 of which fell and are left out; 0.01 h of motion, ")
     assert [line.split() for line in text.splitlines() if line.startswith(("panda", "ur5"))] == [
         ["panda", "5/6", "obstacle-toe", "(1)"],
         ["ur5", "6/6", "none"],
-        ["panda", "ok", "5", "2.5", "83.3%"],
-        ["panda", "impact", "5", "0.5", "16.7%"],
-        ["ur5", "ok", "6", "3.0", "83.3%"],
-        ["ur5", "impact", "6", "0.6", "16.7%"],
+        ["panda", "ok", "5", "5.0", "50.0%"],
+        ["panda", "oscillations", "5", "5.0", "50.0%"],
+        ["ur5", "ok", "6", "6.0", "50.0%"],
+        ["ur5", "oscillations", "6", "6.0", "50.0%"],
     ]
 
 
@@ -253,7 +224,7 @@ def test_a_run_that_kills_its_worker_is_named_and_all_others_are_made(tmp_path, 
     monkeypatch.setattr(
         dataset,
         "simulate",
-        lambda *task, duration: workers.die() if Task(*task) == deadly else stub(Task(*task), 7.0),
+        lambda *task, duration: workers.die() if Task(*task) == deadly else stub(*task),
     )
     made = []
     with pytest.raises(

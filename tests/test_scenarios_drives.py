@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from noiseclassifier.scenarios.arm import PickPlan, Tool, ToolControl
@@ -13,7 +12,6 @@ from noiseclassifier.scenarios.faults import NO_DRIVE_FAULT, DriveFault, Imperfe
 from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, Event, Plan
 from noiseclassifier.scenarios.robots import WIDE, Arm, Drivetrain
 from noiseclassifier.scenarios.simulation import ON_DRIVES
-from noiseclassifier.scenarios.world import real_model
 
 PANDA = WIDE["panda"]
 TWO = Drivetrain(
@@ -106,15 +104,6 @@ def test_torque_arrives_after_the_delay_and_within_the_limit():
     assert torques == [0, 0, 0, 20, 20]
 
 
-def test_a_robot_has_the_mass_of_its_imperfections():
-    model = pin.buildSampleModelManipulator()
-    scales = tuple(np.linspace(0.9, 1.1, model.nv))
-    like = replace(PERFECT, mass=scales, payload=0.2)
-    real = real_model(model, model.frames[-1].name, np.zeros(3), like)
-    masses = [model.inertias[i + 1].mass * scale for i, scale in enumerate(scales)]
-    assert pin.computeTotalMass(real) == pytest.approx(sum(masses) + 0.2)
-
-
 def tool_follows(path, force):
     """Positions of the tip, tick by tick, of a tool that follows a path and presses."""
     ticks, tool = len(path), Tool(PANDA)
@@ -190,21 +179,6 @@ def test_faults_begin_and_end_within_the_run(name):
     for seed in range(30):
         event = fault_of(name, seed, 6.0).event
         assert 0.5 < event.start < event.stop <= 6.02
-
-
-@pytest.fixture(scope="module")
-def good():
-    return followed(drives(), 3.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ON_DRIVES)
-def test_drives_are_nominal_until_the_fault_begins(name, good):
-    fault = fault_of(name)
-    first = round(fault.event.start * RATE)
-    faulty = followed(drives(fault=fault), min(round(fault.event.start + 0.5, 2), 3.0))
-    np.testing.assert_array_equal(good[:first], faulty[:first])
-    assert np.abs(good[: len(faulty)] - faulty).max() > 0 or name == "latency"
 
 
 def test_a_dropout_leaves_no_torque():

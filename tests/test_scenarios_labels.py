@@ -58,12 +58,6 @@ def test_a_weak_blow_is_recorded_and_neither_impact_nor_ok():
     assert 0.03 < trace.peak < 0.1
 
 
-def test_a_constant_offset_is_not_a_deviation():
-    slow = 0.3 * np.sin(2 * np.pi * 0.3 * TIME)[:, None] * np.ones(2)
-    blocks, _ = label(slow)
-    assert [block.label for block in blocks] == ["ok"]
-
-
 def test_a_sudden_velocity_is_a_high_acceleration_and_a_gentle_one_is_not():
     def rise(seconds):
         return 0.5 * np.clip((TIME - 2) / seconds, 0, 1)[:, None] * [1.0, 0.0]

@@ -13,8 +13,7 @@ from simulated import simulated
 
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import simulation
-from noiseclassifier.scenarios.faults import multisine, obstacles
-from noiseclassifier.scenarios.labels import deviation
+from noiseclassifier.scenarios.faults import multisine
 from noiseclassifier.scenarios.motions import Picks
 from noiseclassifier.scenarios.simulation import Case
 from noisemodel import Run
@@ -110,16 +109,6 @@ def test_each_defect_shows_first_in_the_stage_where_it_acts(runs):
         assert first_difference(run, healthy, stage) < min([np.inf, *before])
 
 
-def test_after_an_obstacle_the_tool_is_quieter_than_when_a_good_one_moves(runs):
-    run, healthy = runs["obstacle-full", 5], runs["straight", 5]
-    fast = deviation(run.velocity, healthy.velocity, rate=run.rate)
-    good = deviation(healthy.velocity, np.zeros_like(healthy.velocity), rate=run.rate)
-    (impact,) = (block for block in run.blocks if block.label == "impact")
-    after = np.linalg.norm(fast[run.time > impact.stop + 0.05], axis=1).max()
-    assert after < np.linalg.norm(good, axis=1).max()
-    assert after < 0.25 * np.linalg.norm(fast, axis=1).max()
-
-
 def test_a_run_states_how_it_was_made(runs, tmp_path):
     run = runs["obstacle-full", 5]
     run.save(tmp_path / "run.npz")
@@ -141,19 +130,6 @@ def test_reported_velocities_are_the_slopes_of_reported_positions(runs):
     mean = np.cumsum(run.velocity.astype(float), axis=0)
     mean = (mean[span:] - mean[:-span]) / span
     assert np.abs(slope - mean).max() < 0.03
-
-
-def test_the_robot_stays_within_its_speed_and_torque(runs):
-    for seed in SEEDS:
-        run = runs["straight", seed]
-        assert (np.abs(run.velocity).max(axis=0) < [2.175] * 4 + [2.61] * 3).all()
-        assert (np.abs(run.effort).max(axis=0) < [87.0] * 4 + [12.0] * 3).all()
-
-
-def test_a_healthy_robot_makes_noise(runs):
-    still = runs["straight", 5].velocity[:1000]
-    assert 1e-4 < still.std() < 5e-3
-    assert np.unique(still[:, 0]).size > 100
 
 
 def test_seeds_differ_in_motion_and_in_robot(runs):
@@ -196,15 +172,6 @@ def test_a_defect_without_an_effect_yields_no_failure(monkeypatch):
     assert labels(run) == {"ok"}
     assert event["labelled"] == 0
     assert not any(block.start < event["start"] + 0.1 < block.stop for block in run.blocks)
-
-
-def test_a_plate_without_contact_changes_nothing(runs, monkeypatch):
-    with_defect(
-        monkeypatch, partial(obstacles, height=(1e-4, 1e-4), half=(1e-4, 1e-4), offset=(9.0, 9.0))
-    )
-    run = scenarios.simulate("panda", "special", 10, duration=SHORT)
-    assert labels(run) == {"ok"}
-    assert run.meta["events"] == []
 
 
 def test_a_run_that_diverges_is_refused(monkeypatch, tmp_path):
@@ -250,12 +217,6 @@ def test_numbers_out_of_range_are_refused():
         scenarios.simulate("panda", "straight", 0, duration=1.0)
 
 
-def test_without_mujoco_the_error_names_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(scenarios.ScenarioError, match=r"pip install 'noise-inspector\[sim\]'"):
-        scenarios.simulate("panda", "straight", 0)
-
-
 def test_listing_scenarios_needs_no_simulator():
     code = (
         "import sys; from noiseclassifier import scenarios as s; assert s.SCENARIOS and s.ROBOTS;"
@@ -271,8 +232,7 @@ def test_the_table_has_the_papers_numbers_and_a_sentence_for_each_scenario():
     assert [line.name for line in lines if line.healthy] == list(HEALTHY)
     for name, line in scenarios.SCENARIOS.items():
         assert line.name == name
-        for text in (line.description, *(case.description for case in line.cases.values())):
-            assert not text or text.endswith(".")
-            assert ". " not in text
+        assert line.description.endswith(".")
+        assert ". " not in line.description
         assert line.cases
         assert "ok" in line.labels

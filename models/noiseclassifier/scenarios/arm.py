@@ -19,6 +19,7 @@ from noiseclassifier.scenarios.motions import (
     Picks,
     Plan,
     Reach,
+    Rng,
     ScenarioError,
     Tip,
     Units,
@@ -143,9 +144,10 @@ class Ability:
 
 Movement: TypeAlias = Callable[[float], Array]
 """From a duration, in [s], to positions at its ticks, shape (ticks, joints), in [rad]."""
+Made: TypeAlias = tuple[Movement, float]  # with its highest speed times its duration, in [rad]
 
 
-def reach(arm: Arm, motion: Reach, rng: np.random.Generator, duration: float) -> ReachPlan:
+def reach(arm: Arm, motion: Reach, rng: Rng, duration: float) -> ReachPlan:
     """Plan of movements, one after the other."""
     ability = Ability.of(arm)
     moving, stopping, loading = rng.spawn(3)
@@ -168,7 +170,7 @@ def reach(arm: Arm, motion: Reach, rng: np.random.Generator, duration: float) ->
     )
 
 
-def _movement(motion: Reach, rng: np.random.Generator, ability: Ability, start: Array) -> Array:
+def _movement(motion: Reach, rng: Rng, ability: Ability, start: Array) -> Array:
     """A movement at the drawn speed, or as fast as the drives can follow."""
     speed = float(np.exp(rng.uniform(np.log(motion.speed[0]), np.log(motion.speed[1]))))
     movement, extent = KINDS[motion.kind](motion, rng, ability, start)
@@ -183,16 +185,14 @@ def _movement(motion: Reach, rng: np.random.Generator, ability: Ability, start: 
     raise ScenarioError("no drive is strong enough for the motion, however slow it is")
 
 
-def _goal(motion: Reach, rng: np.random.Generator, ability: Ability) -> Array:
+def _goal(motion: Reach, rng: Rng, ability: Ability) -> Array:
     """Positions around those at rest, within limits; some joints stay there."""
     count = len(ability.rest)
     away = rng.uniform(-motion.spread, motion.spread, count) * (rng.uniform(size=count) < 0.8)
     return np.asarray(np.clip(ability.rest + away, ability.low, ability.high))
 
 
-def _straight(
-    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
-) -> tuple[Movement, float]:
+def _straight(motion: Reach, rng: Rng, ability: Ability, start: Array) -> Made:
     goal = _goal(motion, rng, ability)
 
     def movement(duration: float) -> Array:
@@ -202,9 +202,7 @@ def _straight(
     return movement, 1.875 * float(np.abs(goal - start).max())
 
 
-def _trapezoid(
-    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
-) -> tuple[Movement, float]:
+def _trapezoid(motion: Reach, rng: Rng, ability: Ability, start: Array) -> Made:
     """Constant acceleration, speed, and deceleration: jerk is not finite."""
     goal, ramp = _goal(motion, rng, ability), float(rng.uniform(0.1, 0.4))
 
@@ -219,9 +217,7 @@ def _trapezoid(
     return movement, float(np.abs(goal - start).max()) / (1 - ramp)
 
 
-def _spline(
-    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
-) -> tuple[Movement, float]:
+def _spline(motion: Reach, rng: Rng, ability: Ability, start: Array) -> Made:
     """Through way points without a stop."""
     points = np.array([start, *(_goal(motion, rng, ability) for _ in range(rng.integers(3, 6)))])
     lengths = np.abs(np.diff(points, axis=0)).max(axis=1) + 0.05
@@ -238,9 +234,7 @@ def _spline(
     return movement, float(np.abs(path(np.linspace(0, 1, 500), 1)).max())
 
 
-def _sines(
-    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
-) -> tuple[Movement, float]:
+def _sines(motion: Reach, rng: Rng, ability: Ability, start: Array) -> Made:
     """Sums of sines, faded in and out; slower ones are larger."""
     count = len(start)
     rates = 2 * np.pi * np.exp(rng.uniform(np.log(SINES[0]), np.log(SINES[1]), (3, count)))
@@ -257,9 +251,7 @@ def _sines(
     return movement, seconds * float((sizes * rates).sum(axis=0).max()) * 0.7
 
 
-def _teleoperated(
-    motion: Reach, rng: np.random.Generator, ability: Ability, start: Array
-) -> tuple[Movement, float]:
+def _teleoperated(motion: Reach, rng: Rng, ability: Ability, start: Array) -> Made:
     """A hand that wanders and hesitates, sent at a low rate and interpolated linearly."""
     count = len(start)
     seconds, rate = float(rng.uniform(2.0, 5.0)), float(rng.uniform(*SENDING))
@@ -305,15 +297,13 @@ def _bounded(path: Array, start: Array, ability: Ability) -> Array:
     return np.asarray(start + away / np.maximum(excess, 1.0))
 
 
-def _wander(rng: np.random.Generator, shape: tuple[int, int], deviation: float) -> Array:
+def _wander(rng: Rng, shape: tuple[int, int], deviation: float) -> Array:
     """Low-passed white noise of about unit amplitude; deviation of the filter in ticks."""
     smooth = gaussian_filter1d(rng.normal(size=shape), deviation, axis=0, mode="wrap")
     return np.asarray(smooth * np.sqrt(2 * np.sqrt(np.pi) * deviation))
 
 
-def _stopped(
-    motion: Reach, rng: np.random.Generator, joints: Array, ticks: int
-) -> tuple[Array, tuple[float, ...]]:
+def _stopped(motion: Reach, rng: Rng, joints: Array, ticks: int) -> tuple[Array, tuple[float, ...]]:
     """The plan with emergency stops: its pace drops to 0 and comes back."""
     pace, stops, now = np.ones(ticks), [], 0.0
     while motion.stops:
@@ -333,7 +323,7 @@ def _stopped(
 
 
 def _payloads(
-    motion: Reach, rng: np.random.Generator, tool: Tip, units: Units, duration: float
+    motion: Reach, rng: Rng, tool: Tip, units: Units, duration: float
 ) -> tuple[Payload, ...]:
     """What the tool carries from time to time."""
     payloads, now = [], float(rng.uniform(*CARRYING))
@@ -403,7 +393,7 @@ class Segment:
     bend: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def pick(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> PickPlan:
+def pick(arm: Arm, motion: Picks, rng: Rng, duration: float) -> PickPlan:
     """Plan of picks, one after the other."""
     table, area = arm.table, arm.reach
     x, y, z = Tool(arm).place(np.array(arm.rest)).tolist()
@@ -439,14 +429,12 @@ def pick(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> 
     )
 
 
-def _place(rng: np.random.Generator, area: Any) -> tuple[float, float]:
+def _place(rng: Rng, area: Any) -> tuple[float, float]:
     """A place in ranges of x and y."""
     return float(rng.uniform(*area[0])), float(rng.uniform(*area[1]))
 
 
-def _one_pick(
-    motion: Picks, rng: np.random.Generator, table: float, place: tuple[float, float]
-) -> list[Segment]:
+def _one_pick(motion: Picks, rng: Rng, table: float, place: tuple[float, float]) -> list[Segment]:
     x, y = place
     above = table + float(rng.uniform(0.1, 0.2))
     yaw = float(rng.uniform(-0.5, 0.5))
@@ -465,7 +453,7 @@ def _one_pick(
     ]
 
 
-def _one_flight(rng: np.random.Generator, table: float, area: Any) -> list[Segment]:
+def _one_flight(rng: Rng, table: float, area: Any) -> list[Segment]:
     """A movement over the table in any direction."""
     position = (*_place(rng, area), table + float(rng.uniform(0.05, 0.3)))
     pause = Segment(float(rng.uniform(0.02, 0.3)), position, 0.0)
@@ -538,7 +526,10 @@ class ToolControl:
         desired = self._plan.force[number]
         if np.isnan(desired):
             self._pressing = 0
-            self._offset = self._left * self._plan.keep[number] or self._guarded(number)
+            # A tool that descends yields to an unplanned contact.
+            yielding = self._offset + TICK * float(self._gain[number]) * (self._force - GUARD)
+            guarded = min(max(yielding, 0.0), FURTHEST)
+            self._offset = self._left * self._plan.keep[number] or guarded
             return self._offset
         if not self._pressing:
             self._excess = self._force if self._force > TOUCHING else 0.0
@@ -550,16 +541,8 @@ class ToolControl:
         self._offset = self._left = min(max(self._offset + rise, -FURTHEST), FURTHEST)
         return self._offset
 
-    def _guarded(self, number: int) -> float:
-        """Height offset of a tool that descends: it yields to an unplanned contact, in [m]."""
-        rise = TICK * float(self._gain[number]) * (self._force - GUARD)
-        return min(max(self._offset + rise, 0.0), FURTHEST)
-
     def _solve(self, tip: Array, yaw: float) -> tuple[Array, Array]:
-        """Joints after a Newton step towards a pose of the tool, and the inverse Jacobian.
-
-        One step per tick is enough: the tool moves by a millimetre in that time.
-        """
+        """Joints after a Newton step (the tool moves by a millimetre), and the inverse Jacobian."""
         joints = self._joints[-1]
         place, lever, rotation, jacobian = self._tool.jacobian(joints)
         turn = rotation.T @ pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ self._upright
@@ -574,7 +557,7 @@ SETTLING = 300
 """Ticks before the recording during which the arm comes to rest under its unknown load."""
 
 
-def plan(arm: Arm, motion: Picks | Reach, rng: np.random.Generator, duration: float) -> Plan:
+def plan(arm: Arm, motion: Picks | Reach, rng: Rng, duration: float) -> Plan:
     """Plan of the motion of one run."""
     if isinstance(motion, Reach):
         return reach(arm, motion, rng, duration)

@@ -259,7 +259,9 @@ def make(folder: Folder, tasks: Sequence[Task], *, jobs: Jobs = 1) -> Iterator[T
     dead: list[Task] = []
     while groups:
         rest = []
-        for place, alive in as_done(partial(_make, folder), groups, jobs=jobs, died=_died):
+        for place, alive in as_done(
+            partial(_make, folder), groups, jobs=jobs, died=lambda _: False
+        ):
             left = folder.missing(groups[place])
             yield from (task for task in groups[place] if task not in left)
             if not alive:  # the first one that is missing killed the worker
@@ -292,10 +294,6 @@ def _make(folder: Folder, group: Sequence[Task]) -> bool:
     return True
 
 
-def _died(_: Sequence[Task]) -> bool:
-    return False
-
-
 def write_logs(
     folder: Folder,
     output: Path,
@@ -304,11 +302,7 @@ def write_logs(
     rate: float | None = None,
     side: Side = "all",
 ) -> Iterator[tuple[str, Run]]:
-    """Write logs of the runs of wide domains, each by its name, ``<robot>/<fault>[.copy]-<seed>``.
-
-    Yields:
-        Each log, with its name.
-    """
+    """Write logs of wide domains, each by name: ``<robot>/<fault>[.copy]-<seed>``."""
     kept = set(folder.kept())
     if not kept:
         raise DatasetError(f"{folder.path}: holds no run; `inspector simulate domains` makes them")

@@ -12,6 +12,7 @@ from noiseclassifier.scenarios.motions import (
     Picks,
     Range,
     Reach,
+    Rng,
     Stand,
     Stroll,
     Trot,
@@ -83,7 +84,7 @@ class Domain:
         return {"name": f"mujoco-{self.control}", **asdict(self)}
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, limits: Limits) -> "Domain":
+    def draw(cls, rng: Rng, limits: Limits) -> "Domain":
         """Draw the domain of one run."""
         draw = _Draw(rng, float(rng.uniform()))
         control: Control = str(rng.choice(get_args(Control)))  # type: ignore[assignment]
@@ -149,9 +150,7 @@ class Logger:
         return self.bits <= TARGET_BITS or self.hold >= TARGET_HOLD
 
     @classmethod
-    def draw(
-        cls, rng: np.random.Generator, domain: Domain, *, most: float, rate: float | None = None
-    ) -> "Logger":
+    def draw(cls, rng: Rng, domain: Domain, *, most: float, rate: float | None = None) -> "Logger":
         """Draw the logger of a run with a highest rate, and with a given rate or any, in [Hz]."""
         draw = _Draw(rng, domain.wildness)
         drawn = float(rng.choice([each for each in RATES if each <= most * (1 + 1e-6)]))
@@ -183,7 +182,7 @@ class Logger:
 class _Draw:
     """Values of one run."""
 
-    def __init__(self, rng: np.random.Generator, wildness: float) -> None:
+    def __init__(self, rng: Rng, wildness: float) -> None:
         self._rng, self.wildness = rng, wildness
 
     def __call__(self, name: str) -> float:
@@ -241,9 +240,7 @@ def _mixed(span: Range, share: float) -> float:
     return span[0] + share * (span[1] - span[0])
 
 
-def arm_motion(
-    rng: np.random.Generator, wildness: float, arm: Any, *, soft: bool = False
-) -> Picks | Reach:
+def arm_motion(rng: Rng, wildness: float, arm: Any, *, soft: bool = False) -> Picks | Reach:
     """Motion of an arm."""
     picks, kind, way = rng.uniform(size=3).tolist()
     fast, hard, wide, stops, carries, pace, force = rng.uniform(size=7).tolist()
@@ -269,7 +266,7 @@ def arm_motion(
 
 
 def humanoid_motion(
-    rng: np.random.Generator, wildness: float, robot: Simulated, *, soft: bool = False
+    rng: Rng, wildness: float, robot: Simulated, *, soft: bool = False
 ) -> Stroll | Stand:
     """Motion of a humanoid."""
     upper = Gesture(
@@ -291,9 +288,7 @@ def humanoid_motion(
     return Stroll(walk=walk, stops=int(rng.integers(3)), pause=(0.8, 2.0), upper=upper)
 
 
-def quadruped_motion(
-    rng: np.random.Generator, wildness: float, robot: Simulated, *, soft: bool = False
-) -> Trot:
+def quadruped_motion(rng: Rng, wildness: float, robot: Simulated, *, soft: bool = False) -> Trot:
     """Motion of a quadruped."""
     gaits = _TABLE["gaits"]
     gait = str(rng.choice(list(gaits), p=[each["share"] for each in gaits.values()]))

@@ -6,7 +6,7 @@ import numpy as np
 
 from noiseclassifier.scenarios.domains import Domain
 from noiseclassifier.scenarios.faults import NO_DRIVE_FAULT, DriveFault, Imperfections
-from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, times
+from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, Rng, times
 from noiseclassifier.scenarios.robots import Drivetrain
 from noisemodel.types import Array
 
@@ -15,20 +15,14 @@ def tracking_gains(bandwidth: float, step: float) -> tuple[float, float]:
     """Gains of the critically damped alpha-beta filter that estimates velocities from an encoder.
 
     At 10 kHz, differences of encoder counts would mask every motion; servo drives track their
-    encoders instead. The filter predicts, and corrects position and velocity (the latter in [1/s])
-    by a share of the innovation; both poles lie at exp(-2 pi bandwidth step).
+    encoders instead, and correct by a share of the innovation; both poles lie at exp(-2 pi f step).
     """
     pole = float(np.exp(-2 * np.pi * bandwidth * step))
     return 1 - pole**2, (1 - pole) ** 2 / step
 
 
 class Drives:
-    """The drives of all joints, one sample after the other.
-
-    Args:
-        start: Joint positions at rest, shape (joints,), in [rad].
-        offset: Encoder error at rest, shape (joints,), in [rad].
-    """
+    """The drives of all joints, sample by sample, from positions and encoder errors at rest."""
 
     def __init__(
         self, start: Array, drivetrain: Drivetrain, offset: Array, imperfections: Imperfections
@@ -37,7 +31,7 @@ class Drives:
         self._damping = np.array(drivetrain.damping) * imperfections.damping
         self._limit = np.array(drivetrain.torque)
         self._least = -self._limit
-        self._count = imperfections.encoder_step
+        self._count = float(2 * np.pi / 2**imperfections.encoder_bits)
         self._alpha, self._beta = tracking_gains(imperfections.encoder_bandwidth, STEP)
         self._tracked, self._velocity = start + offset, np.zeros_like(start)
         self._waiting: deque[Array] = deque(
@@ -60,11 +54,7 @@ class Drives:
     def torque(
         self, position: Array, velocity: Array, desired: Array, rate: Array, feedforward: Array
     ) -> Array:
-        """Torques that act now, after the delay, in [N m].
-
-        Demanded now are those of the model, of the positions that are read and desired, and of the
-        velocities that are reported and desired.
-        """
+        """Torques that act now, after the delay: of the model, and by positions and velocities."""
         demanded = feedforward + self._stiffness * (desired - position)
         demanded += self._damping * (rate - velocity)
         return self._delayed(demanded)
@@ -88,14 +78,11 @@ ORDERS = (1, 2)  # orders of the ripple, as multiples of the gear ratio
 
 
 class DomainDrives(Drives):
-    """The drives of all joints in a wide domain, one sample after the other.
+    """The drives of all joints in a wide domain, with so many ticks before the recording.
 
     An elastic gear is a spring with free play between rotor and joint (Spong 1987), whose
     transmission error is locked to the rotor's angle, so that it shakes the joint at the orders
     of the gear. Friction beyond Coulomb's is Stribeck's (Armstrong-Helouvry et al. 1994).
-
-    Args:
-        settling: Ticks before the recording.
     """
 
     def __init__(
@@ -108,7 +95,7 @@ class DomainDrives(Drives):
         domain: Domain,
         fault: DriveFault = NO_DRIVE_FAULT,
         settling: int,
-        rng: np.random.Generator,
+        rng: Rng,
     ) -> None:
         super().__init__(start, drivetrain, offset, imperfections)
         joints, limit = len(start), self._limit

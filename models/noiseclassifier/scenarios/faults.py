@@ -1,7 +1,8 @@
 """Faults: what a seed draws for one run, from a plan and the settings in table.toml.
 
 Each function that returns `Faults` draws one kind of fault from random numbers, the plan of the
-run, and keywords: its settings.
+run, and keywords: its settings, in the units that table.toml states. Forces and stiffnesses of
+loads are multiplied by the robot's units.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,6 +26,7 @@ from noiseclassifier.scenarios.motions import (
     Plan,
     Push,
     Range,
+    Rng,
     Signal,
     minimum_jerk,
 )
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
     from noiseclassifier.scenarios.domains import Domain
 
 Integers: TypeAlias = NDArray[np.int64]
-Rng: TypeAlias = np.random.Generator
 Command: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
 """From times, shape (samples,), targets and rates, shape (samples, joints), to both."""
 
@@ -153,11 +154,6 @@ class Imperfections:
             torque_delay=round(domain.delay * RATE),
         )
 
-    @property
-    def encoder_step(self) -> float:
-        """Resolution of an encoder, in [rad]."""
-        return float(2 * np.pi / 2**self.encoder_bits)
-
 
 def _log_uniform(rng: Rng, span: Range, count: int) -> Array:
     return np.exp(rng.uniform(np.log(span[0]), np.log(span[1]), count))
@@ -231,15 +227,7 @@ def sensor_jumps(
     after: Sequence[Range] = ((0.35, 0.42), (0.52, 0.6)),
     share: float = 1.0,
 ) -> Faults:
-    """Jumps of the signal of a sensor during contacts.
-
-    Args:
-        size: Size of a jump, either way, in [N], [N m] or [rad].
-        sensor: One of each effector, or, with a dot in its name, one of the robot.
-        hold: Duration of a jump, in [s].
-        after: When the jumps of one contact begin, after its start, in [s].
-        share: Share of the contacts with jumps.
-    """
+    """Jumps of the signal of a sensor during contacts."""
     contacts = begun(plan)
     there = rng.uniform(size=len(contacts)) < share
     there[:1] = True
@@ -309,11 +297,8 @@ def multisine(
 ) -> Faults:
     """Oscillations of the height of an effector, or of all: one sine per hertz of a band.
 
-    Args:
-        bands: The bands to choose from, in [Hz].
-        amplitude: Of one sine of equal power, in [m].
-        fastest: Upper limit of the speed, which reduces the amplitude in high bands, in [m/s]: the
-            2 mm of the paper at 900 Hz would be 11 m/s, which no drive follows.
+    ``fastest`` limits their speed: the 2 mm of the paper at 900 Hz would be 11 m/s, which no drive
+    follows. ``amplitude`` is that of one sine of equal power.
     """
     low, high = bands[int(rng.integers(len(bands)))]
     frequencies = np.arange(low, high + 1.0)
@@ -356,11 +341,7 @@ def obstacles(
 ) -> Faults:
     """Boxes on the ground, unknown to the controller, where effectors touch down.
 
-    Args:
-        half: Half of their edge lengths along and across the effector, in [m].
-        offset: Of their middles, as shares of half of the effector.
-        share: Share of the contacts with a box.
-        most: Most boxes, none of them at the last contact.
+    They are offset by shares of half of the effector; of at most so many, none is the last.
     """
     places = begun(plan, effectors)
     if most is not None and len(places) > most:
@@ -397,12 +378,7 @@ def underfoot(
     share: float = 1.0,
     most: int | None = None,
 ) -> Faults:
-    """Boxes under feet, lower than the feet are lifted; none if no foot is lifted.
-
-    Args:
-        rise: Height of the boxes, as a share of the lift.
-        half: Half of their edge lengths, in the robot's unit of length.
-    """
+    """Boxes under feet, lower than the feet are lifted; none if no foot is lifted."""
     lift = float(np.ptp(plan.places[..., 2]))
     if not lift:
         return Faults()
@@ -412,12 +388,7 @@ def underfoot(
 
 
 def giving_way(rng: Rng, plan: Plan, *, depth: Range, half: Range, after: Range) -> Faults:
-    """Ground that gives way under an effector: it is lower, but for boxes that vanish.
-
-    Args:
-        half: Half of their edge lengths, in [m].
-        after: When they vanish, after the start of a contact, in [s].
-    """
+    """Ground that gives way under an effector: it is lower, but for boxes that vanish."""
     deep = float(rng.uniform(*depth))
     boxes, events = [], []
     for contact in begun(plan):
@@ -458,12 +429,7 @@ ADVANCE = 0.3  # shortest way over which a step down may come, in the robot's un
 def step_down(
     rng: Rng, plan: Plan, *, depth: Range, when: Range = (0.3, 0.5), ahead: bool = False
 ) -> Faults:
-    """A step down at an edge across the path, beyond all contacts so far, before the next one.
-
-    Args:
-        when: Earliest time of that contact, as a share of the run.
-        ahead: Whether there is none if feet do not get ahead of where they stand at first.
-    """
+    """A step down at an edge across the path, beyond all contacts so far, before the next one."""
     if ahead:
         xs = [contact.place[0] for contact in plan.contacts]
         foremost = max(contact.place[0] for contact in plan.contacts if contact.start <= 0)
@@ -516,13 +482,7 @@ def _speed(plan: Plan) -> Array:
 def collisions(
     rng: Rng, plan: Plan, *, every: float, stiffness: Range, limit: Range, hold: Range
 ) -> Faults:
-    """Obstacles in the air that a tool meets while it moves, one in so many [s].
-
-    Args:
-        stiffness: In [N/m], times the robot's unit of force.
-        limit: Force at which an obstacle breaks loose, in [N], times the robot's unit of force.
-        hold: Time in which its resistance fades, in [s].
-    """
+    """Obstacles in the air that a tool meets while it moves, one in so many [s]."""
     speed = _speed(plan)
     loads = []
     for span in np.array_split(np.arange(len(speed)), max(1, round(plan.duration / every))):
@@ -545,13 +505,7 @@ def collisions(
 def joint_stops(
     rng: Rng, plan: Plan, *, overshoot: Range, stiffness: Range, least: float
 ) -> Faults:
-    """An end stop nearer than the controller knows; none where joints move little, or are free.
-
-    Args:
-        overshoot: How far beyond it the plan goes at most, in [rad].
-        stiffness: In [N m/rad], times the robot's unit of torque.
-        least: Least range of a joint's motion, in [rad].
-    """
+    """An end stop nearer than the controller knows; none where joints move little, or are free."""
     joints: Array | None = getattr(plan, "joints", None)
     if joints is None:
         return Faults()
@@ -577,15 +531,7 @@ def joint_stops(
 def pushes(
     rng: Rng, plan: Plan, *, every: float, force: Range, rise: Range, hold: Range, along: Range
 ) -> Faults:
-    """Hands that push links where the tool is slow; at least one, where it is slowest.
-
-    Args:
-        every: Mean time between two pushes, in [s].
-        force: Largest force, in [N], times the robot's unit of force.
-        rise: Time in which it rises, and time in which it falls, in [s].
-        hold: Time in between, in [s].
-        along: Place on the way from the base to the last link.
-    """
+    """Hands that push links where the tool is slow; at least one, where it is slowest."""
     speed = _speed(plan)
     edge = round(min(ALONE, plan.duration / 4) / TICK)
     count = max(1, round((plan.duration - 2 * ALONE) / every))

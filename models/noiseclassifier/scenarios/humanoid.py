@@ -17,6 +17,7 @@ from noiseclassifier.scenarios.motions import (
     Contact,
     Gesture,
     Plan,
+    Rng,
     Sole,
     Stand,
     Stroll,
@@ -82,9 +83,7 @@ class Step:
     height: float  # height of its swing, in [m]
 
 
-def footsteps(
-    robot: Humanoid, motion: Walk, rng: np.random.Generator, duration: float
-) -> tuple[Step, ...]:
+def footsteps(robot: Humanoid, motion: Walk, rng: Rng, duration: float) -> tuple[Step, ...]:
     """Footsteps of a walk."""
     single, double = (
         robot.pace * float(rng.uniform(*span)) for span in (motion.single, motion.double)
@@ -117,9 +116,7 @@ def footsteps(
     return tuple(steps)
 
 
-def stopping(
-    robot: Humanoid, motion: Stroll, rng: np.random.Generator, duration: float
-) -> tuple[Step, ...]:
+def stopping(robot: Humanoid, motion: Stroll, rng: Rng, duration: float) -> tuple[Step, ...]:
     """Footsteps of a walk with stops."""
     pauses = rng.uniform(*motion.pause, motion.stops)
     pauses = pauses[np.cumsum(pauses) < duration / 2]
@@ -132,7 +129,7 @@ def stopping(
     return tuple(steps)
 
 
-def _advance(robot: Humanoid, motion: Walk, rng: np.random.Generator) -> tuple[float, float, float]:
+def _advance(robot: Humanoid, motion: Walk, rng: Rng) -> tuple[float, float, float]:
     """Advance of the body per step: along, across, and in direction."""
     (along, across), turn = robot.stride, robot.turn
     size = float(rng.uniform(0.85, 0.95) if motion.drop else rng.uniform(0.45, 0.8))
@@ -157,12 +154,7 @@ NO_FOOT = -1  # the foot in the air while both are on the ground
 
 
 def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, Array, Integers]:
-    """Paths of the soles at the times of ticks.
-
-    Returns:
-        Places, shape (ticks, feet, 3), in [m]; directions, shape (ticks, feet), in [rad]; the foot
-        in the air, or -1, shape (ticks,).
-    """
+    """Places and directions of the soles, shape (ticks, feet, …), and the foot in the air or -1."""
     places, yaws = np.zeros((len(time), 2, 3)), np.zeros((len(time), 2))
     places[:, :, 1] = robot.apart, -robot.apart
     swinging = np.full(len(time), NO_FOOT)
@@ -303,7 +295,7 @@ FADE = 1.0  # time in which sines fade in, in [s]
 DWELL = 0.3  # longest time of rest between two reaches, as a share of a reach
 
 
-def gesture(robot: Humanoid, motion: Gesture, rng: np.random.Generator, duration: float) -> Array:
+def gesture(robot: Humanoid, motion: Gesture, rng: Rng, duration: float) -> Array:
     """Positions of the upper body's joints, shape (ticks, joints), in [rad]."""
     time = times(round(duration / TICK), TICK)
     reach = np.array(robot.reach)
@@ -327,7 +319,7 @@ STILL = 0.5  # time of standing still at both ends, in [s]
 SWAY_FADE = 1.0  # time in which sway and squat fade in and out, in [s]
 
 
-def stand(robot: Humanoid, motion: Stand, rng: np.random.Generator, duration: float) -> WalkPlan:
+def stand(robot: Humanoid, motion: Stand, rng: Rng, duration: float) -> WalkPlan:
     """Plan of standing."""
     plan = walk(robot, (), duration, upper=gesture(robot, motion.upper, rng, duration))
     time = plan.time
@@ -544,11 +536,7 @@ def _rates(plan: WalkPlan) -> Array:
 
 
 def bearing(plan: WalkPlan) -> Array:
-    """Planned ground forces on the soles, per weight of the robot.
-
-    Returns:
-        Force, and torque about the sole's middle in [m], of each sole, shape (ticks, 12).
-    """
+    """Planned force and torque of the ground on each sole, per weight, shape (ticks, 12)."""
     # The ground's force on a pendulum points from the zero-moment point to the centre of mass.
     force = np.ones((len(plan.zmp), 3))
     force[:, :2] = (plan.centre[:, :2] - plan.zmp) * plan.rate**2 / GRAVITY
@@ -564,9 +552,7 @@ SETTLING = 500  # ticks before the recording during which the robot comes to res
 LEVER = 0.05  # noise of torque sensors per noise of force sensors, in [m]
 
 
-def plan(
-    robot: Humanoid, motion: Walk | Stroll | Stand, rng: np.random.Generator, duration: float
-) -> WalkPlan:
+def plan(robot: Humanoid, motion: Walk | Stroll | Stand, rng: Rng, duration: float) -> WalkPlan:
     """Plan of the motion of one run."""
     if isinstance(motion, Walk):
         return walk(robot, footsteps(robot, motion, rng, duration), duration)

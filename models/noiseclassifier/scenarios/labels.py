@@ -93,18 +93,7 @@ class Trace:
 def deviation(
     velocity: Array, twin: Array, *, rate: float, band: tuple[float, float] | None = None
 ) -> Array:
-    """Fast part of the difference between a run and its twin.
-
-    Args:
-        velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
-        twin: Those of the twin, shape (samples, joints), in [rad/s].
-        rate: Sample rate, in [Hz].
-        band: Pass band, in [Hz], in place of the high-pass.
-
-    Returns:
-        The difference after a causal filter of first order (a high-pass, or a band-pass), shape
-        (samples, joints), in [rad/s].
-    """
+    """Difference of a run from its twin after a causal high-pass, or band-pass, of first order."""
     from scipy.signal import butter, sosfilt
 
     if band:
@@ -117,13 +106,7 @@ def deviation(
 def annotate(
     velocity: Array, twin: Array, events: Sequence[Event], *, rate: float
 ) -> tuple[tuple[Block, ...], tuple[Trace, ...]]:
-    """Labels of a run by the rule of this module, and the effect of each event.
-
-    Args:
-        velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
-        twin: Those of the twin, shape (samples, joints), in [rad/s].
-        rate: Sample rate, in [Hz].
-    """
+    """Labels of a run by its velocities and those of its twin, and the effect of each event."""
     events = _independent(events)
     fast = deviation(velocity, twin, rate=rate)
     broadband = _level(fast, rate)
@@ -148,7 +131,7 @@ def annotate(
         change = change.max(axis=1, initial=0.0) * rate
         own = [
             (a, b)
-            for a, b in _clipped(_spans(loud, round(RULE.gap * rate)), first, end)
+            for a, b in _spans(loud, round(RULE.gap * rate), first, end)
             if level[a:b].max() > RULE.contrast * background
             and _confirms(event.label, filtered[a:b], level[a:b], change[a - first : b - first])
         ]
@@ -204,8 +187,8 @@ def _confirms(label: str, fast: Array, level: Array, change: Array) -> bool:
     return int(np.count_nonzero(np.diff(sign))) >= 2 * RULE.periods
 
 
-def _spans(mask: Mask, bridge: int) -> list[Span]:
-    """Spans in which a mask is true, gaps of up to ``bridge`` samples closed."""
+def _spans(mask: Mask, bridge: int, start: int = 0, stop: int | None = None) -> list[Span]:
+    """Spans in which a mask is true, gaps of up to ``bridge`` samples closed, within a range."""
     edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
     spans: list[Span] = []
     for first, end in edges.reshape(-1, 2).tolist():
@@ -213,12 +196,8 @@ def _spans(mask: Mask, bridge: int) -> list[Span]:
             spans[-1] = (spans[-1][0], end)
         else:
             spans.append((first, end))
-    return spans
-
-
-def _clipped(spans: Sequence[Span], first: int, end: int) -> list[Span]:
-    """Parts of spans that lie in a range."""
-    return [(max(a, first), min(b, end)) for a, b in spans if a < end and b > first]
+    stop = len(mask) if stop is None else stop
+    return [(max(a, start), min(b, stop)) for a, b in spans if a < stop and b > start]
 
 
 APART = 0.05  # contacts with a shorter pause are merged, in [s]
@@ -257,13 +236,8 @@ def visible(
 ) -> Mask:
     """Frames in which a difference exceeds a floor by ``CONTRAST`` in a band of a joint.
 
-    Args:
-        difference: What a fault changes, shape (samples, joints).
-        floor: The signal without the fault, shape (samples, joints).
-        rate: Sample rate, in [Hz].
-        lowest: Lowest frequency of the bands, in [Hz].
-        centred: Whether the mean of a frame is left out.
-        near: Frames on either side of which the loudest floor counts.
+    ``centred`` leaves out the mean of a frame; of the floor, the loudest of so many frames on
+    either side counts (``near``).
     """
     length, hop = round(FRAME * rate), round(HOP * rate)
     starts = np.arange(0, max(len(difference) - length, 0) + 1, hop)

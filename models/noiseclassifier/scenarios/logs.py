@@ -20,7 +20,7 @@ from noiseclassifier.scenarios.domains import Logger
 from noiseclassifier.scenarios.labels import AROUND, FRAME, HOP, visible
 from noiseclassifier.scenarios.motions import PUSH
 from noisemodel import Block, Run
-from noisemodel.types import Array, Mask
+from noisemodel.types import Array, Mask, Real
 
 SLOWEST = 1.0  # of efforts, in [Hz]: a frame's first line, at 2.5 Hz, has what is slower, too
 HARMONICS = (1, 2, 4)  # orders of the ripple, as multiples of the gear ratio
@@ -28,54 +28,43 @@ SHARPNESS, GAIN = 8.0, 3.0  # quality and gain of the resonances that ripple exc
 
 
 def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
-    """The log of a run.
-
-    Returns:
-        Measured velocities, what is desired and efforts (torques in [N m], or currents in [A]), at
-        the logger's rate, with those of the failures' labels that can still be seen; ``meta`` has
-        the logger.
-    """
+    """The log of a run, with the labels of failures that can still be seen in it."""
     found, reference = _log(run, logger, seed), _log(twin, logger, seed)
-    blocks = run.blocks
+    blocks, events = run.blocks, run.meta.get("events", ())
     if run is not twin:
-        difference = _clean(run, logger) - _clean(twin, logger)
-        seen = visible(difference, reference.velocity, rate=logger.rate)
+        desired = None
         if found.velocity_desired is not None and reference.velocity_desired is not None:
             desired = found.velocity_desired - reference.velocity_desired
-            floor = reference.velocity_desired - reference.velocity
-            seen |= visible(desired - difference, floor, rate=logger.rate)
-        if any(event.get("facts", {}).get("throughout") for event in run.meta.get("events", ())):
-            seen &= _louder(found, reference)
+        seen = _seen(_clean(run, logger) - _clean(twin, logger), desired, reference, logger.rate)
+        if any(event.get("facts", {}).get("throughout") for event in events):
+            # Where two walks part, steps that come later make a difference, but no noise.
+            own = found.velocity, found.velocity_desired
+            seen &= _seen(*own, reference, found.rate, near=AROUND)
         pushed: tuple[Block, ...] = ()
         if found.effort is not None and reference.effort is not None:
+            difference = found.effort - reference.effort  # their noise is equal
             felt = visible(
-                found.effort - reference.effort,  # their noise is equal
-                reference.effort,
-                rate=logger.rate,
-                lowest=SLOWEST,
-                centred=True,
+                difference, reference.effort, rate=logger.rate, lowest=SLOWEST, centred=True
             )
-            seen, pushed = seen | felt, kept(_pushes(run), felt)
+            hands = (event for event in events if event.get("cause") == PUSH)
+            pushes = tuple(Block(hand["start"], hand["stop"], hand["label"]) for hand in hands)
+            seen, pushed = seen | felt, kept(pushes, felt)
         blocks = _joined((*kept(run.blocks, seen), *pushed))
     end = len(found.velocity) / logger.rate
     blocks = tuple(replace(b, stop=min(b.stop, end)) for b in blocks if b.start < end)
-    events = [{**event, "labelled": overlap(event, blocks)} for event in run.meta.get("events", ())]
+    events = [{**event, "labelled": overlap(event, blocks)} for event in events]
     return replace(
         found, blocks=blocks, meta={**run.meta, "events": events, "logger": asdict(logger)}
     )
 
 
-def _louder(log: Run, twin: Run) -> Mask:
-    """Frames that are louder in a band than the twin's frames around them.
-
-    Where two walks part, steps that come later make a difference, but no noise of their own.
-    """
-    louder = visible(log.velocity, twin.velocity, rate=log.rate, near=AROUND)
-    if log.velocity_desired is not None and twin.velocity_desired is not None:
-        error = log.velocity_desired - log.velocity
+def _seen(velocity: Real, desired: Real | None, twin: Run, rate: float, near: int = 0) -> Mask:
+    """Frames in which velocities or their error exceed those of the twin's log around them."""
+    seen = visible(velocity, twin.velocity, rate=rate, near=near)
+    if desired is not None and twin.velocity_desired is not None:
         floor = twin.velocity_desired - twin.velocity
-        louder |= visible(error, floor, rate=log.rate, near=AROUND)
-    return louder
+        seen |= visible(desired - velocity, floor, rate=rate, near=near)
+    return seen
 
 
 def kept(blocks: Sequence[Block], seen: Mask) -> tuple[Block, ...]:
@@ -101,15 +90,6 @@ def kept(blocks: Sequence[Block], seen: Mask) -> tuple[Block, ...]:
                 pieces.append(replace(block, start=first, stop=last))
         found += pieces
     return tuple(found)
-
-
-def _pushes(run: Run) -> tuple[Block, ...]:
-    """The times in which hands push, by their events."""
-    return tuple(
-        Block(event["start"], event["stop"], event["label"])
-        for event in run.meta.get("events", ())
-        if event.get("cause") == PUSH
-    )
 
 
 def _joined(blocks: Sequence[Block]) -> tuple[Block, ...]:

@@ -13,6 +13,7 @@ TICK = 1e-3  # time between two ticks of control, in [s]
 STEPS = 10  # samples per tick
 STEP = TICK / STEPS  # time between two samples, in [s]
 RATE = round(1 / STEP)  # samples per second, in [Hz]
+Rng: TypeAlias = np.random.Generator
 Signal: TypeAlias = Callable[[Array], Array]  # from times, in [s], to values, shape (times, ...)
 
 
@@ -70,16 +71,12 @@ def multiplied(value: Any, factor: float) -> Any:
 
 @dataclass(frozen=True)
 class Box:
-    """A box that stands in the world.
-
-    Attributes:
-        since: When it appears, in [s]: a box where a foot stands would intersect the foot.
-    """
+    """A box that stands in the world."""
 
     centre: tuple[float, float, float]  # x, y, z of its centre, in [m]
     half: tuple[float, float, float]  # half of its edge lengths, in [m]
     yaw: float = 0.0  # how far it is turned about the vertical, in [rad]
-    since: float = 0.0
+    since: float = 0.0  # when it appears, in [s]: a box where a foot stands would intersect it
     until: float = float("inf")  # when it vanishes, in [s]
 
     @property
@@ -134,13 +131,8 @@ class Contact:
 
     def later(self, delay: float) -> "Contact":
         """The contact with all times later by a delay, in [s]."""
-        return replace(
-            self,
-            start=self.start + delay,
-            lift=self.lift + delay,
-            stop=self.stop + delay,
-            approach=self.approach + delay,
-        )
+        times = ("start", "lift", "stop", "approach")
+        return replace(self, **{name: getattr(self, name) + delay for name in times})
 
 
 @dataclass(frozen=True)
@@ -170,10 +162,7 @@ class Payload:
 
 @dataclass(frozen=True, kw_only=True)
 class Collision:
-    """An obstacle in the air, where an effector is at that time, that it pushes away.
-
-    It breaks loose at its limit of force, then resists with less, and at last not at all.
-    """
+    """An obstacle in the air that gives way at its limit of force, and fades."""
 
     frame: str
     start: float  # when the effector meets it; if it is slow then, as soon as it is fast, in [s]
@@ -224,12 +213,7 @@ REACHES = ("minimum-jerk", "trapezoid", "spline", "sines", "teleoperation")
 
 @dataclass(frozen=True, kw_only=True)
 class Reach:
-    """An arm moves its joints in the air, from rest to rest.
-
-    Attributes:
-        payload: Mass that it picks up and puts down, times the robot's unit of force, in [kg];
-            (0, 0) for none.
-    """
+    """An arm moves its joints in the air, from rest to rest."""
 
     kind: str = "minimum-jerk"
     speed: Range = (0.3, 1.0)  # highest speed of a movement's fastest joint, in [rad/s]
@@ -237,7 +221,7 @@ class Reach:
     spread: float = 0.6  # furthest distance of a joint from its position at rest, in [rad]
     pause: Range = (0.05, 0.4)  # time between two movements; some are longer, in [s]
     stops: float = 0.0  # emergency stops per second, in [1/s]; the arm goes on after each
-    payload: Range = (0.0, 0.0)
+    payload: Range = (0.0, 0.0)  # mass that it carries, by the robot's unit of force, in [kg]
     stand: float = 0.2  # time that it stands before its first movement, in [s]
     duration: float = 6.0  # default duration of a run, in [s]
 
@@ -296,16 +280,11 @@ class Stroll:
 
 @dataclass(frozen=True, kw_only=True)
 class Stand:
-    """A humanoid stands on both feet; its centre of mass and its upper body move.
-
-    Attributes:
-        period: Of sway and squat, in [s], for a robot as high as TALOS; others have the same share
-            of their own period.
-    """
+    """A humanoid stands on both feet; its centre of mass and its upper body move."""
 
     sway: Range = (0.0, 0.0)
     squat: Range = (0.0, 0.0)
-    period: Range = (2.0, 4.0)
+    period: Range = (2.0, 4.0)  # of sway and squat of TALOS, in [s]; others' by their size
     upper: Gesture = field(default_factory=Gesture)
     duration: float = 7.0  # default duration of a run, in [s]
 

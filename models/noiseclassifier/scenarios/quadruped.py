@@ -18,6 +18,7 @@ from noiseclassifier.scenarios.motions import (
     Box,
     Contact,
     Plan,
+    Rng,
     Tip,
     Trot,
     Units,
@@ -79,7 +80,7 @@ class Beat:
 
 
 def beats(
-    rng: np.random.Generator,
+    rng: Rng,
     *,
     begin: float,
     end: float,
@@ -155,10 +156,7 @@ def height_of(share: Array) -> Array:
 def footholds(
     beats: Sequence[Beat], hip: Array, *, way: Array, yaw: Array, stop: float
 ) -> list[Foothold]:
-    """Footholds: under the hip in the middle of each stance.
-
-    This is the neutral point of Raibert, Legged Robots That Balance, 1986.
-    """
+    """Footholds under the hip in the middle of each stance (Raibert 1986, neutral point)."""
     ends = [*(beat.lift for beat in beats), np.inf][1:]
     middles = [(beat.touch + end) / 2 for beat, end in zip(beats, ends, strict=True)]
     ticks = [0, *(round(min(stop, middle) / TICK) for middle in middles)]
@@ -207,7 +205,7 @@ def steer(
     time: Array,
     way: str,
     robot: Quadruped,
-    rng: np.random.Generator,
+    rng: Rng,
     *,
     bouts: Sequence[tuple[float, float]],
 ) -> tuple[Array, Array]:
@@ -232,7 +230,7 @@ def _onset(time: Array, start: float) -> Array:
     return minimum_jerk(np.clip((time - start) / CHANGE, 0, 1))[:, None]
 
 
-def _command(way: str, robot: Quadruped, rng: np.random.Generator) -> Array:
+def _command(way: str, robot: Quadruped, rng: Rng) -> Array:
     """Velocity ahead, to the left, and of turning, shape (3,)."""
     speed = robot.speed * float(rng.uniform(0.4, 1.0))
     turning = robot.turning * float(rng.uniform(0.3, 1.0)) * float(rng.choice((-1.0, 1.0)))
@@ -254,15 +252,8 @@ SINES = 3  # sines per axis
 POSE_FADE = 0.8  # time of fading in and out, in [s]
 
 
-def poses(
-    time: Array, rng: np.random.Generator, share: float, *, size: float
-) -> tuple[Array, Array]:
-    """Random poses, from and to the neutral one.
-
-    Returns:
-        Roll and pitch, shape (ticks, 2), in [rad]; shift ahead, to the left and up, shape
-        (ticks, 3), in [m].
-    """
+def poses(time: Array, rng: Rng, share: float, *, size: float) -> tuple[Array, Array]:
+    """Roll and pitch, and the shift of the body, by random sines from and to the neutral pose."""
     if not share:
         return np.zeros((len(time), 2)), np.zeros((len(time), 3))
     largest = share * np.array((*TILT, *(size * shift for shift in SHIFT)))
@@ -329,7 +320,7 @@ class GaitPlan(Plan):
     weight: float  # in [N]
 
 
-def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: float) -> GaitPlan:
+def plan(robot: Quadruped, motion: Trot, rng: Rng, duration: float) -> GaitPlan:
     """Plan of a gait from rest to rest."""
     standing = stand(robot)
     shapes, steering, bending = rng.spawn(3)
@@ -389,9 +380,7 @@ def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: flo
     )
 
 
-def _bouts(
-    rng: np.random.Generator, motion: Trot, duration: float, period: float
-) -> list[tuple[float, float]]:
+def _bouts(rng: Rng, motion: Trot, duration: float, period: float) -> list[tuple[float, float]]:
     """Start and end of each time of stepping, in [s]; none if the robot stands."""
     if motion.gait == STAND:
         return []
@@ -426,18 +415,18 @@ LOWEST, STEEPEST = 0.5, 0.7
 
 
 class StateEstimate:
-    """State estimate, updated once per tick.
+    """State estimate, updated once per tick: all low-passed.
 
-    Roll, pitch, in [rad], and slip, the velocity of the centre of mass, in [m/s], are low-passed
-    and less the planned ones; corrections of path and direction lead towards the plan, in [m] and
-    [rad]; forces on the feet are low-passed, in [N].
+    Roll, pitch and slip, the velocity of the centre of mass, are less the planned ones;
+    corrections of path and direction lead towards the plan.
     """
 
     def __init__(self, robot: Quadruped, sensors: dict[str, slice]) -> None:
         self._where = sensors
-        self._tilt_share = _share(robot.attitude_filter)
-        self._force_share = _share(robot.force_filter)
-        self._slip_share = _share(VELOCITY_FILTER)
+        filters = (robot.attitude_filter, robot.force_filter, VELOCITY_FILTER)
+        self._tilt_share, self._force_share, self._slip_share = (
+            TICK / (time_constant + TICK) for time_constant in filters
+        )
         self.roll = self.pitch = self.yaw_correction = 0.0
         self.slip, self.position_correction = np.zeros(2), np.zeros(2)
         self.force = np.zeros(len(robot.effectors))
@@ -466,11 +455,6 @@ class StateEstimate:
         _, x, y, _ = sensors[self._where["base.turn"]].tolist()
         low = float(sensors[self._where["centre.place"]][2]) < LOWEST * height
         return low or 1 - 2 * (x * x + y * y) < cos(STEEPEST)
-
-
-def _share(time_constant: float) -> float:
-    """Gain of a first-order low-pass per tick."""
-    return TICK / (time_constant + TICK)
 
 
 BALANCE = 0.7  # gain of the foot placement on the offset of the capture point
@@ -508,10 +492,7 @@ class Feet:
         return places
 
     def _placement(self, number: int, estimate: StateEstimate) -> Array:
-        """Horizontal correction of the feet in the air, shape (feet, 2), in [m].
-
-        They follow the robot's, go further in the direction of its slip, and compensate tilt.
-        """
+        """Horizontal correction of the feet in the air: with the robot, its slip and its tilt."""
         plan = self._plan
         swing, progress = plan.swing[number], plan.progress[number]
         begins = swing & ~plan.swing[number - 1]
@@ -644,6 +625,14 @@ VELOCITY_NOISE = 5e-3  # standard deviation of the measured velocity per tick, i
 def scene(robot: Quadruped, plan: GaitPlan, faults: Faults, imperfections: Imperfections) -> Scene:
     """Scene of one run."""
     model, standing = reduced_model(robot), stand(robot)
+    # The encoders read the standing configuration; the lowest foot is on the ground.
+    start = standing.configuration.copy()
+    start[7:] -= faults.offsets(len(start) - 7)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, start)
+    feet = [data.oMf[model.getFrameId(foot.frame)].translation[2] for foot in robot.effectors]
+    start[2] += robot.effectors[0].radius - min(feet)
+    start[3:7] = start[[6, 3, 4, 5]]  # MuJoCo has w first
     boxes = faults.boxes_on(plan)
     world = real_world(robot, boxes, imperfections, frame=model.frames[1].name, point=np.zeros(3))
     sensors = sensors_of(world)
@@ -662,7 +651,7 @@ def scene(robot: Quadruped, plan: GaitPlan, faults: Faults, imperfections: Imper
     noise[sensors["centre.velocity"]] = VELOCITY_NOISE
     return Scene(
         model=world,
-        start=_start(robot, model, standing, faults),
+        start=start,
         control=control,
         fallen=control.fallen,
         effectors=len(robot.effectors),
@@ -670,15 +659,3 @@ def scene(robot: Quadruped, plan: GaitPlan, faults: Faults, imperfections: Imper
         noise=noise,
         changes=box_changes(world, boxes),
     )
-
-
-def _start(robot: Quadruped, model: Any, standing: Standing, faults: Faults) -> Array:
-    """Configuration at which the encoders read the standing one, lowest foot on the ground."""
-    configuration = standing.configuration.copy()
-    configuration[7:] -= faults.offsets(len(configuration) - 7)
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, configuration)
-    lowest = min(data.oMf[model.getFrameId(foot.frame)].translation[2] for foot in robot.effectors)
-    configuration[2] += robot.effectors[0].radius - lowest
-    configuration[3:7] = configuration[[6, 3, 4, 5]]  # MuJoCo has w first
-    return np.asarray(configuration)

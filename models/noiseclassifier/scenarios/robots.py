@@ -159,8 +159,7 @@ def _drives(joints: tuple[str, ...], given: Mapping[str, Any]) -> Drivetrain:
 def _nominal(joints: tuple[str, ...], given: Mapping[str, Any]) -> Drivetrain:
     """Nominal drives of an arm of which no better ones are known.
 
-    Inertia and friction of drives grow with their torque, as in Panda and the UR arms;
-    gains give each joint alone, with all others at rest, a natural frequency of 8 Hz and half the
+    Gains give each joint alone, with all others at rest, a natural frequency of 8 Hz and half the
     critical damping.
     """
     rate, torque = 2 * pi * 8.0, _repeated(given["torque"], len(joints))
@@ -180,9 +179,7 @@ def _nominal(joints: tuple[str, ...], given: Mapping[str, Any]) -> Drivetrain:
 def similar_drives(model: Drivetrain, length: float, force: float) -> dict[str, Any]:
     """Drives of a dynamically similar robot, by the ratios of lengths and of forces.
 
-    Two robots of one shape have the same motion if times scale as a pendulum's of their length
-    (Alexander and Jayes, A dynamic similarity hypothesis for the gaits of quadrupedal mammals, J.
-    Zoology 1983); gains, limits and losses follow from their units.
+    Times scale as a pendulum's of their length (Alexander and Jayes, J. Zoology 1983).
     """
     time, torque = sqrt(length), force * length
     scales = {

@@ -13,7 +13,7 @@ import numpy as np
 from noiseclassifier.scenarios import faults
 from noiseclassifier.scenarios.domains import LIMITS, MOTIONS, Domain
 from noiseclassifier.scenarios.drives import LOAD_SHARE, DomainDrives, Drives
-from noiseclassifier.scenarios.faults import Defect, Faults, Imperfections, Rng, no_defect
+from noiseclassifier.scenarios.faults import Defect, Faults, Imperfections, no_defect
 from noiseclassifier.scenarios.labels import RULE, annotate, unplanned
 from noiseclassifier.scenarios.motions import (
     RATE,
@@ -24,6 +24,7 @@ from noiseclassifier.scenarios.motions import (
     Picks,
     Plan,
     Reach,
+    Rng,
     ScenarioError,
     SimulationError,
     Stand,
@@ -78,7 +79,6 @@ class Case:
 
     motion: Motion
     defect: Defect = no_defect
-    description: str = ""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,6 @@ def _scenarios(given: Mapping[str, Any]) -> Iterator[Scenario]:
             family: Case(
                 KINDS[family](**each.get("motion", {})),
                 _defect(each["fault"], band) if "fault" in each else no_defect,
-                each.get("description", ""),
             )
             for family, each in given.items()
             if family in KINDS
@@ -195,11 +194,11 @@ class Setup:
     robot: Simulated
     motion: Any
     domain: Domain | None
-    planned: np.random.Generator
-    body: np.random.Generator
-    sensors: np.random.Generator
-    faulty: np.random.Generator
-    gears: np.random.Generator
+    planned: Rng
+    body: Rng
+    sensors: Rng
+    faulty: Rng
+    gears: Rng
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +219,7 @@ def simulate(
     """Labelled run of a robot in a scenario, simulated at 10 kHz.
 
     The run without the fault and with the same seed, its twin, is simulated too; labels follow from
-    the difference by the rule in `scenarios.labels`. Runs with the same motion share their twin.
+    the difference by the rule in `scenarios.labels`.
 
     Args:
         robot: One of `ROBOTS`; in wide domains one of more robots.
@@ -458,7 +457,7 @@ def recorded(
     plan: Plan,
     faults: Faults,
     imperfections: Imperfections,
-    rng: np.random.Generator,
+    rng: Rng,
 ) -> "Recording":
     """Record a scene with given drives and the errors of its sensors."""
     from noiseclassifier.scenarios.loop import record
@@ -503,6 +502,8 @@ def _single(signal: Any) -> Any:
 
 def _whole(motion: "Recording", simulated: Simulated, **facts: Any) -> Run:
     """A recording as a run, with the joints that are held away from 0, in single precision."""
+    from noiseclassifier.scenarios.world import pinocchio_base
+
     held = {joint: angle for joint, angle in simulated.held.items() if angle}
     still = np.zeros((len(motion.velocity), len(held)))
     posture = still + np.array([*held.values()])
@@ -512,10 +513,8 @@ def _whole(motion: "Recording", simulated: Simulated, **facts: Any) -> Run:
 
     base = {}
     if motion.base_pose.size:
-        from noiseclassifier.scenarios.world import pinocchio_base
-
-        pose, velocity = pinocchio_base(motion.base_pose, motion.base_velocity)
-        base = {"base_pose": _single(pose), "base_velocity": _single(velocity)}
+        both = pinocchio_base(motion.base_pose, motion.base_velocity)
+        base = dict(zip(("base_pose", "base_velocity"), map(_single, both), strict=True))
     return Run(
         time=times(len(motion.velocity), STEP),
         joint_names=(*simulated.drives.joints, *held),
@@ -532,20 +531,18 @@ def _whole(motion: "Recording", simulated: Simulated, **facts: Any) -> Run:
 
 def kept(motion: "Recording", rate: float, **facts: Any) -> Run:
     """What is kept of a recording: positions, velocities, torques, single precision, at a rate."""
-    others = {
-        "planned": motion.planned,
-        "position": motion.position,
-        "position_desired": motion.position_desired,
-        "effort": motion.torque,
-    }
+    # As stages, since only velocities and stages are decimated.
+    stages = {name: getattr(motion, name) for name in ("planned", "position", "position_desired")}
     run = Run(
         time=times(len(motion.velocity), STEP),
         velocity=_single(motion.velocity),
         velocity_desired=_single(motion.velocity_desired),
-        stages={name: _single(signal) for name, signal in others.items()},
+        stages={
+            name: _single(signal) for name, signal in {**stages, "effort": motion.torque}.items()
+        },
         **facts,
     )
     run = decimated(run, rate)
-    single = {name: _single(stage) for name, stage in run.stages.items()}
-    single |= {name: _single(getattr(run, name)) for name in ("velocity", "velocity_desired")}
+    signals = {**run.stages, "velocity": run.velocity, "velocity_desired": run.velocity_desired}
+    single = {name: _single(signal) for name, signal in signals.items()}
     return replace(run, stages={"planned": single.pop("planned")}, **single)

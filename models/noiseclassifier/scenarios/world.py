@@ -92,15 +92,7 @@ def build(
     effectors: Sequence[Effector] = (),
     boxes: Sequence[Box] = (),
 ) -> Any:
-    """MuJoCo model with one torque actuator per joint, and sensors.
-
-    Args:
-        armature: Inertia of each drive at its joint, shape (joints,), in [kg m²] or [kg].
-        damping: Viscous friction of each joint, shape (joints,), in [N m s] or [N s/m].
-        friction: Coulomb friction of each joint, shape (joints,), in [N m] or [N].
-        contact: Time constant of contacts, in [s].
-        effectors: Parts of the robot that collide with the boxes.
-    """
+    """MuJoCo model with one torque actuator per joint, and sensors."""
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -290,22 +282,19 @@ def sensors_of(model: Any) -> dict[str, slice]:
 
 
 class WholeBody:
-    """Inverse kinematics with one Newton step per call.
-
-    Args:
-        start: Configuration to start from, shape (nq,).
-
-    Attributes:
-        configuration: The present configuration, as Pinocchio has it, shape (nq,).
-        inverse: Inverse Jacobian of the last step: velocities, as Pinocchio has them, per rates of
-            the equations, shape (nv, nv).
-    """
+    """Inverse kinematics from a configuration on, with one Newton step per call."""
 
     def __init__(
         self, model: Any, effectors: Sequence[Effector], start: Array, *, upper: int = 0
     ) -> None:
         self._model = model.copy()
-        self._frames = [_add_point(self._model, effector) for effector in effectors]
+        self._frames = []
+        for effector in effectors:  # their points, as frames
+            parent = model.getFrameId(effector.frame)
+            frame, name = model.frames[parent], f"{effector.frame}.point"
+            pose = frame.placement * pin.SE3(np.eye(3), np.array(effector.point))
+            point = pin.Frame(name, frame.parentJoint, parent, pose, pin.FrameType.OP_FRAME)
+            self._frames.append(self._model.addFrame(point))
         self._data = self._model.createData()
         widths = [6 if isinstance(effector, Sole) else 3 for effector in effectors]
         ends = np.cumsum(widths).tolist()
@@ -330,15 +319,7 @@ class WholeBody:
         upper: Array | None = None,
         steps: int = 1,
     ) -> Array:
-        """Configuration after Newton steps; one is enough for targets that moved by millimetres.
-
-        Args:
-            places: Of the effectors' points, shape (effectors, 3), in [m].
-            turns: Rotation matrix of each sole.
-            centre: Of mass, shape (3,), in [m].
-            base: Rotation matrix of the base.
-            upper: Positions of the upper body's joints, in [rad]; by default they stay.
-        """
+        """Configuration after Newton steps; one is enough for targets that moved by millimetres."""
         model, data = self._model, self._data
         jacobian, error = self._jacobian, self._error
         for _ in range(steps):
@@ -363,12 +344,7 @@ class WholeBody:
         return self.configuration
 
     def hold(self, bearing: Array) -> Array:
-        """Torques that hold the robot still under ground forces.
-
-        Args:
-            bearing: Ground force on each effector's point, in the order of the equations: force, in
-                [N], and, for a sole, torque, in [N m].
-        """
+        """Torques that hold the robot still under ground forces, in the order of the equations."""
         gravity = pin.computeGeneralizedGravity(self._model, self._data, self.configuration)
         legs = self._jacobian[: self._centre.start, 6:]
         return np.asarray(gravity[6:] - bearing @ legs)
@@ -390,29 +366,13 @@ class WholeBody:
         return self._jacobian[self._heights]
 
 
-def _add_point(model: Any, effector: Effector) -> int:
-    """Add the point of an effector as a frame; its index."""
-    parent = model.getFrameId(effector.frame)
-    frame = model.frames[parent]
-    pose = frame.placement * pin.SE3(np.eye(3), np.array(effector.point))
-    kind = pin.FrameType.OP_FRAME
-    return int(
-        model.addFrame(pin.Frame(f"{effector.frame}.point", frame.parentJoint, parent, pose, kind))
-    )
-
-
 def _turn(rotation: Array, wanted: Array) -> Array:
     """Rotation vector from one rotation to another, in the world's axes, shape (3,), in [rad]."""
     return np.asarray(rotation @ pin.log3(rotation.T @ wanted))
 
 
 def pinocchio_base(pose: Array, velocity: Array) -> tuple[Array, Array]:
-    """Pose and velocity of a floating base as Pinocchio has them.
-
-    Args:
-        pose: Position and quaternion (w, x, y, z), shape (samples, 7).
-        velocity: Linear in the world's axes, angular in the base's own, shape (samples, 6).
-    """
+    """Pose (position, quaternion) and velocity of a base as Pinocchio has them, from MuJoCo's."""
     place, w, xyz = pose[:, :3], pose[:, 3:4], pose[:, 4:]
     linear = velocity[:, :3]
     # v' = R^T v, R of the quaternion: v + 2 w (v x u) + 2 (v x u) x u, u its vector part.
@@ -459,16 +419,10 @@ def real_world(
 
 
 def centre_of_mass(zmp: Array, rate: float) -> Array:
-    """Motion of the centre of mass for a zero-moment point.
+    """Motion of the centre of mass for a zero-moment point that is at rest at both ends, in [m].
 
-    Args:
-        zmp: Zero-moment point at each tick, at rest at both ends, shape (ticks, 2), in [m].
-        rate: Natural frequency of the inverted pendulum, in [rad/s].
-
-    Returns:
-        The bounded solution of c - c''/rate² = zmp, shape (ticks, 2), in [m].
+    The bounded solution of c - c''/rate² = zmp (Kajita et al., ICRA 2003), as a banded system.
     """
-    # Kajita et al., Biped walking pattern generation, ICRA 2003; here as one banded system.
     stiff = 1 / (rate * TICK) ** 2
     bands = np.zeros((3, len(zmp)))
     bands[0, 2:] = bands[2, :-2] = -stiff
