@@ -21,7 +21,6 @@ import numpy as np
 KINDS = ("paper", "normal")  # kinds of the extended noise that are computed
 PACKAGES = ("numpy", "scipy", "scikit-learn", "pin", "mujoco")
 """Libraries whose versions may change results."""
-ESTIMATORS = ("svm", "networks", "trees")  # estimators of log-band energies that are trained
 RATE = 10000.0  # sample rate of NoisyTest's data set, in [Hz]
 CHUNK = 64  # frames whose features are computed at once
 
@@ -77,10 +76,7 @@ class Probe:
     def __init__(self, names: Names, output: Path, models: Mapping[str, str]) -> None:
         """Load the models, by the names of their files."""
         self.names, self.output = names, output
-        try:
-            load = names("noiseclassifier.load")
-        except AttributeError:  # before 0.4, all models are of one rate
-            load = names("noiseclassifier.Classifier.load")
+        load = names("noiseclassifier.load")
         self._models = {name: load(path) for name, path in models.items()}
 
     def keep(self, run: str, what: str, **arrays: Any) -> None:
@@ -128,28 +124,19 @@ class Probe:
                 self._classify(name, model, classifier, {"noise": noise}, valid=None)
 
     def train(self, name: str, folder: str) -> None:
-        """Train each kind of model on NoisyTest's data set, and decide on the validation part."""
-        read, log_bands = (
-            self.names("noiseclassifier.Dataset.read"),
-            self.names("noiseclassifier.LogBands"),
-        )
-        original = self.names("noiseclassifier.Profile.noisytest")("rbf")
-        estimator = older("noiseclassifier.LogBands.estimator", self.names.renamed).rpartition(".")[
-            2
-        ]
-        profiles = {kind: log_bands(**{estimator: kind}).at(RATE) for kind in ESTIMATORS}
-        trained = {
-            what: self.names("noiseclassifier.Classifier.train")(
-                read(Path(folder, "training"), profile), profile
-            )
-            for what, profile in {"noisytest-rbf": original, **profiles}.items()
+        """Train each kind of model on NoisyTest's data set, and classify the validation part."""
+        read = self.names("noiseclassifier.Dataset.read")
+        profiles = {
+            "noisytest-rbf": self.names("noiseclassifier.Profile.noisytest")("rbf"),
+            "logbands": self.names("noiseclassifier.LogBands")().at(RATE),
         }
-        validation = read(Path(folder, "validation"), original, training=False)
-        frames = self.names.field("noiseclassifier.Dataset.frames", validation)
-        for what, classifier in trained.items():
-            decisions = self.names("noiseclassifier.Classifier.decision")(classifier, frames)
-            scores = self.names("noiseclassifier.Classifier.scores")(classifier, frames)
-            self.keep(name, f"{what}, trained", decisions=decisions, scores=scores)
+        for what, profile in profiles.items():
+            training = read(Path(folder, "training"), profile)
+            classifier = self.names("noiseclassifier.Classifier.train")(training, profile)
+            for log in sorted(Path(folder, "validation").glob("*.log")):
+                _, noise = self.names("noiseclassifier.read_log")(log)
+                labels = self.names("noiseclassifier.Classifier.classify")(classifier, noise, RATE)
+                self.keep(name, f"{what}, trained, {log.stem}", scores=labels.scores)
 
     def _link_noise(self, name: str, run: Any) -> None:
         """Compute the extended noise of a run that has a robot and positions."""

@@ -10,9 +10,16 @@ import noisemodel as nm
 from noiseclassifier.signals import JOINTS, MOTION, NOISE
 
 RECIPE = replace(nc.ANY, rounds=8, leaves=4)
-ONE_RATE = replace(nc.EACH, rounds=8)
 RATES = (80.0, 125.0, 500.0, 1000.0)
 SECONDS = 5.0
+
+
+def relative(names=(NOISE,), rate=1000.0):
+    """A profile of one rate, relative to the level of a frame as models of earlier versions are."""
+    recipe = nc.LogBands(
+        floor=1e-3, quick=0.02, speed=True, estimator="detector", alarm=0.6, rounds=8, leaves=4
+    )
+    return replace(recipe.at(rate), signals=names, relative=True)
 
 
 def signals(rate, label="ok", seed=0, names=(*MOTION, *JOINTS), seconds=SECONDS):
@@ -56,7 +63,7 @@ def frames(recipe=RECIPE):
         for seed in range(2)
         for label in ("ok", "impact", "oscillations")
     ]
-    return nc.Examples.joined(nc.frames_of(recordings, recipe))
+    return nc.Dataset.joined(nc.frames_of(recordings, recipe))
 
 
 @cache
@@ -67,7 +74,7 @@ def trained():
 @cache
 def fixed(names=(NOISE,), rate=1000.0):
     """A model of one rate trained on a Panda, by the noise alone unless told."""
-    profile = replace(ONE_RATE, signals=names).at(rate)
+    profile = relative(names, rate)
     recordings = [
         recording(rate, label, seed, names)
         for seed in range(2)

@@ -34,7 +34,7 @@ COMMANDS = {
     "smoothness": ("good",),
     "import": ("log.csv", "-o", "out/run.npz"),
     "export": ("run.npz", "-o", "out/run.csv"),
-    "train": ("annotated", "--profile", "scalar", "--rate", "1000", "-o", "out/model.npz"),
+    "train": ("annotated", "--profile", "logbands", "--rate", "1000", "-o", "out/model.npz"),
     "tune": ("fast", *TUNE, "-o", "out/t"),
     "evaluate": ("general", "annotated"),
     "simulate": ("run", "panda", "--duration", "3", "-o", "out/simulated.npz"),

@@ -251,10 +251,7 @@ def test_a_model_is_trained_and_evaluated(tmp_path):
     model = tmp_path / "model.npz"
     runs = [tmp_path / f"run{seed}.npz" for seed in range(2)]
     call = ["train", *runs, "-o", model, "--rate", 1000]
-    status, _, err = inspector(*call, "--profile", "norms")
-    assert (status, err.count("\n")) == (3, 1)
-    assert "left out: 2 runs without desired velocities, e.g. run0; --profile scalar" in err
-    status, out, _ = inspector(*call, "--profile", "scalar")
+    status, out, _ = inspector(*call, "--profile", "logbands")
     assert status == 0
     assert "Subset accuracy" in out
     status, out, _ = inspector("evaluate", model, *runs, "--seen-too")
@@ -272,7 +269,10 @@ def test_a_profile_that_does_not_exist_at_a_rate_is_one_line(tmp_path):
     status, _, err = inspector(*arguments, "noisytest-rbf", "--rate", 1000)
     assert (status, "exists at 10000 Hz only" in err) == (2, True)
     status, _, err = inspector(*arguments, "best")
-    assert (status, "no profile 'best' of one rate; there are joints, norms" in err) == (2, True)
+    assert (status, "no profile 'best' of one rate; there are logbands, noisytest-rbf" in err) == (
+        2,
+        True,
+    )
     status, _, err = inspector("train", run, "-o", tmp_path / "m.npz")
     assert (status, "left out: 1 run without annotated blocks" in err) == (3, True)
 

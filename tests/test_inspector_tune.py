@@ -124,7 +124,7 @@ def test_the_best_point_is_the_one_that_is_trained(data, whole, tmp_path):
     assert out.endswith(f"{model}: written, the best point trained on all training runs\n")
     points = lines(whole[0])[1:]
     best = min(points, key=lambda point: (-point["balanced_accuracy"], point["log_loss"]))
-    classifier = nc.Classifier.load(model)
+    classifier = nc.load(model)
     for name in ("stride", "gamma", "regularization"):
         assert getattr(classifier.profile, name) == best[name]
     metrics = classifier.metrics["validation"]
@@ -298,7 +298,7 @@ def test_two_processes_do_not_write_one_file(data, tmp_path):
 @pytest.mark.parametrize(
     ("more", "reason"),
     [
-        (("--profile", "mfcc"), "no profile 'mfcc' of one rate; there are joints, norms, scalar"),
+        (("--profile", "mfcc"), "no profile 'mfcc' of one rate; there are logbands, noisytest-rbf"),
         (("--profile", "paper-rbf"), "profile paper-rbf exists at 10000 Hz only, not 1000"),
     ],
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.dataset import cut
+from noiseclassifier.dataset import cut, cut_frames
 from noiseclassifier.recording import Block, Recording
 
 PROFILE = replace(nc.Profile.paper(), rate=1000.0, length=400, hop=100, window=256, stride=48)
@@ -24,6 +24,11 @@ def cut_block(begin, stop, profile=PROFILE, *, training=True, **changes):
     return cut(recording(block, **changes), block, profile, training=training)[0]
 
 
+def first_frames(recording, profile=PROFILE):
+    """All frames that training cuts from a recording."""
+    return np.concatenate([each for _, each in cut_frames(recording, profile, training=True)])
+
+
 def test_a_block_holds_its_start_and_not_its_stop():
     assert cut_block(1.0, 1.5).tolist() == list(range(1000, 1500))
 
@@ -34,8 +39,8 @@ def test_time_counts_from_the_start_of_the_recording():
 
 def test_an_open_block_reaches_the_last_sample():
     assert cut_block(2.5, inf).tolist() == list(range(2500, 3000))
-    ours = replace(nc.LogBands().at(1000.0), spread_failures=False)
-    assert cut_block(2.5, inf, ours).tolist() == list(range(2500, 3000))
+    ours = nc.LogBands().at(1000.0)
+    assert cut_block(2.5, inf, ours, training=False).tolist() == list(range(2500, 3000))
 
 
 def test_a_short_block_is_padded_in_training():
@@ -78,10 +83,15 @@ def test_a_dataset_keeps_labels_runs_and_hashes():
     walk = recording(Block(0.0, 0.5, "ok"), Block(0.6, 0.7, "impact"))
     stand = recording(Block(1.0, 1.6, "ok"), name="stand", sha256="abc")
     dataset = nc.Dataset.of([walk, stand], PROFILE)
+    joined = nc.Dataset.joined(nc.Dataset.of([each], PROFILE) for each in (walk, stand))
+    for field in ("features", "labels", "runs"):
+        assert np.array_equal(getattr(joined, field), getattr(dataset, field))
+    assert joined.hashes == dataset.hashes
     assert dataset.labels.tolist() == ["ok", "ok", "impact", "ok", "ok", "ok"]
     assert dataset.runs.tolist() == ["walk"] * 3 + ["stand"] * 3
-    assert dataset.frames[:, 0].tolist() == [0, 100, 600, 1000, 1100, 1200]
-    assert dataset.frames.shape == (6, 400)
+    frames = np.concatenate([first_frames(each) for each in (walk, stand)])
+    assert frames[:, 0].tolist() == [0, 100, 600, 1000, 1100, 1200]
+    assert np.array_equal(dataset.features, nc.features(frames, PROFILE))
     assert dict(dataset.hashes) == {"walk": walk.sha256, "stand": "abc"}
 
 
@@ -89,9 +99,8 @@ def test_frames_that_touch_a_gap_are_left_out():
     valid = np.ones(3000, bool)
     valid[450] = False
     walk = recording(Block(0.0, 1.0, "ok"), Block(0.44, 0.46, "ok"), valid=valid)
-    dataset = nc.Dataset.of([walk], PROFILE)
-    assert dataset.frames[:, 0].tolist() == [0, 500, 600]
-    assert dataset.labels.tolist() == ["ok"] * 3
+    assert first_frames(walk)[:, 0].tolist() == [0, 500, 600]
+    assert nc.Dataset.of([walk], PROFILE).labels.tolist() == ["ok"] * 3
 
 
 def test_a_label_that_is_no_class_is_named():
@@ -179,8 +188,7 @@ def test_our_profile_trains_on_failures_anywhere_in_a_frame(duration):
     profile = nc.LogBands().at(1000.0)
     signal = np.arange(4000.0)
     block = Block(2.0, 2.0 + duration, "impact")
-    dataset = nc.Dataset.of([Recording("a", signal, 1000.0, (block,))], profile)
-    first = dataset.frames[:, 0]
+    first = first_frames(Recording("a", signal, 1000.0, (block,)), profile)[:, 0]
     overlap = np.minimum(first + 400, 2000 + 1000 * duration) - np.maximum(first, 2000)
     assert len(first) > 2
     assert overlap.min() >= min(1000 * duration, 200) - 1e-9

@@ -8,8 +8,7 @@ import pytest
 from generalmodel import RATES, RECIPE, frames, recording, signals, trained
 
 import noiseclassifier as nc
-from noiseclassifier.classifier import LEARNT
-from noiseclassifier.estimators.trees import Trees
+from noiseclassifier.classifier import TAKEN
 from noiseclassifier.features import frame_features
 from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, columns
 from noiseclassifier.signals import JOINTS, MOTION, NOISE
@@ -136,7 +135,7 @@ def test_a_general_model_is_nearer_than_one_of_a_lower_rate_and_yields_to_more_s
 def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_feed():
     one = recording(500.0, "oscillations", 0)
     parts = list(nc.frames_of([one], RECIPE))
-    feeding = [names for names in LEARNT if set(names) <= {*one.signal, NOISE}]
+    feeding = [names for names in TAKEN if set(names) <= {*one.signal, NOISE}]
     assert len(parts) == len(feeding)
     for names, part in zip(feeding, parts, strict=True):
         profile = RECIPE.bound(500.0, names)
@@ -178,51 +177,9 @@ def test_features_relative_to_a_reference_are_never_novel():
 
 
 def test_training_takes_two_classes():
-    alone = nc.Examples.joined(nc.frames_of([recording(500.0, "ok", 0)], RECIPE))
+    alone = nc.Dataset.joined(nc.frames_of([recording(500.0, "ok", 0)], RECIPE))
     with pytest.raises(nc.DatasetError, match="two classes or more of ok, impact, .* are ok"):
         nc.General.train(alone, RECIPE)
-
-
-def test_a_split_sends_a_missing_feature_where_training_chose():
-    trees = Trees(
-        feature=np.array([[0.0], [1.0]]),
-        threshold=np.zeros((2, 1)),
-        left=np.array([[[0.0], [0.0]], [[1.0], [1.0]]]),
-        missing=np.array([[1.0], [0.0]]),
-        leaf=np.array([[1.0, 2.0], [10.0, 20.0]]),
-        prior=np.zeros(2),
-        calibration=np.array([1.0, 0.0, 0.0]),
-        frequency=np.array([0.5, 0.5]),
-        known=np.array([9.0, 9.0]),
-        alarm=0.5,
-    )
-    features = np.array([[-1.0, 1.0], [np.nan, 1.0], [-1.0, np.nan], [np.nan, np.nan]])
-    expected = [[1.0, 20.0], [2.0, 20.0], [1.0, 10.0], [2.0, 10.0]]
-    np.testing.assert_array_equal(trees.logits(features), expected)
-    fewer = trees.at(np.array([1]))
-    np.testing.assert_array_equal(fewer.logits(features[:2, 1:]), [[2.0, 20.0], [2.0, 20.0]])
-    np.testing.assert_array_equal(trees.at(np.array([0])).logits(features[:1, :1]), [[1.0, 10.0]])
-
-
-@pytest.mark.parametrize("leaves", [2, 4])
-def test_trees_have_the_probabilities_of_scikit_learn_where_features_are_missing(leaves):
-    from sklearn.ensemble import HistGradientBoostingClassifier
-
-    random = np.random.default_rng(0)
-    features = random.normal(size=(500, 5))
-    targets = (features[:, 0] > features[:, 2]).astype(int) + (features[:, 1] > 0.5)
-    features[random.random(features.shape) < 0.3] = np.nan
-    profile = replace(nc.GENERAL.at(1000.0), rounds=10, leaves=leaves)
-    ours = Trees.fit(features, targets, np.array(["one"] * 500), profile)
-    theirs = HistGradientBoostingClassifier(
-        max_iter=10, learning_rate=0.15, max_leaf_nodes=leaves, l2_regularization=1.0,
-        early_stopping=False, random_state=0,
-    ).fit(features, targets)  # fmt: skip
-    points = random.normal(size=(100, 5))
-    points[random.random(points.shape) < 0.3] = np.nan
-    np.testing.assert_allclose(
-        ours.score(ours.decision(points)), theirs.predict_proba(points), rtol=1e-9
-    )
 
 
 def test_a_part_of_the_frames_may_lack_a_feature_that_others_have():
@@ -231,7 +188,7 @@ def test_a_part_of_the_frames_may_lack_a_feature_that_others_have():
         for seed, rate in enumerate((80.0, 125.0, 125.0, 500.0))
         for label in ("ok", "oscillations")
     ]
-    model = nc.General.train(nc.Examples.joined(nc.frames_of(recordings, RECIPE)), RECIPE)
+    model = nc.General.train(nc.Dataset.joined(nc.frames_of(recordings, RECIPE)), RECIPE)
     shaken = signals(500.0, "oscillations", seed=12)
     labels = model.at(500.0, shaken).classify(shaken, 500.0)
     assert "oscillations" in {event.label for event in labels.events()}
@@ -267,11 +224,6 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
     assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
 
 
-def test_a_model_for_any_rate_is_no_classifier(path):
-    with pytest.raises(nc.FileError, match="is a model for any rate"):
-        nc.Classifier.load(path)
-
-
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
@@ -291,10 +243,6 @@ def test_a_model_for_any_rate_is_no_classifier(path):
         ({"highest": 1000.0}, "array 'known' has shape"),
         ({"estimator": "svm"}, "a recipe for any rate has trees and a reference"),
         ({"reference": False}, "expected 'log' and one of both"),
-        (
-            {"reference": False, "relative": True},
-            "reference False",
-        ),
     ],
 )
 def test_a_wrong_recipe_is_refused(path, changes, reason):
@@ -324,36 +272,3 @@ def test_a_damaged_file_is_refused(path, name, change, reason):
     rewrite(path, **{name: change(array)})
     with pytest.raises(nc.FileError, match=rf"model.npz: .*{reason}"):
         nc.load(path)
-
-
-# --- files of older formats
-
-
-def older(path, version):
-    """Write a file of trees as an older version did: without `missing` and `reference`."""
-    with np.load(path, allow_pickle=False) as members:
-        manifest = json.loads(str(members["manifest"]))
-    profile = dict(manifest["profile"])
-    del profile["reference"]
-    if version == 4:
-        profile["machine"] = profile.pop("estimator")
-    changes = {"format": f"noise-model/{version}", "profile": profile}
-    rewrite(path, changes, missing=None)
-
-
-@pytest.mark.parametrize("version", [4, 5])
-def test_trees_of_older_formats_decide_as_before(version, tmp_path):
-    profile = replace(nc.EACH.at(500.0), rounds=5)
-    recordings = [
-        recording(500.0, label, seed) for seed in range(2) for label in ("ok", "oscillations")
-    ]
-    before = nc.Classifier.train(nc.Dataset.of(recordings, profile), profile)
-    before.save(tmp_path / "model.npz")
-    older(tmp_path / "model.npz", version)
-    loaded = nc.load(tmp_path / "model.npz")
-    assert isinstance(loaded, nc.Classifier)
-    assert loaded.profile == profile
-    there = signals(500.0, "oscillations", seed=40)
-    np.testing.assert_array_equal(
-        loaded.classify(there, 500.0).scores, before.classify(there, 500.0).scores
-    )

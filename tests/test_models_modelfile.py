@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from generalmodel import relative
 
 import noiseclassifier as nc
+from noiseclassifier.estimators import Networks, Trees, calibrated
+from noiseclassifier.features import feature_count
 
 PROFILE = nc.LogBands(classes=("ok", "rattle", "squeal")).at(500.0)
 RANDOM = np.random.default_rng(5)
@@ -29,7 +32,7 @@ def trained(profile=PROFILE):
 
 
 CLASSIFIER = trained()
-FRAMES = 1.0 + 0.1 * RANDOM.random((20, PROFILE.length))
+FEATURES = nc.features(1.0 + 0.1 * RANDOM.random((20, PROFILE.length)), PROFILE)
 
 
 @pytest.fixture
@@ -56,7 +59,7 @@ def rewrite_manifest(path, **changes):
 
 def refused(path, reason):
     with pytest.raises(nc.FileError, match=rf"model.npz: .*{reason}"):
-        nc.Classifier.load(path)
+        nc.load(path)
 
 
 @pytest.mark.parametrize(
@@ -66,17 +69,15 @@ def refused(path, reason):
         {"kernel": "linear"},
         {"multiclass": "one-vs-rest"},
         {"least_deviation": 0.0},
-        {"estimator": "trees", "rounds": 3, "leaves": 4},
         {"estimator": "detector", "rounds": 3, "leaves": 4},
-        {"estimator": "networks", "networks": 2, "units": 4, "epochs": 2},
     ],
 )
 def test_a_model_that_was_saved_decides_as_before(tmp_path, changes):
     classifier = trained(replace(PROFILE, **changes))
     classifier.save(tmp_path / "model.npz")
-    loaded = nc.Classifier.load(tmp_path / "model.npz")
-    assert np.array_equal(loaded.decision(FRAMES), classifier.decision(FRAMES))
-    assert np.array_equal(loaded.predict(FRAMES), classifier.predict(FRAMES))
+    loaded = nc.load(tmp_path / "model.npz")
+    assert np.array_equal(loaded.decide(FEATURES), classifier.decide(FEATURES))
+    assert np.array_equal(loaded.predict(FEATURES), classifier.predict(FEATURES))
     assert loaded.profile == classifier.profile
     assert loaded.classes == ("ok", "rattle", "squeal")
     assert (loaded.runs, loaded.metrics) == (classifier.runs, classifier.metrics)
@@ -94,7 +95,7 @@ def test_a_baseline_of_an_earlier_version_is_refused_with_what_replaces_it(path)
 def test_numpy_alone_reads_it_too(path):
     with np.load(path, allow_pickle=False) as members:
         manifest = json.loads(str(members["manifest"]))
-    assert manifest["format"] == "noise-model/6"
+    assert manifest["format"] == "noise-model/7"
     assert manifest["rate"] == 500.0
     assert manifest["metrics"]["training"]["subset_accuracy"] == 1.0
     assert set(manifest["runs"]) == {"ok", "rattle", "squeal"}
@@ -112,7 +113,7 @@ def test_of_two_that_write_one_model_at_once_the_second_fails(path, monkeypatch,
 
     monkeypatch.setattr(os, "link", late)
     with pytest.raises(nc.OutputError, match=r"new\.npz: exists already"):
-        nc.Classifier.load(path).save(target)
+        nc.load(path).save(target)
     assert target.read_text() == "first"
     assert sorted(os.listdir(path.parent)) == sorted({path.name, "new.npz"})
 
@@ -170,18 +171,18 @@ def test_a_truncated_file_is_refused(path, share):
 
 def test_a_flipped_bit_anywhere_is_refused_or_harmless(path):
     content = path.read_bytes()
-    expected = CLASSIFIER.decision(FRAMES)
+    expected = CLASSIFIER.decide(FEATURES)
     refusals = 0
     for position in RANDOM.integers(0, len(content), 200):
         damaged = bytearray(content)
         damaged[position] ^= 1 << int(RANDOM.integers(8))
         path.write_bytes(damaged)
         try:
-            loaded = nc.Classifier.load(path)
+            loaded = nc.load(path)
         except nc.FileError:
             refusals += 1
         else:
-            assert np.array_equal(loaded.decision(FRAMES), expected)
+            assert np.array_equal(loaded.decide(FEATURES), expected)
     assert refusals > 150
 
 
@@ -272,8 +273,8 @@ def test_a_version_that_is_not_installed_is_said(monkeypatch):
         ({"manifest": np.array("{")}, "manifest is no JSON"),
         (
             {"manifest": np.array("[]")},
-            r"is of format \[\], this version reads 'noise-model/6', 'noise-model/4',"
-            " 'noise-model/5'",
+            r"is of format \[\], this version reads 'noise-model/7', 'noise-model/4',"
+            " 'noise-model/5', 'noise-model/6'",
         ),
     ],
 )
@@ -312,9 +313,84 @@ def test_wrong_manifests_are_refused(path, changes, reason):
     ],
 )
 def test_trees_with_children_or_features_out_of_range_are_refused(path, name, value, reason):
-    classifier = trained(replace(PROFILE, estimator="trees", rounds=3, leaves=4))
+    classifier = trained(replace(PROFILE, estimator="detector", rounds=3, leaves=4))
     classifier.save(path, overwrite=True)
-    array = classifier.estimator.arrays()[name].copy()
+    array = getattr(classifier.estimator, name).copy()
     array.flat[5] = value
     rewrite(path, **{name: array})
     refused(path, reason)
+
+
+# --- files of earlier versions
+
+EARLIER = {
+    "single_precision": False,
+    "drop_first_sample": False,
+    "flush_end": True,
+    "name": "logbands",
+    "networks": 5,
+    "widen_extra": 0,
+}
+"""Some of the settings that profiles had up to version 6."""
+
+
+def earlier(path, version=6, **profile):
+    """Write a model file anew as an earlier version did."""
+    with np.load(path, allow_pickle=False) as members:
+        settings = json.loads(str(members["manifest"]))["profile"] | EARLIER | profile
+    if version < 6:
+        del settings["reference"]
+        rewrite(path, missing=None)
+    if version < 5:
+        settings["machine"] = settings.pop("estimator")
+    rewrite_manifest(path, format=f"noise-model/{version}", profile=settings)
+
+
+@pytest.mark.parametrize("version", [4, 5, 6])
+@pytest.mark.parametrize("estimator", ["svm", "detector", "trees"])
+def test_models_of_earlier_versions_decide_as_before(path, version, estimator):
+    profile = relative(rate=500.0)
+    changes = {"classes": PROFILE.classes, "estimator": "svm" if estimator == "svm" else "detector"}
+    before = trained(replace(profile, **changes))
+    before.save(path, overwrite=True)
+    earlier(path, version, estimator=estimator)
+    loaded = nc.load(path)
+    assert loaded.profile == replace(before.profile, estimator=estimator)
+    features = RANDOM.normal(size=(20, len(before.mean)))
+    expected = before.decide(features)
+    if estimator == "trees":  # their logits are the sums of leaves
+        ours = before.estimator
+        sums = Trees.logits(ours, (features - before.mean) / before.scale)
+        expected[:, :-1] = calibrated(sums, ours.calibration)
+    np.testing.assert_array_equal(loaded.decide(features), expected)
+
+
+def test_networks_of_earlier_versions_decide(path):
+    profile = replace(relative(rate=500.0), classes=PROFILE.classes)
+    count = feature_count(profile)
+    arrays = {
+        "hidden": RANDOM.normal(size=(2, count, 4)),
+        "hidden_bias": RANDOM.normal(size=(2, 4)),
+        "output": RANDOM.normal(size=(2, 4, 3)),
+        "output_bias": RANDOM.normal(size=(2, 3)),
+        "calibration": np.array([1.0, 0.0, 0.1, 0.2]),
+        "frequency": np.full(3, 1 / 3),
+        "known": np.array([[-1.0] * count, [2.0] * count]),
+    }
+    trained(replace(profile, estimator="svm")).save(path, overwrite=True)
+    rewrite(path, vectors=None, coefficients=None, intercept=None, **arrays)
+    earlier(path, estimator="networks", networks=2, units=4)
+    loaded = nc.load(path)
+    features = RANDOM.normal(size=(20, count))
+    expected = Networks(**arrays, alarm=0.6).decision((features - loaded.mean) / loaded.scale)
+    np.testing.assert_array_equal(loaded.decide(features), expected)
+    with pytest.raises(nc.ProfileError, match="networks cannot be trained, only svm, det"):
+        trained(loaded.profile)
+    rewrite(path, output=arrays["output"][:, :3])
+    refused(path, r"array 'output' has shape \(2, 3, 3\), its profile asks for \(2, 4, 3\)")
+
+
+@pytest.mark.parametrize("setting", ["single_precision", "drop_first_sample", "flush_end"])
+def test_a_mixture_of_profiles_that_earlier_versions_could_have_is_refused(path, setting):
+    earlier(path, **{setting: not EARLIER[setting]})
+    refused(path, f"that this version cannot follow: {setting} {not EARLIER[setting]} with bands")

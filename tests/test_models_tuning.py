@@ -102,8 +102,7 @@ def test_what_is_wrong_with_a_grid_is_named(texts, reason):
     [
         ("stride=4001", RBF, "stride of 4001 samples is longer than a frame of 4000"),
         ("gamma=1", nc.Profile.noisytest("linear"), "gamma does nothing with the linear"),
-        ("leaves=8", RBF, "leaves does nothing with support vector machines; leave it out"),
-        ("C=1", replace(RBF, estimator="trees"), "regularization does nothing with trees"),
+        ("leaves=8", RBF, "no setting 'leaves' to tune; there are window, stride, bands"),
         ("C=0", RBF, "regularization is 0.0, expected more than 0"),
         ("bands=comb,third", RBF, "bands is 'third', expected one of adjacent, comb, log"),
         ("window=512", RBF, "expected a multiple of three"),
@@ -153,8 +152,8 @@ def test_certain_and_right_margins_have_no_loss():
 
 SMALL = {"rate": 1000.0, "length": 400, "hop": 100, "window": 256, "stride": 48}
 PROFILES = {
-    "noisytest": replace(nc.Profile.noisytest(), **SMALL, open_end=100),
-    "noisytest-linear": replace(nc.Profile.noisytest("linear"), **SMALL, open_end=100),
+    "noisytest": replace(nc.Profile.noisytest(), **SMALL),
+    "noisytest-linear": replace(nc.Profile.noisytest("linear"), **SMALL),
     "paper": replace(nc.Profile.paper(), **SMALL),
     "paper-linear": replace(nc.Profile.paper("linear"), **SMALL),
     "logbands": nc.LogBands().at(1000.0),
@@ -194,7 +193,7 @@ class Sets:
         """What a classifier of its own calls the frames to check."""
         known = nc.Dataset.of(self.learn, profile)
         fresh = nc.Dataset.of(self.check, profile, training=False)
-        return nc.Classifier.train(known, profile).predict(fresh.frames)
+        return nc.Classifier.train(known, profile).predict(fresh.features)
 
 
 def sets(classes=nc.CLASSES, learn=range(4), check=range(4, 7)):
@@ -225,16 +224,6 @@ def assert_equal_to_training(points, sets):
 def test_a_point_predicts_what_a_classifier_with_its_profile_predicts(name):
     profile = PROFILES[name]
     assert_equal_to_training(some_points(profile), sets())
-
-
-@pytest.mark.parametrize(
-    ("estimator", "grid"),
-    [("trees", "leaves=4,8"), ("detector", "leaves=4,8"), ("networks", "epochs=1,2")],
-)
-def test_points_of_other_estimators_predict_what_a_classifier_predicts(estimator, grid):
-    profile = replace(PROFILES["logbands"], estimator=estimator, rounds=3, units=4, networks=2)
-    points = Grid.of([grid]).profiles(profile)
-    assert_equal_to_training(points, sets(learn=range(12), check=range(12, 14)))
 
 
 def test_too_many_frames_for_a_kernel_matrix_change_no_decision(monkeypatch):

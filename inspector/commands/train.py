@@ -25,8 +25,8 @@ def train(
     profile: Annotated[
         str,
         option(
-            "general, for any rate; or of one rate: joints, norms, scalar, logbands,"
-            " noisytest-rbf, noisytest-linear, paper-rbf or paper-linear."
+            "general, for any rate; or of one rate: logbands, noisytest-rbf, noisytest-linear,"
+            " paper-rbf or paper-linear."
         ),
     ] = "general",
     rate: Annotated[
@@ -54,10 +54,7 @@ Validation = Annotated[
 Folds = Annotated[int | None, option("Folds of the cross-validation.", min=2, show_default="5")]
 ProfileName = Annotated[
     str,
-    option(
-        "joints, norms, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
-        " paper-linear."
-    ),
+    option("logbands, noisytest-rbf, noisytest-linear, paper-rbf or paper-linear."),
 ]
 Grid = Annotated[
     list[str] | None,

@@ -32,9 +32,6 @@ RATE = 10_000.0
 THIN = 8
 """A general model learns from every so many `ok` frames of a log."""
 PROFILES: dict[str, Callable[[float], nc.Profile]] = {
-    "joints": nc.EACH.at,
-    "norms": nc.GENERAL.at,
-    "scalar": nc.SCALAR.at,
     "logbands": nc.LogBands().at,
     "noisytest-rbf": lambda _: nc.Profile.noisytest("rbf"),
     "noisytest-linear": lambda _: nc.Profile.noisytest("linear"),
@@ -42,12 +39,6 @@ PROFILES: dict[str, Callable[[float], nc.Profile]] = {
     "paper-linear": lambda _: nc.Profile.paper("linear"),
 }
 """Profiles by name, at a rate in [Hz]."""
-LACKING = {
-    "measured": "without measured velocities",
-    "desired": "without desired velocities",
-    "error": "without tracking errors",
-}
-"""Why a run is left out, by the first signal that it lacks."""
 
 
 def classified(
@@ -218,8 +209,8 @@ def train(
 ) -> tuple[nc.Evaluation, LeftOut]:
     """Train a model and write it.
 
-    Runs below the rate, those that lack a signal of the profile, and those without an annotation
-    are left out; a desired velocity that is a placeholder is none, as in `inspector classify`.
+    Runs below the rate and those without an annotation are left out; a desired velocity that is a
+    placeholder is none, as in `inspector classify`.
 
     Args:
         inputs: Annotated run files, folders of them, or NoisyTest folders.
@@ -244,19 +235,17 @@ def train(
             parts = list(nc.frames_of(usable, nc.ANY, thin=THIN))
             if not parts:
                 raise nc.NoFrameError(0, nc.ANY.classes)
-            examples = nc.Examples.joined(parts)
-            model = nc.General.train(examples, nc.ANY, thin=THIN)
+            frames = nc.Dataset.joined(parts)
+            model = nc.General.train(frames, nc.ANY, thin=THIN)
         else:
-            examples = nc.Examples.read(usable, chosen)
-            model = nc.Classifier.train(examples, chosen)
+            frames = nc.Dataset.of(usable, chosen)
+            model = nc.Classifier.train(frames, chosen)
     except nc.NoFrameError as error:
         if error.count or not left_out.runs:
             raise
-        scalar = set(LACKING.values()) & left_out.runs.keys()
-        hint = "; --profile scalar takes the noise alone" if scalar else ""
-        raise InspectorError(f"no run to train {profile} on; {left_out}{hint}") from error
+        raise InspectorError(f"no run to train {profile} on; {left_out}") from error
     model.save(output, overwrite=overwrite)
-    return model.evaluate(examples), left_out
+    return model.evaluate(frames), left_out
 
 
 def profile_at(name: str, rate: float) -> nc.Profile:
@@ -276,13 +265,7 @@ def lacking(each: nc.Recording | nc.Unanswered, profile: nc.Profile) -> str:
     """Why a profile cannot be trained on a run, in a few words; empty if it can."""
     if isinstance(each, nc.Unanswered):
         return f"below {profile.rate:g} Hz"
-    if not each.blocks:
-        return "without annotated blocks"
-    there = nc.signals.named(each.signal)
-    if nc.signals.feeds(there, profile.signals):
-        return ""
-    gone = [name for name in profile.signals if name not in there]
-    return next((LACKING[name] for name in gone if name in LACKING), "without joints")
+    return "" if each.blocks else "without annotated blocks"
 
 
 def evaluate(

@@ -95,7 +95,7 @@ class Tuned:
         if self.search.validation:
             ((first, second),) = self.trial.splits
             learn, check = [learn[i] for i in first], [learn[i] for i in second]
-        examples = nc.Examples.read(learn, best)
+        examples = nc.Dataset.of(learn, best)
         validation = nc.Dataset.of(check, best, training=False) if check else None
         trained = nc.Classifier.train(examples, best, validation=validation)
         trained.save(output, overwrite=overwrite)

@@ -4,14 +4,14 @@
 
 after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` holds
 all settings: NoisyTest's, the paper's, or ours for any rate (`LogBands`). A `Dataset` holds
-annotated frames, a `Classifier` is trained on them and labels signals, `evaluate` measures frames,
-and `assess` whole recordings. A `Stream` labels a signal sample by sample.
+annotated frames by their features, a `Classifier` is trained on them and labels signals, and
+`assess` measures it on whole recordings. A `Stream` labels a signal sample by sample.
 
 This package needs no robot: its input is a signal and its rate. It needs NumPy, and scikit-learn
 only to train.
 """
 
-from noiseclassifier.assessment import Assessment, assess, evaluate
+from noiseclassifier.assessment import Assessment, assess
 from noiseclassifier.bursts import Bursts
 from noiseclassifier.classifier import (
     Classifier,
@@ -22,7 +22,7 @@ from noiseclassifier.classifier import (
     load,
     nearest,
 )
-from noiseclassifier.dataset import Dataset, Examples
+from noiseclassifier.dataset import Dataset
 from noiseclassifier.errors import (
     AnnotationError,
     DatasetError,
@@ -42,15 +42,7 @@ from noiseclassifier.lasting import Lasting, merged
 from noiseclassifier.matching import Unanswered, match
 from noiseclassifier.measures import Evaluation
 from noiseclassifier.noisytest import nominal_rate, read_log
-from noiseclassifier.profile import (
-    ANY,
-    CLASSES,
-    EACH,
-    GENERAL,
-    SCALAR,
-    LogBands,
-    Profile,
-)
+from noiseclassifier.profile import ANY, CLASSES, LogBands, Profile
 from noiseclassifier.recording import (
     Block,
     Fault,
@@ -65,10 +57,7 @@ from noiseclassifier.signals import NOISE, Signals
 __all__ = [
     "ANY",
     "CLASSES",
-    "EACH",
-    "GENERAL",
     "NOISE",
-    "SCALAR",
     "UNKNOWN",
     "AnnotationError",
     "Assessment",
@@ -79,7 +68,6 @@ __all__ = [
     "DatasetError",
     "Evaluation",
     "Event",
-    "Examples",
     "Fault",
     "FileError",
     "General",
@@ -102,7 +90,6 @@ __all__ = [
     "Unanswered",
     "assess",
     "check_apart",
-    "evaluate",
     "features",
     "folds",
     "frame",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from noiseclassifier.classifier import Classifier, Model
-from noiseclassifier.dataset import Dataset, Examples, check
+from noiseclassifier.dataset import Dataset, check
 from noiseclassifier.errors import DatasetError, SignalError
 from noiseclassifier.labels import Event, Labels, interval
 from noiseclassifier.matching import UNCLEAR, Predictions, Unanswered, origin_of, truth_of, within
@@ -173,7 +173,7 @@ def predict(
         with suppress(DatasetError):  # all blocks lie in gaps
             # Frames that are cut from blocks, as the paper does for validation.
             dataset = Dataset.of([recording], profile, training=False)
-            truth, predicted = dataset.labels, classifier.predict(dataset.frames)
+            truth, predicted = dataset.labels, classifier.predict(dataset.features)
     return Predictions(
         recording.name,
         group_of(recording.name),
@@ -216,14 +216,6 @@ def measure(
             predictions[0].labels.classes,
         ),
     )
-
-
-def evaluate(classifier: Classifier, dataset: Dataset) -> Evaluation:
-    """Confusion matrix of a classifier on annotated frames, and all measures that follow from it.
-
-    Labels that the classifier does not have count as missed.
-    """
-    return classifier.evaluate(Examples.of(dataset, classifier.profile))
 
 
 # --- as text

@@ -14,11 +14,11 @@ from typing import Any, Self, TypeAlias
 import numpy as np
 
 from noiseclassifier import modelfile
-from noiseclassifier.dataset import CHUNK, Dataset, Examples, features_in_chunks
-from noiseclassifier.errors import DatasetError, FileError, MissingSignalError, RateError
-from noiseclassifier.estimators import ESTIMATORS, Estimator
-from noiseclassifier.estimators.trees import Detector, Trees
+from noiseclassifier.dataset import Dataset
+from noiseclassifier.errors import DatasetError, MissingSignalError, ProfileError, RateError
+from noiseclassifier.estimators import ESTIMATORS, LEARNT, Detector, Estimator, Trees
 from noiseclassifier.features import (
+    CHUNK,
     FrameFeatures,
     Frames,
     Rest,
@@ -54,7 +54,7 @@ from noiseclassifier.signals import (
     stacked,
 )
 
-LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
+TAKEN = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
 """Of the inputs, those that training takes of each log: the others lack features of the first."""
 UNBOUNDED = 1e9
 """Highest value of features relative to the run: they say nothing of novelty."""
@@ -87,40 +87,35 @@ class Classifier:
 
     @classmethod
     def train(
-        cls,
-        dataset: Dataset | Examples,
-        profile: Profile,
-        *,
-        validation: Dataset | Examples | None = None,
+        cls, dataset: Dataset, profile: Profile, *, validation: Dataset | None = None
     ) -> Self:
         """Train a classifier; equal input gives an equal one. It needs scikit-learn.
 
         Args:
-            dataset: Annotated frames cut by the same profile, or their features.
+            dataset: Annotated frames by their features of the same profile.
             validation: Others, for measures.
 
         Raises:
             DatasetError: If the frames are of fewer than two classes.
-            SignalError: If the frames do not fit the profile.
+            ProfileError: If the estimator is of earlier versions.
         """
-        sets = {
-            name: Examples.of(each, profile) if isinstance(each, Dataset) else each
-            for name, each in (("training", dataset), ("validation", validation))
-            if each is not None
-        }
-        examples = sets["training"]
-        classes, targets = targets_of(examples.labels, profile.classes)
-        mean, scale = standard(examples.features, profile)
-        scaled = (examples.features - mean) / scale
-        estimator = ESTIMATORS[profile.estimator].fit(scaled, targets, examples.groups, profile)
-        model = cls(profile, classes, estimator, mean, scale, dict(examples.hashes))
-        metrics = {name: model.evaluate(each).as_dict() for name, each in sets.items()}
+        if profile.estimator not in LEARNT:
+            raise ProfileError(
+                f"estimator {profile.estimator} cannot be trained, only {', '.join(LEARNT)}"
+            )
+        classes, targets = targets_of(dataset.labels, profile.classes)
+        mean, scale = standard(dataset.features, profile)
+        scaled = (dataset.features - mean) / scale
+        estimator = LEARNT[profile.estimator].fit(scaled, targets, dataset.groups, profile)
+        model = cls(profile, classes, estimator, mean, scale, dict(dataset.hashes))
+        metrics = {"training": model.evaluate(dataset).as_dict()}
+        if validation is not None:
+            metrics["validation"] = model.evaluate(validation).as_dict()
         return replace(model, metrics=metrics, versions=modelfile.versions())
 
-    def evaluate(self, examples: Examples) -> Evaluation:
+    def evaluate(self, dataset: Dataset) -> Evaluation:
         """Measures of the model on frames, by their features."""
-        predicted = self._choose(self.decide(examples.features))
-        return Evaluation.of(examples.labels, predicted, self.classes)
+        return Evaluation.of(dataset.labels, self.predict(dataset.features), self.classes)
 
     def at(self, rate: float, signals: Collection[str]) -> "Classifier":
         """The model itself, if a log of that rate, in [Hz], and of these signals feeds it.
@@ -141,30 +136,15 @@ class Classifier:
         """Sample rate of its signals, in [Hz]."""
         return self.profile.rate
 
-    def predict(self, frames: Real) -> Words:
-        """Class of each frame, shape (frames,); see `decision`."""
-        return self._choose(self.decision(frames))
-
-    def scores(self, frames: Real) -> Array:
-        """Score of each class, larger meaning more certain, shape (frames, classes).
-
-        Networks and trees give probabilities, support vector machines votes and margins.
-        """
-        return self.estimator.score(self.decision(frames))
-
-    def decision(self, frames: Real) -> Array:
-        """Decision values, shape (frames, decisions); `noiseclassifier.estimators` define them.
-
-        Args:
-            frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length).
-
-        Raises:
-            SignalError: If the frames have another shape or values that are not finite.
-        """
-        return self.decide(features_in_chunks(frames, self.profile))
+    def predict(self, features: Real) -> Words:
+        """Class of each frame by its features, not yet standardised, shape (frames, features)."""
+        return self._choose(self.decide(features))
 
     def decide(self, plain: Real) -> Array:
-        """Decision values by features, not yet standardised, shape (frames, features)."""
+        """Decision values by features, not yet standardised; `noiseclassifier.estimators` has them.
+
+        The shapes are (frames, features) and (frames, decisions).
+        """
         chunks = range(0, max(len(plain), 1), CHUNK)
         parts = ((plain[first : first + CHUNK] - self.mean) / self.scale for first in chunks)
         return np.concatenate([self.estimator.decision(part) for part in parts])
@@ -210,24 +190,13 @@ class Classifier:
         self.check_rate(rate, "lower the signal's rate, or take another model")
         starts: list[Index] = []
         decisions: list[Array] = []
-        waiting = np.empty((0, len(self.mean)))
         rest = Rest() if whole and self.profile.reference else None
-
-        def decide(plain: Array) -> None:
+        for first, plain in features_of_pieces(pieces, self.profile):
+            starts.append(first)
             decisions.append(self.decide(plain))
             if rest is not None:
                 own = plain[:, : plain.shape[1] // 2]  # the other half is relative to the past
                 rest.add(own, self._choose(decisions[-1]) != "ok")
-
-        for first, plain in features_of_pieces(pieces, self.profile):
-            starts.append(first)
-            waiting = np.concatenate((waiting, plain)) if len(waiting) else plain
-            # The rounding of a decision depends on how many frames are decided at once.
-            if count := len(waiting) // CHUNK * CHUNK:
-                decide(waiting[:count])
-                waiting = waiting[count:]
-        if len(waiting) or not decisions:
-            decide(waiting)
         found, begins = np.concatenate(decisions), np.concatenate(starts)
         labels = self.labels(found, begins, rate, start=start)
         again = rest.relative(labels.flagged) if rest is not None else None
@@ -268,19 +237,6 @@ class Classifier:
         """
         settings = {"profile": self.profile.as_dict(), "rate": self.rate}
         modelfile.write(path, self, settings, overwrite=overwrite)
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a model file; nothing in it is unpickled or run.
-
-        Raises:
-            FileError: If the file is missing, damaged, no model file, of another version, or
-                a model for any rate.
-        """
-        model = load(path)
-        if not isinstance(model, cls):
-            raise FileError(path, "is a model for any rate; read it by noiseclassifier.load")
-        return model
 
     def _choose(self, decisions: Array) -> Words:
         return np.array((*self.classes, UNKNOWN))[self.estimator.choose(decisions)]
@@ -396,7 +352,7 @@ class General:
     sha256: str = ""
 
     @classmethod
-    def train(cls, frames: Examples, recipe: LogBands, *, thin: int = 1) -> Self:
+    def train(cls, frames: Dataset, recipe: LogBands, *, thin: int = 1) -> Self:
         """Train a model; equal input gives an equal one. It needs scikit-learn.
 
         Args:
@@ -426,7 +382,7 @@ class General:
         metrics = {"training": model.evaluate(frames).as_dict()}
         return replace(model, metrics=metrics, versions=modelfile.versions())
 
-    def evaluate(self, frames: Examples) -> Evaluation:
+    def evaluate(self, frames: Dataset) -> Evaluation:
         """Measures of the model on frames."""
         decisions = self.estimator.decision((frames.features - self.mean) / self.scale)
         names = np.array((*self.classes, UNKNOWN))
@@ -469,8 +425,8 @@ def frames_of(
     recipe: LogBands,
     *,
     thin: int = 1,
-    inputs: Sequence[Sequence[str]] = LEARNT,
-) -> Iterator[Examples]:
+    inputs: Sequence[Sequence[str]] = TAKEN,
+) -> Iterator[Dataset]:
     """Labelled frames of recordings, once for each of the inputs that they feed.
 
     Frames are those that classifying would cut, relative to the recording itself. Frames of which
@@ -499,7 +455,7 @@ def frames_of(
             full[:, recipe.places(profile)] = features[kept]
             full[:, efforts] = np.nan  # their unit is not known, but relative to the run it is none
             runs = np.full(len(full), recording.name)
-            yield Examples(full, truth[kept], runs, {recording.name: recording.sha256})
+            yield Dataset(full, truth[kept], runs, {recording.name: recording.sha256})
 
 
 # --- files, and the choice of a model

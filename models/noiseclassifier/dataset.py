@@ -1,8 +1,7 @@
-"""Data sets: labelled frames of many recordings, and their features to train an estimator with."""
+"""Data sets: features of the labelled frames of many recordings, to train an estimator with."""
 
-from collections.abc import Collection, Iterable, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Self
@@ -10,29 +9,29 @@ from typing import Self
 import numpy as np
 
 from noiseclassifier.errors import DatasetError, NoFrameError, RateError, RecordingError
-from noiseclassifier.features import features, frame
+from noiseclassifier.features import features, first_sample, frame
 from noiseclassifier.noisytest import read_folder
 from noiseclassifier.profile import NOMINAL, Profile
 from noiseclassifier.recording import Block, Recording, group_of
-from noiseclassifier.signals import Array, Mask, Real, Words, stacked
+from noiseclassifier.signals import Mask, Real, Words, stacked
 
-CHUNK = 64
-"""Frames per evaluation, which bounds the memory that they take."""
+OPEN_END = 1000
+"""Samples after the last one at which NoisyTest stops a block that lasts to the end."""
 
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """Labelled frames; recordings and their blocks keep their order.
+    """Labelled frames by their features; recordings and their blocks keep their order.
 
     Attributes:
-        frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length)
-            if the profile has several.
+        features: Not yet standardised; of logs of any rates, NaN where one is missing, shape
+            (frames, features).
         labels: Class of each frame, shape (frames,).
         runs: Name of the recording that each frame is from, shape (frames,).
         hashes: SHA-256 of each recording, by name.
     """
 
-    frames: Real
+    features: Real
     labels: Words
     runs: Words
     hashes: Mapping[str, str]
@@ -41,7 +40,7 @@ class Dataset:
     def of(
         cls, recordings: Iterable[Recording], profile: Profile, *, training: bool = True
     ) -> Self:
-        """Frame the annotated blocks of recordings, and leave out frames that touch a gap.
+        """Frames of the annotated blocks of recordings, which are read one after the other.
 
         Args:
             recordings: Annotated signals at the profile's rate, each of another name.
@@ -53,24 +52,22 @@ class Dataset:
             NoFrameError: If there is no frame at all.
             DatasetError: If a name repeats.
         """
-        frames, labels, runs = [], [], []
+        found, labels, runs = [], [], []
         hashes: dict[str, str] = {}
         for recording in recordings:
             check(recording, profile, hashes)
             hashes[recording.name] = recording.sha256
-            for block in recording.blocks:
-                signal, valid = cut(recording, block, profile, training=training)
-                whole = frame(valid, length=profile.length, hop=profile.hop).all(axis=1)
-                frames.append(frame(signal, length=profile.length, hop=profile.hop)[whole])
-                labels += [block.label] * len(frames[-1])
-                runs += [recording.name] * len(frames[-1])
+            for label, frames in cut_frames(recording, profile, training=training):
+                found.append(features(frames, profile))
+                labels += [label] * len(frames)
+                runs += [recording.name] * len(frames)
         if not labels:
             raise NoFrameError(len(hashes), profile.classes)
-        return cls(np.concatenate(frames), np.array(labels), np.array(runs), hashes)
+        return cls(np.concatenate(found), np.array(labels), np.array(runs), hashes)
 
     @classmethod
     def read(cls, folder: str | Path, profile: Profile, *, training: bool = True) -> Self:
-        """Read and frame a folder of NoisyTest's ``.log`` and ``.toml`` files, in sorted order.
+        """Frames of a folder of NoisyTest's ``.log`` and ``.toml`` files, in sorted order.
 
         Raises:
             FileError: If a file is missing or cannot be understood.
@@ -78,57 +75,9 @@ class Dataset:
         """
         return cls.of(read_folder(folder, rate=profile.rate), profile, training=training)
 
-    def __len__(self) -> int:
-        return len(self.labels)
-
-
-@dataclass(frozen=True, eq=False)
-class Examples:
-    """Features of labelled frames; a tenth of the memory that the frames themselves take.
-
-    Attributes:
-        features: Not yet standardised; of logs of any rates, NaN where one is missing, shape
-            (frames, features).
-        labels, runs, hashes: As of a `Dataset`.
-    """
-
-    features: Real
-    labels: Words
-    runs: Words
-    hashes: Mapping[str, str]
-
-    @classmethod
-    def of(cls, dataset: Dataset, profile: Profile) -> Self:
-        """Features of all frames of a data set that was cut by the same profile.
-
-        Raises:
-            SignalError: If the frames do not fit the profile.
-        """
-        found = features_in_chunks(dataset.frames, profile)
-        return cls(found, dataset.labels, dataset.runs, dataset.hashes)
-
-    @classmethod
-    def read(
-        cls, recordings: Iterable[Recording], profile: Profile, *, training: bool = True
-    ) -> Self:
-        """Features of recordings, read one after the other; only the features are kept.
-
-        Arguments and errors are those of `Dataset.of`; recordings without a frame are skipped.
-        """
-        found: list[Self] = []
-        hashes: dict[str, str] = {}
-        for recording in recordings:
-            check(recording, profile, hashes)
-            hashes[recording.name] = recording.sha256
-            with suppress(NoFrameError):
-                found.append(cls.of(Dataset.of([recording], profile, training=training), profile))
-        if not found:
-            raise NoFrameError(len(hashes), profile.classes)
-        return replace(cls.joined(found), hashes=hashes)
-
     @classmethod
     def joined(cls, parts: Iterable[Self]) -> Self:
-        """Examples of all parts, one or more."""
+        """Frames of all parts, one or more."""
         every = list(parts)
         features, labels, runs = (
             np.concatenate([getattr(part, name) for part in every])
@@ -146,10 +95,15 @@ class Examples:
         return len(self.labels)
 
 
-def features_in_chunks(frames: Real, profile: Profile) -> Array:
-    """Features of frames, some at a time, which bounds the memory that they take."""
-    chunks = range(0, max(len(frames), 1), CHUNK)
-    return np.concatenate([features(frames[first : first + CHUNK], profile) for first in chunks])
+def cut_frames(
+    recording: Recording, profile: Profile, *, training: bool
+) -> Iterator[tuple[str, Real]]:
+    """Label and frames of each annotated block, but for those that touch a gap."""
+    for block in recording.blocks:
+        signal, valid = cut(recording, block, profile, training=training)
+        whole = frame(valid, length=profile.length, hop=profile.hop).all(axis=1)
+        if whole.any():
+            yield block.label, frame(signal, length=profile.length, hop=profile.hop)[whole]
 
 
 def check(recording: Recording, profile: Profile, names: Collection[str] = ()) -> None:
@@ -171,14 +125,15 @@ def cut(
     """Samples of a block of a recording, one frame of them or more.
 
     A block shorter than a frame is padded in training, lest a frame mixes failures that follow
-    each other, and widened to its surroundings otherwise (paper, Sec. III-A); a profile may ask
-    for widened ones in training too, and for failures in every place of a frame.
+    each other, and widened to its surroundings otherwise (paper, Sec. III-A). With log bands it is
+    always widened: padding would make a train of impacts of one, and frames to classify have none.
     """
-    lost = int(profile.drop_first_sample)
-    precision = np.float32 if profile.single_precision else np.float64
+    lost = first_sample(profile)
+    precision = np.float32 if profile.bands == "comb" else np.float64
     time: Real = recording.time[lost:].astype(precision)
-    pad = training and profile.pad_short
-    spread = training and profile.spread_failures and block.label != profile.classes[0]
+    log = profile.bands == "log"
+    pad = training and not log
+    spread = training and log and block.label != profile.classes[0]
     wanted = _spread(block, time, profile) if spread else block
     samples = _samples(time, *_bounds(time, wanted, profile, pad=pad), profile)
     whole = stacked(recording.signal, profile.signals)
@@ -189,7 +144,7 @@ def cut(
             recording.name,
             f"block {block.label!r} from {block.start:g} s to {block.stop:g} s holds no sample",
         )
-    if count < profile.length and not (pad or profile.pad_widened):
+    if count < profile.length and not (pad or profile.bands == "comb"):
         raise RecordingError(
             recording.name, f"{len(time)} samples are too short: one frame takes {profile.length}"
         )
@@ -203,16 +158,20 @@ def cut(
 
 
 def _bounds(time: Real, block: Block, profile: Profile, *, pad: bool) -> tuple[float, float]:
-    """Start and stop of the samples, in NoisyTest's order of operations, for equal rounding."""
-    start, stop = block.start, block.stop
+    """Start and stop of the samples, in NoisyTest's order of operations, for equal rounding.
+
+    Its validation sets are widened to a sample more than a frame, also past an end of the
+    recording, where others are moved inside.
+    """
+    start, stop, noisytest = block.start, block.stop, profile.bands == "comb"
     if stop == inf and len(time):
-        stop = time[-1] + profile.open_end / profile.rate
+        stop = time[-1] + (OPEN_END if noisytest else 1) / profile.rate
     if pad or stop - start >= profile.duration:
         return start, stop
     start -= (profile.duration - (stop - start)) / 2.0
-    if not profile.pad_widened and len(time):
+    if not noisytest and len(time):
         start = max(min(start, time[-1] + 1.0 / profile.rate - profile.duration), time[0])
-    return start, start + profile.duration + profile.widen_extra / profile.rate
+    return start, start + profile.duration + noisytest / profile.rate
 
 
 def _spread(block: Block, time: Real, profile: Profile) -> Block:
@@ -230,8 +189,8 @@ def _spread(block: Block, time: Real, profile: Profile) -> Block:
 
 
 def _samples(time: Real, start: float, stop: float, profile: Profile) -> slice:
-    """Samples from a start to a stop, by their times or by their number."""
-    if profile.cut_by_time:
+    """Samples from a start to a stop, by their number; NoisyTest takes them by their times."""
+    if profile.bands == "comb":
         inside = np.flatnonzero((time >= start) & (time <= stop))
         return slice(inside[0], inside[-1] + 1) if len(inside) else slice(0, 0)
     first = max(round((start - float(time[0])) * profile.rate), 0)

@@ -10,7 +10,6 @@ NoisyTest and the paper has the coefficients over time of the first band first, 
 the second.
 """
 
-from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import TypeAlias, TypeVar
@@ -26,8 +25,10 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 AT_ONCE = 2**16
 """How many samples are transformed at once, of all rows: more leave the cache of the processor."""
-LENGTHS = 2
-"""Frames' lengths of samples that are taken at once: more do not fit into the cache."""
+CHUNK = 64
+"""Frames that are evaluated at once, which bounds the memory that they take."""
+LENGTHS = 8
+"""Frames' lengths of samples that are taken at once, which bounds the memory that they take."""
 
 LEAST_SPREAD = 0.15
 """Added to each spread, in [Np]: features of a robot that stands hardly vary at all."""
@@ -95,12 +96,16 @@ def features(frames: Real, profile: Profile) -> Array:
     """
     _check_frames(frames, profile)
     rows = frames.shape[1] if frames.ndim > 2 else 1
-    exact = rounded(frames, profile).reshape(len(frames), rows, profile.length).swapaxes(0, 1)
-    energies = [
-        log_band_energies(_windows_of(exact, each.window, each.stride), profile, each)
-        for each in profile.resolutions
-    ]
-    found = temporal_pooling(energies, profile)
+    parts = []
+    for first in range(0, max(len(frames), 1), CHUNK):
+        some = rounded(frames[first : first + CHUNK], profile)
+        exact = some.reshape(len(some), rows, profile.length).swapaxes(0, 1)
+        energies = [
+            log_band_energies(_windows_of(exact, each.window, each.stride), profile, each)
+            for each in profile.resolutions
+        ]
+        parts.append(temporal_pooling(energies, profile))
+    found = np.concatenate(parts)
     return np.concatenate((found, 0.0 * found), axis=1) if profile.reference else found
 
 
@@ -128,7 +133,7 @@ def _check_frames(frames: Real, profile: Profile) -> None:
 
 def rounded(samples: Real, profile: Profile) -> Array:
     """Samples as 64-bit numbers, rounded to the precision of the profile."""
-    if profile.single_precision:
+    if profile.bands == "comb":
         samples = samples.astype(np.float32, copy=False)
     return samples.astype(np.float64, copy=False)
 
@@ -173,7 +178,7 @@ def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
     """Features of frames, by the energies of each resolution, shape (frames, time, energies)."""
     if profile.bands != "log":
         flat = dct(energies[0]).reshape(len(energies[0]), feature_count(profile))
-        return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
+        return flat.astype(np.float32).astype(np.float64) if profile.bands == "comb" else flat
     count, rows = len(profile.statistics), []
     for each, resolution in zip(energies, profile.resolutions, strict=True):
         apart = pool(each, count).reshape(len(each), count, -1, resolution.bands)
@@ -435,7 +440,7 @@ def features_of_pieces(
             frames = FrameFeatures(profile, len(samples) if samples.ndim > 1 else 1)
         yield frames.push(samples, None if valid is None else np.asarray(valid, bool))
     assert frames is not None
-    least = profile.drop_first_sample + profile.length
+    least = first_sample(profile) + profile.length
     if frames.count < least:
         raise SignalError(f"a signal of {frames.count} samples is too short: a frame takes {least}")
     yield frames.finish()
@@ -445,43 +450,38 @@ class FrameFeatures:
     """Features of the frames of a signal that comes in chunks of any size.
 
     The features of a frame come with its last sample, and do not depend on the chunks, bit for
-    bit. Each Fourier transform is computed once, for all frames that share it: many at a time,
-    since they take little longer than one, and all but the last few before the chunk that
-    completes a frame. Memory does not grow.
+    bit. Each Fourier transform is computed once, for all frames that share it. Memory does not
+    grow.
     """
 
     def __init__(self, profile: Profile, rows: int) -> None:
         """Start a signal of so many norms and joints of the signals that go joint by joint."""
-        self._profile = profile
-        # Room for a frame, and for as much as is taken at once.
-        self._at_once = LENGTHS * profile.length
-        self._samples = np.zeros((rows, profile.length + self._at_once))
-        self._valid = np.zeros(self._samples.shape[1], dtype=bool)
-        self._windows = [_Windows(self._samples, profile, each) for each in profile.resolutions]
+        self._profile, self._rows = profile, rows
         self._nothing = np.empty(0, dtype=np.intp), np.empty((0, feature_count(profile)))
-        # Longest latency of a window: its samples have to be in the buffer still.
-        self._latency = profile.length - max(each.window for each in profile.resolutions)
-        self._lead = min(profile.hop // 2, *(each.stride for each in profile.resolutions))
+        self._no_windows = [
+            (
+                self._nothing[0],
+                log_band_energies(np.zeros((rows, 1, each.window)), profile, each)[:0],
+            )
+            for each in profile.resolutions
+        ]
         self._begin()
 
     def _begin(self) -> None:
         self.count = 0  # samples so far
-        self._held = 0  # samples in the buffer
-        self._first = int(self._profile.drop_first_sample)
-        self._frame = self._first  # start of the next frame
+        self._frame = first_sample(self._profile)  # start of the next frame
+        self._base = 0  # number of the first sample that is held
+        self._held: list[tuple[Array, Mask]] = []
+        self._windows = self._no_windows  # starts and energies, of frames to come
         self._relative = RunningReference()
-        for windows in self._windows:
-            windows.done = 0
-        self._due = self._next_due(0)  # count with which there is work to do
 
     def push(self, samples: Real, valid: Mask | None = None) -> Frames:
         """Features of the frames that samples, shape (samples,) or (rows, samples), complete."""
         count = samples.shape[-1]
-        if samples.ndim > 1 and len(samples) != len(self._samples):
-            raise SignalError(
-                f"{len(samples)} rows of norms and joints, expected {len(self._samples)}"
-            )
-        if valid is not None and valid.shape != (count,):
+        if samples.ndim > 1 and len(samples) != self._rows:
+            raise SignalError(f"{len(samples)} rows of norms and joints, expected {self._rows}")
+        valid = np.ones(count, dtype=bool) if valid is None else valid
+        if valid.shape != (count,):
             raise SignalError(
                 f"samples of shape {samples.shape} and validity of shape {valid.shape},"
                 " expected (samples,) for both"
@@ -492,158 +492,98 @@ class FrameFeatures:
             raise SignalError(
                 f"sample {self.count + place} of the signal is not finite ({plain[row, place]})"
             )
-        return self._take(rounded(samples, self._profile), valid)
+        exact = rounded(samples, self._profile).reshape(self._rows, count)
+        at_once = LENGTHS * self._profile.length
+        pieces = [slice(first, first + at_once) for first in range(0, count, at_once)]
+        found = [self._take(exact[:, piece], valid[piece]) for piece in pieces]
+        return _joined(found) if found else self._nothing
 
     def skip(self, samples: int) -> None:
         """Skip a gap as if so many samples were pushed that are not valid, however many."""
         length, hop = self._profile.length, self._profile.hop
-        self._lose(min(samples, length))
-        # Pending frames lie wholly in the gap now, and so would all that are skipped.
-        hops = max(samples - length, 0) // hop
-        self.count += hops * hop
-        self._frame += hops * hop
-        self._due += hops * hop
-        for windows in self._windows:
-            windows.jump(hops)
-        self._lose(samples - min(samples, length) - hops * hop)
+        near = min(samples, length)
+        self._lose(near)
+        # All frames to come begin in the gap now, and so would all that are skipped.
+        hops = (samples - near) // hop * hop
+        self.count += hops
+        self._frame += hops
+        self._base += hops
+        if hops:
+            self._windows = self._no_windows
+        self._lose(samples - near - hops)
 
     def finish(self) -> Frames:
         """End the signal; what is pushed next begins another one."""
-        profile, found = self._profile, self._nothing
-        last = self.count - profile.length
-        flush = profile.flush_end and last > self._first
-        if flush and (last - self._first) % profile.hop and self._is_whole(last):
-            energies = [windows.of_place(last - self._base) for windows in self._windows]
-            found = np.array([last]), self._features(energies)
+        first, last = first_sample(self._profile), self.count - self._profile.length
+        found = self._nothing
+        # A last frame, flush with the end, covers the tail of a signal.
+        if self._profile.bands == "log" and last > first and (last - first) % self._profile.hop:
+            found = self._features(np.array([last]), *self._all_held())
         self._begin()
         return found
 
-    def _take(self, exact: Array, valid: Mask | None) -> Frames:
-        found: list[Frames] = []
-        for first in range(0, exact.shape[-1], self._at_once):
-            piece = slice(first, first + self._at_once)
-            self._keep(exact[..., piece], True if valid is None else valid[piece])
-            if self.count >= self._due:
-                found += self._advance(exact.shape[-1])
-        return _joined(found) if found else self._nothing
-
     def _lose(self, samples: int) -> None:
-        self._take(np.zeros((len(self._samples), samples)), np.zeros(samples, dtype=bool))
+        self._take(np.zeros((self._rows, samples)), np.zeros(samples, dtype=bool))
 
-    def _keep(self, samples: Array, valid: Mask | bool) -> None:
-        """Append samples to the buffer, at most as many as are taken at once."""
+    def _take(self, samples: Array, valid: Mask) -> Frames:
+        """Features of the frames that samples complete; they are held for the next ones."""
+        length, hop = self._profile.length, self._profile.hop
+        self._held.append((samples.copy(), valid.copy()))
+        self.count += len(valid)
+        if self.count < self._frame + length:
+            return self._nothing
+        frames = np.arange(self._frame, self.count - length + 1, hop)
+        self._frame += len(frames) * hop
+        samples, valid = self._all_held()
+        found = self._features(frames, samples, valid)
+        over = self._frame - hop - self._base  # no later frame begins before, also not a last one
+        self._held, self._base = [(samples[:, over:], valid[over:])], self._base + over
+        return found
+
+    def _all_held(self) -> tuple[Array, Mask]:
+        samples, valid = zip(*self._held, strict=True)
+        return np.concatenate(samples, axis=1), np.concatenate(valid)
+
+    def _features(self, frames: Index, samples: Array, valid: Mask) -> Frames:
+        """Features of those frames that no gap touches, by the samples that are held."""
+        places = frames - self._base
         length = self._profile.length
-        count = samples.shape[-1]
-        if self._held + count > len(self._valid):
-            for buffer in (self._samples, self._valid):
-                buffer[..., :length] = buffer[..., self._held - length : self._held]
-            self._held = length
-        stop = self._held + count
-        self._samples[..., self._held : stop], self._valid[self._held : stop] = samples, valid
-        self._held = stop
-        self.count += count
-
-    def _advance(self, chunk: int) -> list[Frames]:
-        """Transform the windows that are complete, and pool the windows of complete frames.
-
-        The next chunk is expected to have as many samples as this one.
-        """
-        profile = self._profile
-        for windows in self._windows:
-            windows.advance(self.count - self._first, self._base - self._first)
-        frames = range(self._frame, self.count - profile.length + 1, profile.hop)
-        self._frame += len(frames) * profile.hop
-        self._due = self._next_due(chunk)
-        whole = np.array([frame for frame in frames if self._is_whole(frame)], dtype=np.intp)
+        whole = frames[[bool(valid[place : place + length].all()) for place in places]]
         if not len(whole):
-            return []
-        numbers = (whole - self._first) // profile.hop
-        energies = [windows.of_frames(numbers) for windows in self._windows]
-        return [(whole, self._features(energies))]
+            return self._nothing
+        found, windows = [], []
+        for known, resolution in zip(self._windows, self._profile.resolutions, strict=True):
+            steps = resolution.stride * np.arange(resolution.transforms(length))
+            wanted = whole[:, None] + steps
+            starts, energies = self._transformed(wanted, samples, known, resolution)
+            found.append(energies[np.searchsorted(starts, wanted)])
+            again = starts >= self._frame
+            windows.append((starts[again], energies[again]))
+        self._windows = windows
+        pooled = temporal_pooling(found, self._profile)
+        if self._profile.reference:
+            pooled = np.concatenate((pooled, self._relative.relative(pooled)), axis=1)
+        return whole, pooled
 
-    def _features(self, energies: list[Array]) -> Array:
-        """Features of frames, in order, unchanged and relative to those so far."""
-        found = temporal_pooling(energies, self._profile)
-        if not self._profile.reference:
-            return found
-        return np.concatenate((found, self._relative.relative(found)), axis=1)
-
-    def _next_due(self, chunk: int) -> int:
-        """Count at which to go on: before the chunk that completes a frame, and after it."""
-        complete = self._frame + self._profile.length
-        early = complete - max(chunk, self._lead)
-        return min(early if early > self.count else complete, self.count + self._latency)
-
-    @property
-    def _base(self) -> int:
-        """Number of the first sample in the buffer."""
-        return self.count - self._held
-
-    def _is_whole(self, frame: int) -> bool:
-        """Whether no gap touches the frame that starts at a sample."""
-        place = frame - self._base
-        return bool(self._valid[place : place + self._profile.length].all())
+    def _transformed(
+        self, wanted: Index, samples: Array, known: Frames, resolution: Resolution
+    ) -> Frames:
+        """Known windows and those that start at wanted samples, in order, and their energies."""
+        fresh = np.setdiff1d(wanted, known[0])
+        windows = np.lib.stride_tricks.sliding_window_view(samples, resolution.window, -1)
+        at_once = max(1, AT_ONCE // (self._rows * resolution.window))
+        parts = [known[1]]
+        for first in range(0, len(fresh), at_once):
+            places = fresh[first : first + at_once] - self._base
+            parts.append(log_band_energies(windows[:, places], self._profile, resolution))
+        starts = np.concatenate((known[0], fresh))
+        order = starts.argsort()
+        return starts[order], np.concatenate(parts)[order]
 
 
-class _Windows:
-    """Log-band energies of a signal's windows at one resolution, each computed once.
-
-    Frames start every hop, and their windows at the same phases of each hop. Windows are numbered
-    in order of time. Samples are counted from the start of the first frame.
-    """
-
-    def __init__(self, samples: Array, profile: Profile, resolution: Resolution) -> None:
-        self._profile, self._resolution = profile, resolution
-        steps = resolution.stride * np.arange(resolution.transforms(profile.length))
-        hops, phase = np.divmod(steps, profile.hop)
-        phases, rank = np.unique(phase, return_inverse=True)
-        self._of_frame = hops * len(phases) + rank  # those of the first frame
-        self._in_frame = steps
-        self._phases: list[int] = phases.tolist()
-        self._windows = np.lib.stride_tricks.sliding_window_view(samples, resolution.window, -1)
-        cycle = samples.shape[1] // profile.hop + 2
-        self._rows, self._cycle = len(phases) * cycle, cycle * profile.hop
-        # Window i is in row i modulo rows; two cycles, so that no slice ends at the last row.
-        around = np.arange(2 * self._rows)
-        self._row_of = around % self._rows
-        self._start_of = around // len(phases) * profile.hop + phases[around % len(phases)]
-        one = log_band_energies(self._windows[:, 0], profile, resolution)
-        self._energies = np.zeros((self._rows, *one.shape))
-        self._at_once = max(1, AT_ONCE // (samples.shape[0] * resolution.window))
-        self.done = 0  # how many windows are transformed
-
-    def jump(self, hops: int) -> None:
-        """Skip so many hops of a gap."""
-        self.done += hops * len(self._phases)
-
-    def advance(self, count: int, base: int) -> None:
-        """Transform the windows that are complete; ``base`` is the first sample in the buffer."""
-        hops, phase = divmod(count - self._resolution.window, self._profile.hop)
-        complete = hops * len(self._phases) + bisect_right(self._phases, phase)
-        if complete <= self.done:
-            return
-        cycles, first = divmod(self.done, self._rows)
-        fresh = slice(first, first + complete - self.done)
-        starts = self._start_of[fresh] + (cycles * self._cycle - base)
-        rows = self._row_of[fresh]
-        for few in range(0, len(starts), self._at_once):
-            part = slice(few, few + self._at_once)
-            one = len(starts[part]) == 1  # a slice copies nothing
-            chosen = slice(starts[few], starts[few] + 1) if one else starts[part]
-            self._energies[rows[part]] = log_band_energies(
-                self._windows[:, chosen], self._profile, self._resolution
-            )
-        self.done = complete
-
-    def of_frames(self, frames: Index) -> Array:
-        """Log-band energies of frames whose windows are transformed, by their numbers in hops."""
-        windows = (frames * len(self._phases))[:, None] + self._of_frame
-        return self._energies.take(windows, axis=0, mode="wrap")
-
-    def of_place(self, place: int) -> Array:
-        """Log-band energies of the frame that starts at a place in the buffer."""
-        windows = self._windows[:, place + self._in_frame]
-        return log_band_energies(windows, self._profile, self._resolution)[None]
+def first_sample(profile: Profile) -> int:
+    """Number of the first sample of the first frame; NoisyTest loses one before."""
+    return int(profile.bands == "comb")
 
 
 def _joined(parts: list[Frames]) -> Frames:

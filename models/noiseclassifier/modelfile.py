@@ -25,15 +25,21 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from noiseclassifier.errors import FileError, OutputError, ProfileError
-from noiseclassifier.estimators import ESTIMATORS
-from noiseclassifier.estimators.trees import Trees
+from noiseclassifier.estimators import ESTIMATORS, Trees
 from noiseclassifier.features import feature_count
 from noiseclassifier.jsontext import from_json
 from noiseclassifier.profile import HIGHEST, LogBands, Profile
 from noiseclassifier.signals import Array
 
-FORMAT = "noise-model/6"
-OLD_FORMATS = ("noise-model/4", "noise-model/5")
+FORMAT = "noise-model/7"
+OLD_FORMATS = ("noise-model/4", "noise-model/5", "noise-model/6")
+DROPPED = {
+    *("name", "networks", "units", "decay", "epochs", "learning_rate", "penalty"),
+    *("pad_short", "spread_failures", "open_end", "cut_by_time", "widen_extra", "pad_widened"),
+}
+"""Settings of profiles in older formats that labels do not depend on."""
+BY_BANDS = {"single_precision": "comb", "drop_first_sample": "comb", "flush_end": "log"}
+"""Settings in older formats, and the bands that have them now."""
 LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times as many as the shipped ones."""
 
@@ -44,7 +50,10 @@ _BASELINE = {"good": 2, "limit": 1}
 
 _KINDS = [
     {"manifest": 0, "mean": 1, "scale": 1, **own}
-    for own in (*(each.DIMENSIONS for each in ESTIMATORS.values()), _BASELINE)
+    for own in (
+        *({name: len(axes) for name, axes in each.SHAPES.items()} for each in ESTIMATORS.values()),
+        _BASELINE,
+    )
 ]
 _KINDS += [{**kind, **_ADAPTED} for kind in _KINDS] + [
     {name: count for name, count in kind.items() if name != "missing"}
@@ -70,7 +79,8 @@ def write(
     """Write a model file, whole or not at all; settings are profile, rate, and recipe if any."""
     known = {name: dict(getattr(model, name)) for name in ("runs", "metrics", "versions")}
     manifest = {"format": FORMAT, **settings, "classes": list(model.classes), **known}
-    arrays = {**model.estimator.arrays(), "mean": model.mean, "scale": model.scale}
+    arrays = {name: getattr(model.estimator, name) for name in model.estimator.SHAPES}
+    arrays |= {"mean": model.mean, "scale": model.scale}
     text = json.dumps(manifest, sort_keys=True, allow_nan=False)
     content = io.BytesIO()
     np.savez(content, allow_pickle=False, manifest=np.array(text), **arrays)  # dated 1980 always
@@ -211,13 +221,24 @@ def _manifest(path: str | Path, text: str) -> dict[str, Any]:
         )
     profile = manifest.get("profile")
     if isinstance(profile, dict):
-        if given != FORMAT:  # versions 4 and 5 know no reference, and have another name
-            names = {"machine": "estimator"}
-            profile = {names.get(name, name): value for name, value in profile.items()}
-            manifest["profile"] = {"reference": False, **profile}
-        if manifest["profile"].get("estimator") == "baseline":
+        if given != FORMAT:
+            manifest["profile"] = profile = _of_this_version(path, profile)
+        if profile.get("estimator") == "baseline":
             raise FileError(path, f"is a baseline of good runs: {ACCEPT}")
+    if given != FORMAT and isinstance(manifest.get("recipe"), dict):
+        manifest["recipe"].pop("relative", None)
     return dict(manifest)
+
+
+def _of_this_version(path: str | Path, profile: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of a profile that an earlier version wrote, as this one has them."""
+    for name, bands in BY_BANDS.items():
+        if profile.get(name) not in (None, profile.get("bands") == bands):
+            problem = f"{name} {profile[name]} with bands {profile.get('bands')!r}"
+            raise FileError(path, f"has a profile that this version cannot follow: {problem}")
+    names = {"machine": "estimator"}  # in version 4; versions 4 and 5 know no reference
+    kept = {name: each for name, each in profile.items() if name not in {*DROPPED, *BY_BANDS}}
+    return {"reference": False, **{names.get(name, name): each for name, each in kept.items()}}
 
 
 _JSON_TYPES = {
@@ -266,15 +287,30 @@ def _check_arrays(
     path: str | Path, profile: Profile, count: int, classes: int, arrays: Mapping[str, Array]
 ) -> None:
     estimator = ESTIMATORS[profile.estimator]
-    if lacking := sorted(estimator.DIMENSIONS.keys() - arrays.keys()):
+    if lacking := sorted(estimator.SHAPES.keys() - arrays.keys()):
         raise FileError(
             path, f"its profile asks for {profile.estimator}, but it has no {', '.join(lacking)}"
         )
-    wanted = estimator.shapes(arrays, profile, features=count, classes=classes)
-    for name, shape in {**wanted, "mean": (count,), "scale": (count,)}.items():
-        if arrays[name].shape != shape:
+    one_vs_one = profile.multiclass == "one-vs-one"
+    sizes = {
+        "features": count,
+        "classes": classes,
+        "1 + classes": 1 + classes,
+        "svms": classes * (classes - 1) // 2 if one_vs_one else classes,
+        "trees": profile.rounds * classes,
+        "leaves": profile.leaves,
+        "splits": profile.leaves - 1,
+    }
+    for name, axes in {**estimator.SHAPES, "mean": ("features",), "scale": ("features",)}.items():
+        shape = arrays[name].shape
+        # There may be any number of vectors, networks and units, but of each array the same.
+        wanted = tuple(
+            sizes.setdefault(axis, size) if isinstance(axis, str) else axis
+            for axis, size in zip(axes, shape, strict=True)
+        )
+        if shape != wanted:
             raise FileError(
-                path, f"array {name!r} has shape {arrays[name].shape}, its profile asks for {shape}"
+                path, f"array {name!r} has shape {shape}, its profile asks for {wanted}"
             )
     if "location" in arrays:
         raise FileError(path, f"is adapted to good runs: {ACCEPT}")

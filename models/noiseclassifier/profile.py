@@ -1,7 +1,8 @@
 """Profiles: every setting of frames, features and estimator, for one rate or for any.
 
 A `Profile` is in samples and of one rate: NoisyTest's, the paper's, or the profile that a recipe in
-seconds and hertz (`LogBands`) has at that rate.
+seconds and hertz (`LogBands`) has at that rate. Each has other bands, and by these a name and a way
+of cutting frames (`noiseclassifier.dataset`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,11 +44,9 @@ _CHOICES = {
 }
 _ABOVE_ZERO = (
     *("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma"),
-    *("networks", "units", "epochs", "rounds", "learning_rate", "alarm"),
+    *("rounds", "alarm"),
 )
-_ZERO_OR_MORE = (
-    *("open_end", "widen_extra", "least_deviation", "decay", "penalty", "quick_window"),
-)
+_ZERO_OR_MORE = ("least_deviation", "quick_window")
 
 
 @dataclass(frozen=True)
@@ -79,8 +78,6 @@ class Profile:
         ProfileError: If a setting is out of its range, or two do not fit together.
     """
 
-    name: str
-    """Name of the recipe."""
     classes: tuple[str, ...] = CLASSES
     """Names of the classes, `ok` first."""
     signals: tuple[str, ...] = ("noise",)
@@ -97,7 +94,9 @@ class Profile:
     stride: int = 834
     """Samples from one Fourier transform to the next (the paper's s_fft)."""
     bands: Literal["adjacent", "comb", "log"] = "adjacent"
-    """How bins become bands: three adjacent ones, NoisyTest's comb, or ``edges``."""
+    """How bins become bands: three adjacent ones as in the paper, NoisyTest's comb, or ``edges``.
+    NoisyTest's profile also rounds times, samples and features to 32-bit floats, and loses the
+    first sample of a recording (its reader takes that row for the header)."""
     edges: tuple[float, ...] = ()
     """Edges of the bands of ``log``, ascending, in [Hz]."""
     quick_window: int = 0
@@ -108,8 +107,7 @@ class Profile:
     """Edges of its bands, ascending, in [Hz]."""
     relative: bool = False
     """Whether log-band energies are relative to the level of the frame, and differences from the
-    signal before are features, too: then the shape of a spectrum counts, and how much of a noise is
-    neither desired nor tracked."""
+    signal before are features, too; of models of earlier versions."""
     reference: bool = False
     """Whether log-band energies and their differences from the signal before are features as they
     are, and once more relative to a reference (`features.RunningReference`)."""
@@ -119,8 +117,8 @@ class Profile:
     """Least standard deviation in the standardisation of features by the training set; 0 leaves
     them as they are."""
     estimator: EstimatorKind = "svm"
-    """Support vector machines, small networks, boosted trees, trees that first tell failures from
-    `ok` and then name them."""
+    """Support vector machines, or trees that first tell failures from `ok` and then name them
+    (``detector``); networks and other trees are of model files of earlier versions."""
     kernel: Kernel = "rbf"
     """Kernel of the support vector machine."""
     regularization: float = 1.1
@@ -129,45 +127,12 @@ class Profile:
     """Kernel parameter; the linear kernel has none."""
     multiclass: Multiclass = "one-vs-rest"
     """How two-class SVMs are combined for more classes."""
-    networks: int = 5
-    """Networks whose probabilities are averaged, each trained without one part of the groups."""
-    units: int = 64
-    """Units in the hidden layer of a network."""
-    decay: float = 0.1
-    """Penalty on the squares of a network's weights."""
-    epochs: int = 30
-    """Passes over the training set."""
     rounds: int = 100
     """Rounds of boosting; each adds a tree for each class."""
     leaves: int = 16
     """Leaves of a tree at most."""
-    learning_rate: float = 0.15
-    """Factor of the leaves of each tree."""
-    penalty: float = 1.0
-    """Penalty on the squares of the leaves."""
     alarm: float = 0.5
     """Alarm threshold: a probability of any failure."""
-    pad_short: bool = True
-    """Whether a training block shorter than a frame is padded, or else widened."""
-    spread_failures: bool = False
-    """Whether failures lie anywhere in training frames, rather than in their middle."""
-    open_end: int = 1
-    """Samples after the last one at which a block that lasts to the end stops."""
-    flush_end: bool = False
-    """Whether a last frame, flush with the end, covers the tail of a signal."""
-
-    # What follows is NoisyTest's own, and off in every other profile.
-    # (Its `open_end` is 0.1 s: no sample more, but a short block has another middle.)
-    single_precision: bool = False
-    """Times, samples and features are rounded to 32-bit floats."""
-    drop_first_sample: bool = False
-    """The first sample of a recording is lost (its reader takes that row for the header)."""
-    cut_by_time: bool = False
-    """A block holds each sample whose time is from its start to its stop, both included."""
-    widen_extra: int = 0
-    """Samples beyond one frame to which a short block of a validation set is widened."""
-    pad_widened: bool = False
-    """A block widened past an end of its recording is padded, where others are moved inside."""
 
     def __post_init__(self) -> None:
         """Check every setting once."""
@@ -179,25 +144,14 @@ class Profile:
     @classmethod
     def noisytest(cls, kernel: Kernel = "rbf") -> Self:
         """NoisyTest 0.0.1, decision by decision, with its quirks."""
-        return replace(
-            cls.paper(kernel),
-            name="noisytest",
-            bands="comb",
-            multiclass="one-vs-one",
-            single_precision=True,
-            drop_first_sample=True,
-            cut_by_time=True,
-            open_end=1000,
-            widen_extra=1,
-            pad_widened=True,
-        )
+        return replace(cls.paper(kernel), bands="comb", multiclass="one-vs-one")
 
     @classmethod
     def paper(cls, kernel: Kernel = "rbf") -> Self:
         """The text of the paper, Sec. III and its table of hyper-parameters."""
         if kernel == "linear":
-            return cls(name="paper", kernel=kernel, stride=401, regularization=1.0)
-        return cls(name="paper", kernel=kernel, stride=834, regularization=1.1, gamma=5.7e-4)
+            return cls(kernel=kernel, stride=401, regularization=1.0)
+        return cls(kernel=kernel)
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> Self:
@@ -222,6 +176,11 @@ class Profile:
     def norms(self) -> int:
         """Number of signals that are norms."""
         return sum(not by_joint(name) for name in self.signals)
+
+    @property
+    def name(self) -> str:
+        """Name of the recipe."""
+        return {"comb": "noisytest", "adjacent": "paper", "log": "logbands"}[self.bands]
 
     @cached_property
     def moving(self) -> int:
@@ -413,7 +372,6 @@ class LogBands:
     # As in `Profile`:
     classes: tuple[str, ...] = CLASSES
     signals: tuple[str, ...] = (NOISE,)
-    relative: bool = False
     reference: bool = False
     estimator: EstimatorKind = "svm"
     alarm: float = 0.5
@@ -466,7 +424,6 @@ class LogBands:
         shared -= {"hop", "window", "stride", "quick_stride"}  # in samples there, in seconds here
         return Profile(
             **{name: getattr(self, name) for name in shared},
-            name="logbands",
             rate=rate,
             length=round(self.frame * rate),
             hop=round(self.hop * rate),
@@ -482,10 +439,6 @@ class LogBands:
             # Two frames' n standardised features differ by 2 n in squares, whatever the rate.
             gamma=self.softness / (len(STATISTICS) * (len(edges) - 1)),
             multiclass="one-vs-one",
-            # Padding would make a train of impacts of one; frames to classify have none.
-            pad_short=False,
-            spread_failures=True,
-            flush_end=True,
         )
 
     @classmethod
@@ -564,16 +517,6 @@ class LogBands:
         return tuple(edges) if len(edges) > 1 else ()
 
 
-SCALAR = LogBands(relative=True, floor=1e-3, estimator="networks", alarm=0.5, quick=0.02)
-"""For the noise alone. Failures are louder than 0.03 rad/s; amplitudes far below depend on encoders
-and simulators."""
-GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.6, leaves=4, speed=True)
-"""For runs with measured and desired motion; with fewer false positives in fault-free motion. The
-noise alone does not separate a fast motion without sensor noise from a failure. Trees find more
-failures that resemble the training set; networks more that do not, say a rattle on a motion without
-any other noise, which the noise alone does not show as an error."""
-EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.6, rounds=40)
-"""For runs that name their joints: the norm of all masks a single one."""
 ANY = LogBands(
     reference=True,
     floor=1e-3,

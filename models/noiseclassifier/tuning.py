@@ -12,16 +12,15 @@ that a point costs little more than libsvm's own work.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from itertools import accumulate, chain, groupby, product, repeat, takewhile
+from itertools import accumulate, groupby, product, repeat, takewhile
 from math import floor, isnan, log, nan, prod
 from typing import Any, Literal, Self, TypeAlias
 
 import numpy as np
 
-from noiseclassifier.dataset import Examples
+from noiseclassifier.dataset import Dataset
 from noiseclassifier.errors import DatasetError, ProfileError
-from noiseclassifier.estimators import ESTIMATORS, svm
-from noiseclassifier.estimators.decision import TINY
+from noiseclassifier.estimators import SupportVectorMachines, balance, choose, svc
 from noiseclassifier.features import standard
 from noiseclassifier.labels import UNKNOWN
 from noiseclassifier.measures import Evaluation, plain
@@ -35,14 +34,8 @@ Criterion: TypeAlias = Literal["balanced-accuracy", "log-loss", "subset-accuracy
 
 FEATURE_SETTINGS = ("window", "stride", "bands", "floor", "least_deviation")
 """Settings of the features that can be tuned."""
-OWN = {
-    "networks": ("networks", "units", "epochs", "decay", "alarm"),
-    "trees": ("rounds", "leaves", "learning_rate", "penalty", "alarm"),
-    "detector": ("rounds", "leaves", "learning_rate", "penalty", "alarm"),
-    "support vector machines": ("multiclass", "gamma", "regularization"),
-}
-ESTIMATOR_SETTINGS = tuple(dict.fromkeys(chain.from_iterable(OWN.values())))
-"""Settings of the estimators; points that differ in these alone share their features."""
+ESTIMATOR_SETTINGS = ("multiclass", "gamma", "regularization")
+"""Settings of support vector machines; points that differ in these alone share their features."""
 SETTINGS = FEATURE_SETTINGS + ESTIMATOR_SETTINGS
 """Settings that can be tuned: all that come after framing; the last varies fastest."""
 MOST = 1_000_000
@@ -117,12 +110,10 @@ class Grid:
 
     def profiles(self, base: Profile) -> list[Profile]:
         """Profile of each point; all other settings are as in ``base``."""
-        estimator = base.estimator if base.estimator in OWN else "support vector machines"
-        for name in self.axes:
-            linear = name == "gamma" and base.kernel == "linear"
-            if linear or (name in ESTIMATOR_SETTINGS and name not in OWN[estimator]):
-                idle = "the linear kernel" if linear else estimator
-                raise ProfileError(f"{name} does nothing with {idle}; leave it out of the grid")
+        if "gamma" in self.axes and base.kernel == "linear":
+            raise ProfileError(
+                "gamma does nothing with the linear kernel; leave it out of the grid"
+            )
         for stride in self.axes.get("stride", ()):
             if isinstance(stride, int) and stride > base.length:
                 raise ProfileError(
@@ -191,11 +182,11 @@ class Trial:
         """Names of some of the recordings."""
         return [self.recordings[index].name for index in indices.tolist()]
 
-    def examples(self, profile: Profile, *, training: bool) -> Examples:
+    def examples(self, profile: Profile, *, training: bool) -> Dataset:
         """Features of the training recordings, or of the test recordings, one by one."""
         wanted = np.unique(np.concatenate([split[not training] for split in self.splits]))
         found = [self.recordings[index] for index in wanted.tolist()]
-        return Examples.read(found, profile, training=training)
+        return Dataset.of(found, profile, training=training)
 
 
 @dataclass(frozen=True)
@@ -292,15 +283,12 @@ def _decide(
 ) -> Iterator[tuple[Index, Array]]:
     """Train the estimator of each point, and give its choices and margins of test frames."""
     classes = int(targets.max()) + 1
-    if profiles[0].estimator != "svm" or len(known) > LARGEST:
+    if len(known) > LARGEST:
         for profile in profiles:
-            estimator = ESTIMATORS[profile.estimator].fit(known, targets, groups, profile)
-            found = estimator.decision(fresh)
-            if profile.estimator == "svm":
-                margins = class_margins(found, classes=classes, multiclass=profile.multiclass)
-            else:
-                margins = np.log(estimator.score(found) + TINY)
-            yield estimator.choose(found), margins
+            svms = SupportVectorMachines.fit(known, targets, groups, profile)
+            found = svms.decision(fresh)
+            margins = class_margins(found, classes=classes, multiclass=profile.multiclass)
+            yield svms.choose(found), margins
         return
     from sklearn import config_context
 
@@ -317,22 +305,22 @@ def _decide(
             with config_context(assume_finite=True, skip_parameter_validation=True):
                 found = _decisions(train, test, targets, profile)
             multiclass = profile.multiclass
-            chosen = svm.choose(found, classes=classes, multiclass=multiclass)
+            chosen = choose(found, classes=classes, multiclass=multiclass)
             yield chosen, class_margins(found, classes=classes, multiclass=multiclass)
 
 
 def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> Array:
     """Decision values of SVMs trained on a kernel matrix, shape (frames, decisions)."""
-    weights = svm.balance(targets)
+    weights = balance(targets)
     if profile.multiclass == "one-vs-one":
         weighted = dict(enumerate(weights.tolist()))
-        fitted = svm.svc(profile, profile.regularization, weighted, precomputed=True)
+        fitted = svc(profile, profile.regularization, weighted, precomputed=True)
         decisions: Array = fitted.fit(train, targets).decision_function(test)
         # With two classes, scikit-learn turns the sign so that positive means the second.
         return decisions if decisions.ndim == 2 else -decisions[:, None]
     found = []
     for number, weight in enumerate(weights.tolist()):
-        one = svm.svc(profile, profile.regularization * weight, precomputed=True)
+        one = svc(profile, profile.regularization * weight, precomputed=True)
         found.append(one.fit(train, targets == number).decision_function(test))
     return np.stack(found, axis=1)
 
