@@ -131,7 +131,9 @@ def test_a_model_is_trained_on_a_folder_of_runs_and_one_without_a_block_is_skipp
         return np.array(json.loads(out)["frames"]["confusion"]).sum()
 
     for left in (3, 2):
-        status, out, _ = inspector("train", data, "-o", model, "--profile", "logbands", "--overwrite")
+        status, out, _ = inspector(
+            "train", data, "-o", model, "--profile", "logbands", "--overwrite"
+        )
         assert (status, "Subset accuracy" in out) == (0, True)
         assert frames(data / "panda") == left * 2 * 7
         if left == 3:
