@@ -259,7 +259,7 @@ def test_a_model_is_trained_and_evaluated(tmp_path):
     assert "Failure recall" in out
     status, out, _ = inspector("evaluate", model, tmp_path / "run2.npz", "--json")
     assert status == 0
-    confusion = np.array(json.loads(out)["confusion"])
+    confusion = np.array(json.loads(out)["frames"]["confusion"])
     np.testing.assert_array_equal(confusion.sum(axis=1), [7, 7])
 
 
