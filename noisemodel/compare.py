@@ -117,19 +117,13 @@ class Comparison:
         return self.links[shares.argmax()], float(shares.max())
 
     def by_band(self, kind: int) -> Array:
-        """Spectral distance to the reference in each of ``BANDS``, shape (bands,), in [dB].
-
-        ``kind`` is the index of the kind. It is nan above the Nyquist frequency.
-        """
+        """Spectral distance of a kind to the reference in each of ``BANDS``, in [dB], or nan."""
         squares = self.distance_by_frequency[kind, self.reference] ** 2
         inside = [(self.frequency >= low) & (self.frequency < high) for low, high in BANDS.values()]
         return np.sqrt(_means(squares, inside))
 
     def by_label(self, kind: int, labels: Sequence[str]) -> Array:
-        """Mean contrast of the events with each label, shape (labels,), in [dB].
-
-        ``kind`` is the index of the kind. It is nan where there is no such event.
-        """
+        """Mean contrast of a kind in the events with each label, in [dB]; nan without any."""
         own = np.array([event.label for event in self.events])
         return _means(self.contrast[kind], [own == label for label in labels])
 
@@ -180,10 +174,7 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Comparisons:
-    """Kinds of noise estimates compared on many robots, all on the same kinds.
-
-    It has a length, an iterator and indices, all over ``robots``, and prints as a table.
-    """
+    """Kinds of noise estimates compared on many robots; it prints as a table."""
 
     robots: tuple[Comparison, ...]  # what could be compared, in the order of the robots
     left_out: tuple[LeftOut, ...] = ()  # what could not, and why
@@ -348,11 +339,7 @@ def contrasts(pressure: Array, time: Array, rate: float, events: Sequence[Block]
 def _estimates(
     robot: Robot, surface: Surface, q: Real, v: Real, kinds: Sequence[str]
 ) -> tuple[Array, Array, Array, Array]:
-    """Pressure and power over time, energy by link, of each kind; and the terms' shares.
-
-    Pressure, power, shape (kinds, samples), and energy, shape (kinds, links), are to some scale;
-    shares as `Comparison.terms`.
-    """
+    """Pressure and power, shape (kinds, samples), energy, (kinds, links), and shares of terms."""
     power, energy = np.zeros((len(kinds), len(q))), np.zeros((len(kinds), len(surface.links)))
     terms: Array = np.zeros((len(surface.links), len(TERMS)))
     for start in range(0, len(q), CHUNK):
@@ -566,12 +553,8 @@ def _check(sources: Sequence[Source], kinds: Sequence[str], geometry: str, seed:
         )
     if not sources:
         raise NoiseModelError("no robots to compare")
-    for source in sources:
-        if not isinstance(source, Source):
-            raise NoiseModelError(
-                f"a robot is of type {type(source).__name__}, expected a Robot, a listed name, the"
-                " path of a URDF, or a run"
-            )
+    if strange := [type(each).__name__ for each in sources if not isinstance(each, Source)]:
+        raise NoiseModelError(f"a robot is of type {strange[0]}, expected a robot or a run")
     if seed < 0:
         raise NoiseModelError(f"seed is {seed}, expected 0 or more")
     if geometry not in GEOMETRIES:

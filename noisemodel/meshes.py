@@ -268,8 +268,8 @@ def _geometry(named: Named, geometry: ET.Element) -> Iterator[Mesh]:
         vertex = inputs.get("VERTEX")
         if vertex is None:
             raise ValueError(f"a <{_word(part)}> has no input VERTEX")
-        stride = 1 + max(_integer(entry, "offset", 0) for entry in part.findall("{*}input"))
-        faces = _faces(part, _integer(vertex, "offset", 0), stride)
+        stride = 1 + max(int(entry.get("offset", 0)) for entry in part.findall("{*}input"))
+        faces = _faces(part, int(vertex.get("offset", 0)), stride)
         source = vertex.get("source", "")
         if source not in points:
             points[source] = _positions(named, _target(named, vertex, "source"))
@@ -283,10 +283,8 @@ def _positions(named: Named, vertices: ET.Element) -> Array:
         if entry.get("semantic") == "POSITION":
             source = _target(named, entry, "source")
             accessor = _child(source, "technique_common/{*}accessor")
-            first, count, width = (
-                _integer(accessor, name, default)
-                for name, default in (("offset", 0), ("count", 0), ("stride", 1))
-            )
+            first, count = int(accessor.get("offset", 0)), int(accessor.get("count", 0))
+            width = int(accessor.get("stride", 1))
             numbers = _numbers(_target(named, accessor, "source"))
             return numbers[first : first + width * count].reshape(count, width)[:, :3]
     raise ValueError("<vertices> have no input POSITION")
@@ -331,10 +329,6 @@ def _target(named: Named, element: ET.Element, attribute: str = "url") -> ET.Ele
     if address not in named:
         raise ValueError(f"<{_word(element)}> refers to {address!r}, which is not there")
     return named[address]
-
-
-def _integer(element: ET.Element, name: str, default: int) -> int:
-    return int(element.get(name, default))
 
 
 def _numbers(element: ET.Element) -> Array:

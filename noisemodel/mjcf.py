@@ -79,11 +79,9 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
     except UnicodeEncodeError as error:
         raise RobotError(f"{path}: its path is not UTF-8, as MuJoCo needs it") from error
     compiled, meshes = _compiled(path, folders)
-    if compiled.njnt > limit("joints"):
-        raise RobotError(f"{path}: {compiled.njnt} joints; {beyond('joints')}")
-    if compiled.nbody + compiled.ngeom > limit("bodies"):
-        count = compiled.nbody + compiled.ngeom
-        raise RobotError(f"{path}: {count} bodies and geoms; {beyond('bodies')}")
+    for count, name in ((compiled.njnt, "joints"), (compiled.nbody + compiled.ngeom, "bodies")):
+        if count > limit(name):
+            raise RobotError(f"{path}: {count} {name}; {beyond(name)}")
     for name in ("qpos0", "body_pos", "body_quat", "jnt_pos", "jnt_axis", "geom_pos", "geom_size"):
         if not np.isfinite(getattr(compiled, name)).all():
             raise RobotError(f"{path}: {name} of the compiled model is not finite")

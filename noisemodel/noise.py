@@ -141,10 +141,7 @@ class Noise:
         return decibel(self.total / REFERENCE_POWER)
 
     def pressure(self, distance: float) -> Array:
-        """Sound pressure at a distance in [m] from a robot that is a point and radiates evenly.
-
-        It has the shape (samples,), in [Pa]; a NoiseModelError if ``distance`` is not positive.
-        """
+        """Sound pressure in [Pa] at a distance in [m] from a robot that is a point, (samples,)."""
         if not 0.0 < distance < np.inf:
             raise NoiseModelError(f"distance is {distance:g} m, expected a positive number")
         impedance = DENSITY * SOUND_SPEED
@@ -384,10 +381,9 @@ def link_noise(
 
 
 def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
-    """The fast part of a motion: without its running mean over a tenth of a second.
+    """The fast part of a motion, shape (samples, nv): without its mean over a tenth of a second.
 
-    It holds what vibrates at 10 Hz and above, shape (samples, nv), and little of what is slower.
-    ``valid`` is False in gaps, which no mean reaches over.
+    It holds what vibrates at 10 Hz and above. ``valid`` is False in gaps: no mean reaches over.
     """
     fast = np.zeros(velocity.shape[::-1])
     half = _half(rate)

@@ -13,7 +13,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -209,22 +209,20 @@ def _cluster(address: str) -> Iterator[Any]:
 
 def _check_software(client: Any, address: str) -> None:
     """Refuse workers that have not the same software, or none."""
+    here = _software()
+    for worker, there in client.run(_software, on_error="return").items():
+        if there != here:
+            raise NoiseModelError(
+                f"{address}: worker {worker} has {there}, here is {here}; install the same on all"
+            )
+
+
+def _software() -> dict[str, str]:
+    found = {}
     for name in SOFTWARE:
-        here = _version(name)
-        for worker, found in client.run(_version, name, on_error="return").items():
-            there = "none" if isinstance(found, Exception) else found
-            if there != here:
-                raise NoiseModelError(
-                    f"{address}: worker {worker} has {name} {there}, here is {here};"
-                    " install the same on all"
-                )
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:  # run from its folder
-        return "none"
+        with suppress(PackageNotFoundError):  # run from its folder
+            found[name] = version(name)
+    return found
 
 
 def _there(

@@ -151,10 +151,7 @@ class Run:
 
     @property
     def motion(self) -> Real:
-        """All measured velocities, a floating base's first, shape (samples, n).
-
-        The simplified noise counts the base's six velocities too (paper, Sec. II-A: n = 30).
-        """
+        """All measured velocities, a floating base's first (paper, Sec. II-A), (samples, n)."""
         base, joints = self.base_velocity, self.velocity
         if base is None:
             return joints
@@ -243,10 +240,9 @@ def rows_of(run: Run, rows: slice | NDArray[np.intp], **changes: Any) -> Run:
 
 
 def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
-    """The motion of a run piece by piece, each of which fits into memory.
+    """The motion of a run, the fields ``MOTION``, in pieces that fit into memory.
 
-    The pieces have the rate and the names of the run, and the fields ``MOTION`` alone. They are not
-    checked again: one may be a gap alone. ``samples`` is their length, megabytes unless given.
+    They are not checked again: one may be a gap alone. They have megabytes unless ``samples`` each.
     """
     names = ("joint_names", "desired_joint_names", "robot", "meta", "rate")
     whole = dict.fromkeys(SAMPLED) | {name: getattr(run, name) for name in names}

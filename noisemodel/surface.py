@@ -41,10 +41,7 @@ ALL: Indices = np.zeros(1, dtype=np.intp)  # where the only cell begins, if all 
 def triangles(robot: Robot, geometry: str = "visual") -> tuple[Array, ...]:
     """Triangles of each joint's link in the joint's axes, (triangles, 3 corners, 3), in [m].
 
-    A link is all geometry that moves with one joint. ``geometry`` is "visual" or "collision", as
-    the URDF or MJCF has them; "hull", the convex hull of every visual by itself; or "auto", the
-    visual or, of a link that has none, the collision. Which side of a triangle is outside is not
-    known.
+    ``geometry`` is as in `Surface.of`. Which side of a triangle is outside is not known.
     """
     if geometry not in GEOMETRIES:
         known = ", ".join(GEOMETRIES)
@@ -254,8 +251,8 @@ def point_speeds(points: Array, twists: Array) -> Array:
 def _cells(cloud: Cloud, halvings: int) -> tuple[Array, Array, Indices]:
     """Points and weights sorted by cells, and where each cell begins.
 
-    Cells are cut at their mean across their longest axis. The cloud is transformed to axes in
-    which it is less slender: so a rod is cut around itself, too, and not only along.
+    Cells are cut at their mean across their longest axis, in axes in which the cloud is less
+    slender: so a rod is cut around itself, too, and not only along.
     """
     _, (covariance,) = _statistics(cloud.points, cloud.weights, ALL)
     spread, axes = np.linalg.eigh(covariance)

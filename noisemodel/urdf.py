@@ -52,13 +52,12 @@ def checked(path: Path) -> ET.Element:
     root = read_xml(path, "URDF")
     if root.tag != "robot":
         raise RobotError(f"{path}: not a URDF, its root is <{root.tag}>, expected <robot>")
-    if not root.get("name"):
-        raise RobotError(f"{path}: the URDF is empty or unexpanded, its <robot> has no name")
+    if not root.get("name") or root.find("link") is None:
+        what = "its <robot> has no name or no link"
+        raise RobotError(f"{path}: the URDF is empty or unexpanded, {what}")
     joints = root.findall("joint")
     if len(joints) > limit("joints"):
         raise RobotError(f"{path}: {len(joints)} joints; {beyond('joints')}")
-    if root.find("link") is None:
-        raise RobotError(f"{path}: the URDF has no link")
     _check_numbers(path, root)
     _check_tree(path, joints)
     mimics(path, root)

@@ -458,7 +458,11 @@ def test_robots_that_cannot_be_read_or_have_no_surface_are_left_out(tmp_path):
         ({"kinds": ()}, NoiseModelError, "expected two different ones"),
         ({"surface": "skin"}, GeometryError, "geometry 'skin' is not known, .* visual, collision"),
         ({"robots": []}, NoiseModelError, "no robots to compare"),
-        ({"robots": ["panda", 3]}, NoiseModelError, "a robot is of type int, expected a Robot"),
+        (
+            {"robots": ["panda", 3]},
+            NoiseModelError,
+            "a robot is of type int, expected a robot",
+        ),
         ({"seed": -1}, NoiseModelError, "seed is -1, expected 0 or more"),
         ({"jobs": 0}, NoiseModelError, "jobs is 0, expected 1 or more"),
     ],
