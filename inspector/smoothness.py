@@ -29,6 +29,7 @@ from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.text import cell, counted, progress
 from inspector.verdict import EXPECTED
+from noiseclassifier.matching import duration, spans_of
 from noisemodel import Run
 from noisemodel.run import stretches
 from noisemodel.types import Array, Real
@@ -204,9 +205,9 @@ def scored(run: Run, log: str, *, episode: str = "", library: Library | None = N
         remarks.append("Velocities are first differences of positions.")
     else:
         velocity = np.asarray(run.velocity[part], dtype=np.float64)
-    rate, duration = run.rate, _length(part) / run.rate
+    rate, seconds = run.rate, _length(part) / run.rate
     found: dict[str, tuple[float | None, str]] = {"flagged": flagged}
-    found["level"] = level_above(velocity, rate, FAST), _too_little(rate, duration, FAST)
+    found["level"] = level_above(velocity, rate, FAST), _too_little(rate, seconds, FAST)
     if len(velocity) and float(speed_of(velocity).max()) >= STANDING:
         reason = "the motion is too short, or has no jerk"
         found["sparc"] = sparc(speed_of(velocity), rate), reason
@@ -225,11 +226,11 @@ def scored(run: Run, log: str, *, episode: str = "", library: Library | None = N
         found["tracking"] = None, "the log has no desired motion of its joints"
     else:
         error, quantities["tracking"] = tracked
-        reason = _too_little(rate, duration, TRACKED)
+        reason = _too_little(rate, seconds, TRACKED)
         found["tracking"] = level_above(error, rate, TRACKED), reason
     scores = {name: found[name][0] for name in SCORES}
     missing = {name: found[name][1] for name, score in scores.items() if score is None}
-    return Episode(log, episode, duration, rate, scores, missing, quantities, tuple(remarks))
+    return Episode(log, episode, seconds, rate, scores, missing, quantities, tuple(remarks))
 
 
 def _length(part: slice) -> int:
@@ -279,11 +280,8 @@ def _flagged(run: Run, library: Library) -> tuple[float | None, str]:
     if found.status is Status.CANNOT_TELL or found.labels is None:
         return None, found.reason.rstrip(".")
     covered = sum(stop - start for start, stop, _ in found.lane)
-    total, end = 0.0, -np.inf
-    for event in sorted(found.findings, key=lambda event: event.start):
-        total += max(0.0, event.stop - max(event.start, end))
-        end = max(end, event.stop)
-    return (float(min(total / covered, 1.0)), "") if covered else (None, "no frame has a label")
+    total = duration(spans_of(found.findings))
+    return (min(total / covered, 1.0), "") if covered else (None, "no frame has a label")
 
 
 def _too_little(rate: float, duration: float, frequency: float) -> str:
@@ -401,13 +399,10 @@ def as_text(ranking: Ranking) -> str:
     ]
     columns = list(zip(*([list(head) for head in zip(*heads, strict=True)] + rows), strict=True))
     widths = [max(len(cell) for cell in column) for column in columns]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if place == 1 else cell.rjust(width)
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in zip(*columns, strict=True)
-    ]
+    lines = []
+    for row in zip(*columns, strict=True):
+        rank, name, *others = (each.rjust(width) for each, width in zip(row, widths, strict=True))
+        lines.append("  ".join((rank, row[1].ljust(len(name)), *others)).rstrip())
     meaning = SCORES[ranking.by].meaning
     head = f"{counted(len(episodes), 'episode')}, the smoothest first by {meaning}"
     return "\n".join([head, "", *lines, "", *_notes(ranking)])
@@ -427,44 +422,42 @@ def as_csv(ranking: Ranking) -> str:
 
 def as_json(ranking: Ranking) -> str:
     """Write a ranking as JSON; a score that is missing is null, with its reason."""
-    return json.dumps(
+    scores = {
+        score.name: {
+            "meaning": score.meaning,
+            "unit": score.unit,
+            "smoother": "higher" if score.smooth > 0 else "lower",
+        }
+        for score in SCORES.values()
+    }
+    settings = {
+        "level_above_hz": FAST,
+        "tracking_above_hz": TRACKED,
+        "sparc_cutoff_hz": CUTOFF,
+        "sparc_threshold": THRESHOLD,
+        "sparc_padding": PADDING,
+    }
+    episodes = [
         {
-            "format": FORMAT,
-            "by": ranking.by,
-            "scores": {
-                score.name: {
-                    "meaning": score.meaning,
-                    "unit": score.unit,
-                    "smoother": "higher" if score.smooth > 0 else "lower",
-                }
-                for score in SCORES.values()
-            },
-            "settings": {
-                "level_above_hz": FAST,
-                "tracking_above_hz": TRACKED,
-                "sparc_cutoff_hz": CUTOFF,
-                "sparc_threshold": THRESHOLD,
-                "sparc_padding": PADDING,
-            },
-            "episodes": [
-                {
-                    "rank": rank,
-                    "log": episode.log,
-                    "episode": episode.episode,
-                    "duration": episode.duration,
-                    "rate": episode.rate,
-                    **episode.scores,
-                    "of": dict(episode.quantities),
-                    "missing": dict(episode.reasons),
-                    "remarks": list(episode.remarks),
-                }
-                for rank, episode in zip(ranking.ranks, ranking.episodes, strict=True)
-            ],
-            "failed": {failed.name: failed.problem for failed in ranking.failed},
-        },
-        indent=2,
-        ensure_ascii=False,
-    )
+            "rank": rank,
+            **{name: getattr(each, name) for name in ("log", "episode", "duration", "rate")},
+            **each.scores,
+            "of": dict(each.quantities),
+            "missing": dict(each.reasons),
+            "remarks": list(each.remarks),
+        }
+        for rank, each in zip(ranking.ranks, ranking.episodes, strict=True)
+    ]
+    failed = {each.name: each.problem for each in ranking.failed}
+    document = {
+        "format": FORMAT,
+        "by": ranking.by,
+        "scores": scores,
+        "settings": settings,
+        "episodes": episodes,
+        "failed": failed,
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False)
 
 
 def _notes(ranking: Ranking) -> Iterator[str]:

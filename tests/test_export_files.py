@@ -82,21 +82,18 @@ def test_parquet_holds_every_number_to_the_bit(exported, demo):
     assert table.schema.metadata[b"model"] == b"general"
 
 
-def test_the_frames_can_be_read_from_the_table(exported):
+def test_a_sample_has_the_frame_whose_middle_is_nearest(exported):
     folder, content = exported
+    labels = content.analysis.labels
     table = pyarrow.parquet.read_table(folder / "demo.parquet").to_pylist()
     frames = {row["frame_start"]: row for row in table if row["frame_start"] is not None}
-    assert list(frames) == content.analysis.labels.start.tolist()
+    assert list(frames) == labels.start.tolist()
     rows = list(frames.values())
-    assert [row["frame_stop"] for row in rows] == content.analysis.labels.stop.tolist()
-    assert [row["label"] for row in rows] == content.analysis.labels.label.tolist()
-    scores = [[row[f"score_{name}"] for name in content.analysis.labels.classes] for row in rows]
-    np.testing.assert_array_equal(scores, content.analysis.labels.scores)
-
-
-def test_a_sample_has_the_frame_whose_middle_is_nearest(exported):
-    folder, _ = exported
-    for row in pyarrow.parquet.read_table(folder / "demo.parquet").to_pylist()[::97]:
+    assert [row["frame_stop"] for row in rows] == labels.stop.tolist()
+    assert [row["label"] for row in rows] == labels.label.tolist()
+    scores = [[row[f"score_{name}"] for name in labels.classes] for row in rows]
+    np.testing.assert_array_equal(scores, labels.scores)
+    for row in table[::97]:
         if row["frame_start"] is None:
             assert not 0.2 <= row["time"] <= 3.8
         else:
@@ -119,10 +116,8 @@ def test_csv_has_the_values_of_parquet(exported):
 def test_gaps_are_left_out(tmp_path):
     valid = np.ones(2000, dtype=bool)
     valid[1500:1510] = False
-    run = plain_run(valid=valid)
-    run = Run(
-        time=run.time, velocity=run.velocity * valid[:, None], joint_names=("a",), valid=valid
-    )
+    run = plain_run()
+    run = replace(run, velocity=run.velocity * valid[:, None], valid=valid)
     export(run, tmp_path / "run.parquet", LIBRARY)
     table = pyarrow.parquet.read_table(tmp_path / "run.parquet")
     np.testing.assert_array_equal(table["time"].to_numpy(), run.time[valid])
@@ -176,34 +171,24 @@ def test_an_exported_run_is_imported_again_to_the_bit(exported, demo, tmp_path):
         np.testing.assert_array_equal(getattr(back, name), getattr(demo, name))
 
 
-def test_the_class_ends_where_the_frames_end(exported):
+def test_mcap_holds_classes_lines_and_levels_where_they_are_known(exported, tmp_path):
     folder, content = exported
-    changes = messages(folder / "demo.mcap", "/class")
-    lane = content.analysis.lane
+    path, lane = folder / "demo.mcap", content.analysis.lane
+    changes = messages(path, "/class")
     assert [each["label"] for _, each in changes] == [*(name for _, _, name in lane), ""]
     np.testing.assert_allclose(
         [at * 1e-9 for at, _ in changes], [*(start for start, _, _ in lane), lane[-1][1]]
     )
-
-
-def test_each_finding_is_a_line_of_the_log(exported):
-    folder, content = exported
-    lines = messages(folder / "demo.mcap", "/log")
     (event,) = content.analysis.findings
-    ((at, line),) = lines
+    ((at, line),) = messages(path, "/log")
     assert line["timestamp"] == {"sec": at // 10**9, "nsec": at % 10**9}
     assert line["message"] == f"impact from {event.start:.2f} s to {event.stop:.2f} s"
-
-
-def test_mcap_holds_the_level_above_10_hz_where_it_is_known(exported, tmp_path):
-    folder, content = exported
-    stamps, found = zip(*messages(folder / "demo.mcap", "/level"), strict=True)
+    stamps, found = zip(*messages(path, "/level"), strict=True)
     start, level = content.analysis.noise_level
     assert [each["level"] for each in found] == level[:, 0].tolist()
     np.testing.assert_allclose(np.array(stamps) * 1e-9, start, atol=1e-9)
     run = plain_run()
-    valid = run.time > 0.5
-    export(replace(run, valid=valid), tmp_path / "run.mcap", LIBRARY)
+    export(replace(run, valid=run.time > 0.5), tmp_path / "run.mcap", LIBRARY)
     assert min(stamp for stamp, _ in messages(tmp_path / "run.mcap", "/level")) >= 0.5e9
 
 
@@ -222,17 +207,19 @@ def test_mcap_holds_labels_scores_findings_and_annotations(exported, demo):
     assert [Block(**message) for message in annotated] == list(demo.blocks)
 
 
-def test_absolute_stamps_are_restored(tmp_path):
-    run = plain_run(meta={"start": "1700000000.123456789"})
+@pytest.mark.parametrize(
+    ("changes", "stamps"),
+    [
+        ({"meta": {"start": "1700000000.123456789"}}, [1700000000123456789, 1700000000124456789]),
+        ({"start": -1.0}, [0, 1_000_000]),
+    ],
+)
+def test_stamps_are_absolute_and_a_run_before_time_0_is_shifted(tmp_path, changes, stamps):
+    run = plain_run(**changes)
     export(run, tmp_path / "run.mcap", LIBRARY)
-    stamps = [stamp for stamp, _ in messages(tmp_path / "run.mcap", "/noise")]
-    assert stamps[:2] == [1_700_000_000_123_456_789, 1_700_000_000_124_456_789]
-
-
-def test_a_run_before_time_0_is_shifted(tmp_path):
-    export(plain_run(start=-1.0), tmp_path / "run.mcap", LIBRARY)
-    (first, noise), *_ = messages(tmp_path / "run.mcap", "/noise")
-    assert (first, noise["time"]) == (0, -1.0)
+    found = messages(tmp_path / "run.mcap", "/noise")
+    assert [stamp for stamp, _ in found[:2]] == stamps
+    assert found[0][1]["time"] == run.time[0]
 
 
 # --- layouts

@@ -55,19 +55,16 @@ def test_sparc_of_a_gaussian_speed_is_that_of_its_authors():
     assert sparc(np.exp(-5 * time**2), 100.0) == pytest.approx(-1.41403, abs=1e-5)
 
 
-@pytest.mark.parametrize("frequency", [3.0, 6.0, 9.0])
-def test_an_oscillation_lowers_sparc_and_log_dimensionless_jerk(frequency):
-    clean = minimum_jerk()
-    rough = with_oscillation(clean, frequency, 0.3)
-    assert sparc(speed_of(rough), FAST_RATE) < sparc(speed_of(clean), FAST_RATE)
-    assert log_dimensionless_jerk(rough, FAST_RATE) < log_dimensionless_jerk(clean, FAST_RATE)
+CLEAN = minimum_jerk()
 
 
-def test_two_submovements_are_less_smooth_than_one():
-    one = minimum_jerk()
-    two = np.vstack((one, one))
-    assert sparc(speed_of(two), FAST_RATE) < sparc(speed_of(one), FAST_RATE)
-    assert log_dimensionless_jerk(two, FAST_RATE) < log_dimensionless_jerk(one, FAST_RATE)
+@pytest.mark.parametrize(
+    "rough",
+    [with_oscillation(CLEAN, each, 0.3) for each in (3.0, 6.0, 9.0)] + [np.vstack((CLEAN, CLEAN))],
+)
+def test_an_oscillation_or_a_second_movement_lowers_sparc_and_log_dimensionless_jerk(rough):
+    assert sparc(speed_of(rough), FAST_RATE) < sparc(speed_of(CLEAN), FAST_RATE)
+    assert log_dimensionless_jerk(rough, FAST_RATE) < log_dimensionless_jerk(CLEAN, FAST_RATE)
 
 
 @settings(deadline=None, max_examples=25)
@@ -130,17 +127,13 @@ def test_signals_that_are_too_short_have_no_measure(samples):
         assert squared_difference(signal) is None
 
 
-def test_standstill_and_constant_speed_are_not_nan():
+def test_standstill_constant_speed_and_a_rate_that_is_too_low_are_not_nan():
     still, constant = np.zeros((100, 3)), np.ones((100, 3))
     assert sparc(speed_of(still), FAST_RATE) is None
     assert log_dimensionless_jerk(still, FAST_RATE) is None
     assert log_dimensionless_jerk(constant, FAST_RATE) is None
-    assert level_above(still, FAST_RATE, 10.0) == 0.0
-    assert squared_difference(still) == 0.0
-
-
-def test_a_rate_that_is_too_low_has_no_level():
-    assert level_above(np.ones((100, 1)), 20.0, 10.0) is None
+    assert level_above(still, FAST_RATE, 10.0) == squared_difference(still) == 0.0
+    assert level_above(constant, 20.0, 10.0) is None
 
 
 ROOT = Path(__file__).parents[1]
@@ -231,18 +224,15 @@ def test_velocities_that_were_smoothed_are_replaced_by_differences(tmp_path):
 
 def test_actions_that_a_log_holds_are_counted_once():
     run = rollout(0.02)
-    every = np.repeat(np.arange(200), 10)
     faster = Run(
         time=np.arange(2000) / (10 * RATE),
         velocity=np.random.default_rng(0).standard_normal((2000, 2)),
-        position_desired=run.position_desired[every],
+        position_desired=np.repeat(run.position_desired, 10, axis=0),
         joint_names=run.joint_names,
     )
-    held, plain = scored(faster, "held"), scored(run, "plain")
-    assert held.scores["action_rate"] == pytest.approx(plain.scores["action_rate"], rel=0.05)
-    assert held.scores["action_curvature"] == pytest.approx(
-        plain.scores["action_curvature"], rel=0.05
-    )
+    held, plain = (scored(each, "").scores for each in (faster, run))
+    for name in ("action_rate", "action_curvature"):
+        assert held[name] == pytest.approx(plain[name], rel=0.05)
 
 
 def test_an_angle_that_wraps_is_no_jump():
@@ -263,13 +253,10 @@ def test_the_order_is_by_actions_only_where_all_episodes_have_them_of_one_quanti
     velocities = scored(rollout(position_desired=None, velocity_desired=rollout().velocity), "v")
     of_set = replace(positions, episode="0")
     assert default_order([of_set]) == "action_curvature"
+    assert default_order([positions]) == "level"  # logs, by their measured velocities
     assert default_order([positions, none]) == "level"
     assert default_order([of_set, replace(velocities, episode="1")]) == "level"
     assert ranked([scored(rollout(samples=2), "", episode="0")]).by == "action_rate"
-
-
-def test_logs_are_ordered_by_their_measured_velocities_although_they_have_actions():
-    assert default_order([scored(rollout(), "run")]) == "level"
 
 
 def test_episodes_with_the_same_actions_are_ordered_by_what_tells_them_apart():
@@ -299,10 +286,6 @@ def test_an_episode_without_the_score_has_no_rank_and_comes_last():
     assert order.ranks == (1, None)
 
 
-def test_the_command_knows_all_scores():
-    assert set(get_args(Scores)) == set(SCORES)
-
-
 @pytest.fixture
 def folder(tmp_path):
     for name, chatter in (("smooth", 0.0), ("rough", 0.1), ("middle", 0.01)):
@@ -323,15 +306,15 @@ def test_a_folder_is_ranked_in_one_table(folder):
 
 
 def test_csv_and_json_have_the_same_numbers(folder):
-    _, table, _ = call("smoothness", folder, "--format", "csv", "--by", "ldlj")
-    _, document, _ = call("smoothness", folder, "--format", "json", "--by", "ldlj")
+    assert set(get_args(Scores)) == set(SCORES)
+    table, document = (
+        call("smoothness", folder, "--format", each, "--by", "ldlj")[1] for each in ("csv", "json")
+    )
     rows, found = list(csv.DictReader(io.StringIO(table))), json.loads(document)
-    assert found["format"] == "noise-smoothness/1"
-    assert found["settings"]["sparc_cutoff_hz"] == 10.0
+    assert (found["format"], found["settings"]["sparc_cutoff_hz"]) == ("noise-smoothness/1", 10.0)
     assert [row["rank"] for row in rows] == ["1", "2", "3"]
     for row, episode in zip(rows, found["episodes"], strict=True):
-        assert row["log"] == episode["log"]
-        assert row["flagged"] == ""
+        assert (row["log"], row["flagged"]) == (episode["log"], "")
         assert episode["flagged"] is None
         assert "80 Hz" in episode["missing"]["flagged"]
         assert float(row["ldlj"]) == pytest.approx(episode["ldlj"], rel=1e-5)
