@@ -40,26 +40,19 @@ def folder(tmp_path_factory):
     return path
 
 
-def test_the_measures_of_a_model_are_printed(folder):
-    status, out, err = call("evaluate", folder / "model.npz", folder / "test")
+def test_the_measures_of_a_model_are_printed_or_written(folder, tmp_path):
+    command, path = ("evaluate", folder / "model.npz", folder / "test"), tmp_path / "report.json"
+    status, out, err = call(*command, "-o", path)
     assert (status, err) == (0, "")
     assert "6 runs in 6 groups" in out
     assert "Faults found, of all injected         100.0%" in out
     assert "False alarms per hour of ok time      0 [0, " in out
     assert "As the paper measures\nFalse negative errors" in out
-
-
-def test_json_is_printed_or_written_with_the_models_name(folder, tmp_path):
-    status, out, _ = call("evaluate", folder / "model.npz", folder / "test", "--json")
-    assert status == 0
-    report = json.loads(out)
+    report = json.loads(path.read_text())
     assert (report["model"], report["runs"]) == ("model.npz", 6)
     assert np.array(report["frames"]["confusion"]).sum() == 6 * 2 * 7
-    path = tmp_path / "report.json"
-    status, out, _ = call("evaluate", folder / "model.npz", folder / "test", "-o", path)
-    assert status == 0
-    assert "Balanced accuracy" in out
-    assert json.loads(path.read_text()) == report
+    status, out, _ = call(*command, "--json")
+    assert (status, json.loads(out)) == (0, report)
 
 
 def test_runs_that_it_was_trained_on_are_refused_in_one_line(folder):
@@ -127,11 +120,11 @@ def test_findings_are_those_that_classify_reports(folder, tmp_path):
 
 def test_runs_below_the_rate_of_the_model_are_listed_as_not_answered(folder, tmp_path):
     slow = simulated(tmp_path / "slow.npz", 40, robot="a1", rate=200)
-    status, out, err = call("evaluate", folder / "model.npz", folder / "test", slow)
+    report = tmp_path / "report.json"
+    status, out, err = call("evaluate", folder / "model.npz", folder / "test", slow, "-o", report)
     assert (status, err) == (0, "")
     assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of 1 robot (a1)" in out
-    status, out, _ = call("evaluate", folder / "model.npz", folder / "test", slow, "--json")
-    (listed,) = json.loads(out)["protocol"]["unanswered"]
+    (listed,) = json.loads(report.read_text())["protocol"]["unanswered"]
     assert (listed["run"], listed["robot"]) == ("slow", "a1")
     status, _, err = call("evaluate", folder / "model.npz", slow)
     assert (status, err.count("\n")) == (3, 1)
