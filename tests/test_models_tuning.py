@@ -1,11 +1,9 @@
-"""Tuning: the grid, the log-loss, and the measures of points."""
+"""Tuning: the grid, and the measures of points."""
 
 from dataclasses import dataclass, fields, replace
-from math import log
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
 
 import noiseclassifier as nc
 from noiseclassifier import tuning
@@ -16,8 +14,6 @@ from noiseclassifier.tuning import (
     Grid,
     Measures,
     Trial,
-    balanced_log_loss,
-    class_margins,
     measure,
     order,
     validate,
@@ -113,43 +109,6 @@ def test_a_grid_that_makes_no_sense_with_a_profile_is_refused(text, profile, rea
         Grid.of([text]).profiles(profile)
 
 
-RANDOM = np.random.default_rng(5)
-
-
-def test_the_margin_of_a_class_is_the_least_of_its_pairs():
-    # pairs (0, 1), (0, 2), (1, 2): 0 wins by 1 and by 3, and 2 beats 1 by 2
-    margins = class_margins(np.array([[1.0, 3.0, -2.0]]), classes=3, multiclass="one-vs-one")
-    assert margins.tolist() == [[1.0, -2.0, -3.0]]
-
-
-def sample(frames=200, classes=4):
-    truth = np.arange(frames) % classes
-    return np.eye(classes)[truth] + RANDOM.standard_normal((frames, classes)), truth
-
-
-OFTEN = np.concatenate([np.arange(200), *[np.flatnonzero(np.arange(200) % 4 == 2)] * 9])
-
-
-@pytest.mark.parametrize("frames", [slice(None), OFTEN, slice(199)])
-@pytest.mark.parametrize("width", [1.0, 7.0, 0.0])
-def test_the_loss_is_the_mean_of_the_classes_at_the_best_slope(frames, width):
-    margins, truth = (each[frames] for each in sample())
-
-    def loss(power):
-        shares = np.exp(2.0**power * margins)
-        own = shares[np.arange(len(truth)), truth] / shares.sum(axis=1)
-        return np.mean([-np.log(own[truth == each]).mean() for each in range(4)])
-
-    best = minimize_scalar(loss, bounds=(-6, 6), method="bounded", options={"xatol": 1e-6})
-    expected = best.fun if width else log(4)
-    assert balanced_log_loss(width * margins, truth) == pytest.approx(expected, abs=1e-8)
-
-
-def test_certain_and_right_margins_have_no_loss():
-    truth = np.array([0, 1, 2, 1])
-    assert balanced_log_loss(np.eye(3)[truth], truth) == pytest.approx(0.0, abs=1e-12)
-
-
 SMALL = {"rate": 1000.0, "length": 400, "hop": 100, "window": 256, "stride": 48}
 PROFILES = {
     "noisytest": replace(nc.Profile.noisytest(), **SMALL),
@@ -232,7 +191,6 @@ def test_too_many_frames_for_a_kernel_matrix_change_no_decision(monkeypatch):
     monkeypatch.setattr(tuning, "LARGEST", 0)
     without = validate(points, trial)
     assert np.array_equal(kept.chosen, without.chosen)
-    np.testing.assert_allclose(kept.margins, without.margins, atol=1e-6)
 
 
 def test_folds_predict_what_a_classifier_of_the_other_recordings_predicts():
@@ -276,14 +234,12 @@ def test_frames_that_are_out_of_distribution_are_never_ok():
     assert (found.failure_recall, found.false_alarm_rate) == (1.0, 1.0)
 
 
-def test_the_log_loss_breaks_ties():
-    above_threshold, worse_calibrated = (
-        Measures(0.9, 0.2, 1.0, 0.0, 0.8),
-        Measures(0.9, 0.3, 1.0, 0.0, 0.9),
-    )
-    assert min(worse_calibrated, above_threshold, key=order("balanced-accuracy")) is above_threshold
-    assert min(worse_calibrated, above_threshold, key=order("subset-accuracy")) is worse_calibrated
-    assert min(worse_calibrated, above_threshold, key=order("log-loss")) is above_threshold
+def test_the_other_accuracy_breaks_ties():
+    better, worse = Measures(0.9, 1.0, 0.0, 0.9), Measures(0.9, 1.0, 0.0, 0.8)
+    other = Measures(0.8, 1.0, 0.0, 0.9)
+    assert min(worse, better, other, key=order("balanced-accuracy")) is better
+    assert min(other, worse, better, key=order("subset-accuracy")) is better
+    assert min(other, worse, key=order("balanced-accuracy")) is worse
 
 
 LACKS = "no frame of highaccelerations to learn from where those of walk-{} are checked"

@@ -88,8 +88,8 @@ def tune(
     ] = 10000.0,
     grid: Grid = None,
     criterion: Annotated[
-        Literal["balanced-accuracy", "log-loss", "subset-accuracy"],
-        option("Ranks the points; the log-loss breaks ties."),
+        Literal["balanced-accuracy", "subset-accuracy"],
+        option("Ranks the points; the other one breaks ties."),
     ] = "balanced-accuracy",
     train: Annotated[
         Path | None, option("Train the best point on all training runs, write the model.")

@@ -48,7 +48,6 @@ BATCHES, WORKERS = 4, 16
 same time; and for how many workers of a cluster there should be enough."""
 HEADS = {
     "balanced_accuracy": ("balanced", "accuracy"),
-    "log_loss": ("", "log-loss"),
     "failure_recall": ("failure", "recall"),
     "false_alarm_rate": ("false", "alarms"),
     "subset_accuracy": ("subset", "accuracy"),
@@ -284,8 +283,7 @@ def _cells(point: Point, measures: Measures) -> list[str]:
     cells = [_text(value) for value in point.values()]
     for name in HEADS:
         value = getattr(measures, name)
-        figure = f"{value:.4f}" if name == "log_loss" else f"{value:.1%}"
-        cells.append("-" if isnan(value) else figure)
+        cells.append("-" if isnan(value) else f"{value:.1%}")
     return cells
 
 

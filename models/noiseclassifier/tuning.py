@@ -24,13 +24,13 @@ from noiseclassifier.estimators import SupportVectorMachines, balance, choose, s
 from noiseclassifier.features import standard
 from noiseclassifier.labels import UNKNOWN
 from noiseclassifier.measures import Evaluation, plain
-from noiseclassifier.profile import Kernel, Multiclass, Profile
+from noiseclassifier.profile import Kernel, Profile
 from noiseclassifier.recording import Recording
 from noiseclassifier.signals import Array, Index, Words
 
 Value: TypeAlias = int | float | str
 Point: TypeAlias = Mapping[str, Value]
-Criterion: TypeAlias = Literal["balanced-accuracy", "log-loss", "subset-accuracy"]
+Criterion: TypeAlias = Literal["balanced-accuracy", "subset-accuracy"]
 
 FEATURE_SETTINGS = ("window", "stride", "bands", "floor", "least_deviation")
 """Settings of the features that can be tuned."""
@@ -44,10 +44,6 @@ LARGEST = 5000
 """Training frames up to which a kernel matrix is kept, 200 MB then; above, libsvm has a cache."""
 DIGITS = 9
 """Decimals of a measure: equal measures stay equal whatever the order of summation."""
-WIDEST = 6.0
-"""The slope of the log-loss is fitted within 2^-6 to 2^6 per unit of the margin."""
-CLOSE = 1e-6
-"""Tolerance of its exponent; the loss, which is flat there, has an error of 1e-12 then."""
 
 
 # --- the grid
@@ -191,10 +187,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of a point, as `Evaluation` has them; the balanced log-loss is in nats."""
+    """Measures of a point, as `Evaluation` has them."""
 
     balanced_accuracy: float
-    log_loss: float
     failure_recall: float
     false_alarm_rate: float
     subset_accuracy: float
@@ -212,27 +207,27 @@ class Validation:
     truth: Index  # class of each frame, as an index, shape (frames,)
     runs: Words  # name of the recording that each is from, shape (frames,)
     chosen: Index  # its predicted class, beyond the classes if unknown, shape (points, frames)
-    margins: Array  # or logarithms of the probabilities, shape (points, frames, classes)
     training_frames: int
 
     def measures(self) -> list[Measures]:
         """Measures of each point."""
         names, wanted = (*self.classes, UNKNOWN), [field.name for field in fields(Measures)]
         measures = []
-        for chosen, margins in zip(self.chosen, self.margins, strict=True):
+        for chosen in self.chosen:
             cells = np.zeros((len(names), len(names)), dtype=np.int64)
             np.add.at(cells, (self.truth, chosen), 1)
             found = Evaluation(names, cells).as_dict()
-            found["log_loss"] = balanced_log_loss(margins, self.truth)
             values = (nan if found[name] is None else found[name] for name in wanted)
             measures.append(Measures(*(round(value, DIGITS) for value in values)))
         return measures
 
 
 def order(criterion: Criterion) -> Callable[[Measures], tuple[float, float]]:
-    """Key that sorts points, the best first; the log-loss breaks ties."""
-    name, sign = criterion.replace("-", "_"), 1.0 if criterion == "log-loss" else -1.0
-    return lambda measures: (sign * getattr(measures, name), measures.log_loss)
+    """Key that sorts points, the best first; the other criterion breaks ties."""
+    first, other = "balanced_accuracy", "subset_accuracy"
+    if criterion == "subset-accuracy":
+        first, other = other, first
+    return lambda measures: (-getattr(measures, first), -getattr(measures, other))
 
 
 def measure(profiles: Sequence[Profile], trial: Trial) -> list[Measures]:
@@ -257,7 +252,6 @@ def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
         for each in (known, fresh)
     )
     chosen = np.empty((len(profiles), len(fresh)), dtype=np.intp)
-    margins = np.empty((*chosen.shape, len(classes)))
     for learn, check in trial.splits:
         learnt = np.isin(known.runs, trial.names(learn))
         checked = np.isin(fresh.runs, trial.names(check))
@@ -274,24 +268,22 @@ def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
         near, far = (near - mean) / scale, (far - mean) / scale
         decided = _decide(near, targets[learnt], groups[learnt], far, profiles)
         for point, each in enumerate(decided):
-            chosen[point, checked], margins[point, checked] = each
-    return Validation(classes, truth, fresh.runs, chosen, margins, len(known))
+            chosen[point, checked] = each
+    return Validation(classes, truth, fresh.runs, chosen, len(known))
 
 
 def _decide(
     known: Array, targets: Index, groups: Words, fresh: Array, profiles: Sequence[Profile]
-) -> Iterator[tuple[Index, Array]]:
-    """Train the estimator of each point, and give its choices and margins of test frames."""
-    classes = int(targets.max()) + 1
+) -> Iterator[Index]:
+    """Train the estimator of each point, and give its choices for test frames."""
     if len(known) > LARGEST:
         for profile in profiles:
             svms = SupportVectorMachines.fit(known, targets, groups, profile)
-            found = svms.decision(fresh)
-            margins = class_margins(found, classes=classes, multiclass=profile.multiclass)
-            yield svms.choose(found), margins
+            yield svms.choose(svms.decision(fresh))
         return
     from sklearn import config_context
 
+    classes = int(targets.max()) + 1
     near, far = known @ known.T, fresh @ known.T
     rbf = profiles[0].kernel == "rbf"
     if rbf:  # K(x, y) = exp(-gamma |x - y|^2)
@@ -304,9 +296,7 @@ def _decide(
             # The input checks of scikit-learn would take a sixth of the time here.
             with config_context(assume_finite=True, skip_parameter_validation=True):
                 found = _decisions(train, test, targets, profile)
-            multiclass = profile.multiclass
-            chosen = choose(found, classes=classes, multiclass=multiclass)
-            yield chosen, class_margins(found, classes=classes, multiclass=multiclass)
+            yield choose(found, classes=classes, multiclass=profile.multiclass)
 
 
 def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> Array:
@@ -323,36 +313,3 @@ def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> A
         one = svc(profile, profile.regularization * weight, precomputed=True)
         found.append(one.fit(train, targets == number).decision_function(test))
     return np.stack(found, axis=1)
-
-
-def class_margins(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:
-    """Least decision value in favour of each class, above 0 if it wins all of its pairs."""
-    if multiclass == "one-vs-rest":
-        return decisions
-    pairs = np.full((len(decisions), classes, classes), np.inf)
-    first, second = np.triu_indices(classes, 1)  # the order of the pairs in `svm`
-    pairs[:, first, second], pairs[:, second, first] = decisions, -decisions
-    worst: Array = pairs.min(axis=2)
-    return worst
-
-
-def balanced_log_loss(margins: Array, truth: Index) -> float:
-    """Mean log-loss of the classes, at the slope of the least loss.
-
-    With margins s, p_k = exp(a s_k) / sum_j exp(a s_j) is the probability of class k, and the loss
-    is the mean over classes of the mean over the class's frames of -log p_truth. It is finer than
-    counts of frames. The slope a > 0 has the least loss (Platt's scaling without a bias), so that
-    the loss does not depend on the width of the margins.
-    """
-    from scipy.optimize import minimize_scalar
-
-    counts = np.bincount(truth)
-    weight = 1.0 / (counts[truth] * np.count_nonzero(counts))
-    above = margins - margins[np.arange(len(truth)), truth][:, None]
-
-    def loss(power: float) -> float:
-        return float(weight @ np.logaddexp.reduce(2.0**power * above, axis=1))
-
-    # The loss is convex in a, and has one minimum.
-    best = minimize_scalar(loss, bounds=(-WIDEST, WIDEST), options={"xatol": CLOSE})
-    return min(float(best.fun), loss(-WIDEST), loss(WIDEST))
