@@ -115,14 +115,16 @@ def test_csv_has_the_values_of_parquet(exported):
 
 def test_gaps_are_left_out(tmp_path):
     valid = np.ones(2000, dtype=bool)
-    valid[1500:1510] = False
+    valid[900:1100] = False
     run = plain_run()
     run = replace(run, velocity=run.velocity * valid[:, None], valid=valid)
     export(run, tmp_path / "run.parquet", LIBRARY)
     table = pyarrow.parquet.read_table(tmp_path / "run.parquet")
     np.testing.assert_array_equal(table["time"].to_numpy(), run.time[valid])
     export(run, tmp_path / "run.mcap", LIBRARY)
-    assert len(messages(tmp_path / "run.mcap", "/noise")) == 1990
+    assert len(messages(tmp_path / "run.mcap", "/noise")) == 1800
+    classes = [each["label"] for _, each in messages(tmp_path / "run.mcap", "/class")]
+    assert classes == ["ok", "", "ok", ""]
 
 
 # --- MCAP

@@ -137,6 +137,7 @@ def test_lines_are_short_and_lists_too():
     text = str(measure(many(40, ["ok"] * 47)))
     assert max(map(len, text.splitlines())) <= 120
     assert "and 75 more" in text
+    assert ["have none" in str(measure(many(groups))) for groups in (4, 5)] == [True, False]
 
 
 def sure(name, annotated, labels, confidence, findings, *, cut=None, faults=(), **facts):

@@ -72,6 +72,8 @@ def test_fewer_than_five_groups_have_no_interval():
     assert isnan(share.high)
     rate = rate_of(Resampling.of(["a"]), np.ones(1), np.ones(1))  # counting alone bounds a rate
     assert (rate.low, rate.high) == pytest.approx(garwood(1))
+    low = [rate_of(each_its_own(n), 10.0 * (np.arange(n) < 1), np.ones(n)).low for n in (4, 5)]
+    assert low == pytest.approx([garwood(10)[0] / 4, 0.0])
 
 
 def test_only_runs_in_the_sample_of_a_measure_count():

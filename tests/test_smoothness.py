@@ -209,6 +209,7 @@ def test_the_longest_stretch_between_gaps_is_scored():
     episode = scored(rollout(valid=valid, **signals), "gaps")
     assert episode.duration == pytest.approx(2.6)
     assert episode.remarks == ("The longest stretch without a gap was scored.",)
+    assert scored(run, "whole").remarks == ()
     assert episode.scores["level"] < 0.2  # of the jump from 0 it would be 0.5
 
 
