@@ -95,8 +95,9 @@ CURVES = 8
 """Runs whose level is drawn as a curve, the worst; more lines cannot be told apart."""
 COLUMNS = 1500
 """Columns of the levels; of long runs, the highest level in each is shown."""
-WHOLE, CURVE, TITLES = 832.0, 190.0, 28.0
-"""Height of all parts, of the curves at least, and of a row of tabs, in points, at 1440 x 900."""
+WHOLE, TABLE, CURVE, TITLES = 832.0, 200.0, 190.0, 28.0
+"""Height of all parts, of the table with the verdict at least, of the curves, and of a row of tabs,
+in points, at 1440 x 900."""
 LOWEST, HIGHEST = 20.0, 36.0
 """Height of a run's row; below it, classes and levels lie behind each other in tabs."""
 NAMED = 16.0
@@ -121,24 +122,24 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         told = f"FAIL   {failing} of {len(several.names)} runs" if failing else "PASS   no finding"
         axes.log_verdict(recording, "findings" if failing else "ok", told)
         count = len(several.names)
-        row = (WHOLE - CURVE - 2 * axes.AXIS) / 2 / count
+        room = WHOLE - TABLE - CURVE
+        row = min((room / 2 - axes.AXIS) / count, HIGHEST)
         apart = row >= LOWEST
-        row = min(row, HIGHEST) if apart else (WHOLE - CURVE - TITLES - axes.AXIS) / count
-        tall = row * count + axes.AXIS
+        tall = row * count + axes.AXIS if apart else room - TITLES
         rows = [
             _log_classes(recording, several, Panel("class", tall)),
             _log_levels(recording, several, Panel("levels", tall), (begin, end)),
         ]
         if not apart:
             rows = [(unstable.tabs(*(part for part, _ in rows)), tall + TITLES)]
-        rest = WHOLE - sum(size for _, size in rows)
-        curves = _log_curves(recording, several, Panel("curves", rest))
+        rows.append(_log_curves(recording, several, Panel("curves", CURVE)))
         properties = {"runs": len(several.names), "model": several.sides[0].model}
         title = f"{several.names[0]} and {len(several.names) - 1} more"
         log_report(recording, title, report(several), properties)
-        table = (unstable.text("Runs", "/report", titled=False), WHOLE - axes.VERDICT)
-        left = unstable.above((unstable.drawing("/verdict"), axes.VERDICT), table)
-        whole = unstable.beside((left, 30.0), (unstable.above(*rows, curves), 70.0))
+        rest = WHOLE - axes.VERDICT - sum(size for _, size in rows)
+        verdict = (unstable.drawing("/verdict"), axes.VERDICT)
+        table = (unstable.text("Runs", "/report", titled=False), rest)
+        whole = unstable.above(verdict, table, *rows)
         event = several.longest
         loop = None if event is None else (event.start, event.stop)
         recording.send_blueprint(unstable.blueprint(whole, loop))
