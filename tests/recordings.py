@@ -45,6 +45,42 @@ def entities(path: Path):
     return set(RrdReader(path).store().schema().entity_paths())
 
 
+def layout(path: Path):
+    """What the layout of a recording says: entity, component, and value of each."""
+    reader = RrdReader(path)
+    (blueprint,) = reader.blueprints()
+    for chunk in reader.store(store=blueprint).stream():
+        batch = chunk.to_record_batch()
+        for name in (each for each in batch.schema.names if ":" in each):
+            yield str(chunk.entity_path), name, batch.column(name).to_pylist()[0]
+
+
+def settings(path: Path, prefix: str):
+    """Values of the layout whose component begins so, by what follows."""
+    return {
+        name.removeprefix(prefix): value
+        for _, name, value in layout(path)
+        if name.startswith(prefix)
+    }
+
+
+def properties(path: Path):
+    """What a recording says of its runs."""
+    found = {}
+    for chunk in RrdReader(path).stream():
+        if chunk.entity_path == "/__properties/inspector":
+            batch = chunk.to_record_batch()
+            found |= {name: batch.column(name).to_pylist()[0] for name in batch.schema.names}
+    return found
+
+
+def stretches(path: Path, entity: str):
+    """Starts and stops of what is shaded, in [s]."""
+    time, values = read(path, entity, "Measurements:values")
+    known = np.array([np.isfinite(value).all() for value in values])
+    return time[known].reshape(-1, 2).round(6).tolist()
+
+
 def check_columns(path: Path, columns: dict[str, set[str]]) -> None:
     """Check that entities have the components that their pattern has, and that there is no other.
 

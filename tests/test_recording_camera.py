@@ -7,8 +7,7 @@ import pinocchio
 import pytest
 import rerun as rr
 from chains import BAR
-from recordings import read
-from rerun.chunk import RrdReader
+from recordings import layout, read
 from test_noisemodel_mjcf import ARM, LEGS, written
 
 from inspector.analysis import analyse_file
@@ -44,15 +43,7 @@ def run_of(robot, name, seconds=1.0):
 
 def eye_of(recording):
     """What the blueprint says of the eye, by component."""
-    reader = RrdReader(recording)
-    (blueprint,) = reader.blueprints()
-    found = {}
-    for chunk in reader.store(store=blueprint).stream():
-        batch = chunk.to_record_batch()
-        for name in batch.schema.names:
-            if name.startswith(("EyeControls3D:", "LineGrid3D:", "SpatialInformation:")):
-                found[name.partition(":")[2]] = batch.column(name).to_pylist()[0][0]
-    return found
+    return {name.partition(":")[2]: value[0] for _, name, value in layout(recording) if value}
 
 
 def in_picture(points, eye, target, aspect):

@@ -30,8 +30,6 @@ from inspector.compare.pair import (
     verdict,
     whole,
 )
-from inspector.errors import InspectorError
-from inspector.export.sound import SMALL_RATE, common_gain, sound_of
 from inspector.levels import LINKS, SPECTRUM, link_levels
 from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.axes import Label, Panel, Timed
@@ -39,7 +37,6 @@ from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Drawn, Signal, f
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.findings import classes_of, spoken
-from noisemodel.run import part
 
 SIDE_COLORS = {"before": panels.BEFORE, "after": panels.AFTER}
 SHADES = {
@@ -242,8 +239,6 @@ TITLES = 28.0
 
 ASPECT = 1.35
 """Least width of a robot's view by its height."""
-MAX_VALUES = 8_000_000
-"""Velocities of a run that are mixed into a sound: a second of work."""
 
 
 def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
@@ -259,7 +254,7 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
         axes.log_span(recording, float(time[0]), float(time[-1]))
         trees, robots = _log_robots(recording, pair, Path(folder))
         over_time = [log_changes(recording, pair, found), *log_levels(recording, pair, found)]
-        details = _log_details(recording, pair, trees, loop[0])
+        details = _log_details(recording, pair, trees)
         head = unstable.beside((_log_text(recording, pair, found), 34.0), *robots)
         whole = unstable.above((head, ABOVE), *over_time, (details, DETAILS + TITLES))
         recording.send_blueprint(unstable.blueprint(whole, loop))  # instead of an older layout
@@ -281,15 +276,10 @@ def _log_robots(
     return trees, [*views, (unstable.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 
-def _log_details(
-    recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree], around: float
-) -> Part:
-    """Log what lies behind each other: links, spectra, noise, sounds, signals of joints."""
+def _log_details(recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree]) -> Part:
+    """Log what lies behind each other: links, spectra, noise, signals of joints."""
     parts = [log_links(recording, trees, pair)] if trees else []
     parts += [*log_spectra(recording, pair, _joint(pair)), log_noise(recording, pair)]
-    for name, sound in _sounds(pair, around).items():
-        unstable.log_audio(recording, f"/sound/{name}", sound, float(pair.time[0]))
-        parts.append(unstable.audio(f"Listen {name}", f"/sound/{name}"))
     names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
     limbs = panels.limbs(tuple(names), trees.get("after"))
     parts += log_joints(recording, pair, limbs)
@@ -301,27 +291,6 @@ def _joint(pair: Pair) -> str:
     joint = worst_joint(pair.after)
     name = "" if joint is None else pair.after.run.joint_names[joint]
     return name if name in pair.before.run.joint_names else ""
-
-
-def _sounds(pair: Pair, around: float) -> dict[str, bytes]:
-    """A WAV file of the simplified noise of each run, both at one gain; none if all is silent.
-
-    Of runs that are too long, only a part around a time in [s] is audible.
-    """
-    widest = max(2 * side.run.motion.shape[1] for _, side in pair.sides)
-    count = min(max(2, MAX_VALUES // widest), len(pair.time))
-    middle = int(np.searchsorted(pair.time, around))
-    first = min(max(middle - count // 2, 0), len(pair.time) - count)
-    try:
-        made = {
-            name: sound_of(part(side.run, first, first + count), playing=SMALL_RATE)
-            for name, side in pair.sides
-        }
-    except InspectorError:
-        return {}
-    gain = common_gain(list(made.values()))
-    lead = first / pair.rate
-    return {name: s.file(gain, lead=lead) for name, s in made.items()}
 
 
 def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Part:

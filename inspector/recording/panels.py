@@ -454,7 +454,6 @@ STRIP_WIDTH, STROKES = 7.0, 3
 """Of the lines of a row, in points, and how many there are."""
 ROBOT_SHADES = 16
 """Colours of the robot."""
-POWER_LINES = 8
 POWER_FLOOR_DB = -20.0
 """Sound power below this is drawn at it, in [dB re 1 pW]."""
 KEY = Panel("key", 285.0)
@@ -507,10 +506,6 @@ def log_links(
     """Log the noise of a robot's links: levels of those that vibrate most, power, colours."""
     time, level = levels.link_levels(noise)
     log_power(recording, "/power/total", noise, noise.total, colors.NOISE)
-    shades = colors.of_series(POWER_LINES)
-    for index, shade in zip(noise.loudest[:POWER_LINES], shades, strict=False):
-        path = f"/power/links/{noise.links[index]}"
-        log_power(recording, path, noise, noise.power[:, index], shade)
     for (term, power), shade in zip(noise.terms.items(), colors.of_series(3), strict=False):
         log_power(recording, f"/power/terms/{term}", noise, power, shade)
     scale = levels.LINKS.following(level)

@@ -185,9 +185,6 @@ def _log_strips(
     parts = [part for part, _ in strips]
     if analysis.labels is not None:
         parts.append(unstable.plot("Scores", "/score", axes.ALL, legend=True))
-    if links is not None:
-        title = "Power of links [dB re 1 pW]"
-        parts.append(unstable.plot(title, "/power/links", axes.ALL, legend=True))
     parts += panels.log_joints(recording, run, panels.limbs(run.joint_names, tree))
     lowest = max((size for _, size in strips), default=160.0)
     return unstable.tabs(*parts), lowest + TITLES
