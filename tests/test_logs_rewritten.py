@@ -106,6 +106,7 @@ def date(pattern):
 
 DEGREES = (DEG,) * 4
 IN_DEGREES = ("q#_deg", "dq#_deg_s", "q_d#_deg", "dq_d#_deg_s")
+MILLIRADIANS = ("q# [mrad]", "dq# [mrad/s]", "q_d# [mrad]", "dq_d# [mrad/s]")
 NANOSECONDS = np.round(TIME * 1e9).astype(np.int64)
 WRITINGS = {
     "degrees by name": csv(named(*IN_DEGREES), scale=DEGREES),
@@ -116,9 +117,7 @@ WRITINGS = {
     "speeds alone in deg/s": csv(
         named("q#[rad]", "dq#[deg/s]", "q_d#[rad]", "dq_d#[deg/s]"), scale=(1.0, DEG, 1.0, DEG)
     ),
-    "milliradians": csv(
-        named("q# [mrad]", "dq# [mrad/s]", "q_d# [mrad]", "dq_d# [mrad/s]"), scale=(1e3,) * 4
-    ),
+    "milliradians": csv(named(*MILLIRADIANS), scale=(1e3,) * 4),
     "columns by joint": csv(order=[0, *(3 * s + j for j in (1, 2, 3) for s in range(4))]),
     "desired first, stamps last": csv(order=[*range(7, 13), *range(1, 7), 0]),
     "joints backwards": csv(order=[0, *(s + j for s in (0, 3, 6, 9) for j in (3, 2, 1))]),
@@ -149,7 +148,7 @@ WRITINGS = {
     "npz": npz("time", "q", "dq", "q_d", "dq_d"),
     "npz, in words": npz("t", "positions", "velocities", "desired_positions", "desired_velocities"),
     "parquet": parquet(RUN_NAMES),
-    "parquet, degrees by name": parquet(header(*IN_DEGREES), scale=DEG),
+    "parquet, milliradians by name": parquet(header(*MILLIRADIANS), scale=1e3),
     "parquet, symbols and nanoseconds": parquet(SYMBOLS, NANOSECONDS),
     "parquet, stamps with a type": parquet(
         SYMBOLS, pa.array(EPOCH * 10**9 + NANOSECONDS, pa.timestamp("ns"))
@@ -183,6 +182,6 @@ def test_velocities_are_those_of_positions_alone_if_both_say_the_same(tmp_path):
     both = np.column_stack([TIME, MOTION[:, :3], alone.velocity])
     np.savetxt(paths[1], both, delimiter=",", header=named("q#", "dq#"))
     expected, found = findings(alone), findings(read_log(paths[1]).run)
-    assert [each[0] for each in found] == [each[0] for each in expected]
+    assert [each[0] for each in found] == [each[0] for each in expected] == ["oscillations"]
     for one, other in zip(found, expected, strict=True):
         assert np.allclose(one[1:], other[1:], rtol=0, atol=0.02)

@@ -240,6 +240,12 @@ def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_a_csv(tmp_path):
         taken = "taken: position = qpos[0:2], velocity = qvel[0:2], position_desired = ctrl"
         taken += " (position follows it)"
         assert remarks.count(taken) == 1
+    mapping = ["effort.joint_0=ctrl_0", "effort.joint_1=ctrl_1"]
+    run = read_log(
+        tmp_path / "log.csv", mapping=mapping
+    ).run  # columns that are mapped are no array
+    assert run.velocity_desired is None
+    assert np.array_equal(run.effort, log["ctrl"])
 
 
 def test_a_single_joint_and_velocities_alone_are_read(tmp_path):
