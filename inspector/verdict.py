@@ -365,15 +365,7 @@ class Verdict:
             "status": self.status.value,
             "unknown": self.unknown.value,
             "events": [event.as_dict() for event in self.events],
-            "missing": [
-                {
-                    "label": missing.label,
-                    "start": missing.start and round(missing.start, 6),
-                    "stop": missing.stop and round(missing.stop, 6),
-                    "reason": missing.reason,
-                }
-                for missing in self.missing
-            ],
+            "missing": [asdict(missing) for missing in self.missing],
             "reference": None if self.beside is None else asdict(self.beside),
             "joints": self.joints,
             "counted": not self.ignored,

@@ -107,12 +107,6 @@ def test_a_run_without_a_fitting_model_has_the_status_cannot_tell_and_a_reason()
         assert any(remark.startswith(f"No labels: {reason}") for remark in found.remarks)
 
 
-def test_an_analysis_names_its_model_and_the_hash_of_its_file():
-    found = analyse(moving(), LIBRARY)
-    (path,) = [path for path in model_files() if path.stem == found.model]
-    assert found.model_sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
-
-
 def test_a_finding_starts_at_its_onset_and_ends_when_the_event_does_in_the_lane_too():
     found = analyse(moving(tone=1.0), LIBRARY)
     first, last = found.findings[0].start, max(event.stop for event in found.findings)
@@ -277,29 +271,6 @@ def test_a_desired_velocity_made_of_coarse_positions_is_left_out():
     assert without_placeholder(stepping(1e-4))[1] == ""
 
 
-def test_an_object_that_reads_arrays_on_demand_stands_in_for_a_run(tmp_path):
-    """What a model and the audit need is read, and nothing else."""
-    path = tmp_path / "run.npz"
-    run = moving(
-        tone=1.0, effort=np.ones((5000, 2)), base_pose=np.tile([0, 0, 0, 0, 0, 0, 1.0], (5000, 1))
-    )
-    run.save(path)
-    read = []
-
-    class Lazy:
-        def __getattr__(self, name):
-            value = getattr(Run.load(path), name)
-            read.append(name)
-            object.__setattr__(self, name, value)
-            return value
-
-    found, whole = analyse(Lazy(), LIBRARY), analyse(run, LIBRARY)
-    assert found.findings == whole.findings
-    assert found.status is whole.status
-    assert {"velocity", "effort"} < set(read)
-    assert not {"base_pose", "blocks"} & set(read)
-
-
 def test_a_run_is_labelled_and_audited_once(tmp_path, monkeypatch):
     import inspector.analysis as module
 
@@ -340,7 +311,9 @@ def test_a_run_file_is_analysed_by_its_path_and_a_shipped_model_by_its_name(tmp_
     run.save(tmp_path / "shaken.npz")
     library = load_library(["general"])
     found = analyse(tmp_path / "shaken.npz", library)
-    assert (found.name, found.model) == ("shaken", "general")
+    (path,) = model_files(["general"])
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    assert (found.name, found.model, found.model_sha256) == ("shaken", "general", sha256)
     assert found.findings == analyse(run, library).findings
 
 

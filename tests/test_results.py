@@ -66,7 +66,6 @@ def test_settings_hold_for_commands_and_the_command_line_wins(project):
             "[audit] no setting 'frmat' (did you mean 'format'?)",
         ),
         ("inspector.toml", "[audits]\nformat = 1", "no command 'audits'"),
-        ("inspector.toml", "[classify]\noverwrite = true", "[classify] no setting 'overwrite'"),
         ("inspector.toml", '[view]\noutput = "~/.bashrc"', "[view] no setting 'output'"),
         ("inspector.toml", "robot =", "cannot be read (Invalid value"),
         ("pyproject.toml", "[tool.noise-inspector]\n'", "cannot be read (Expected "),
