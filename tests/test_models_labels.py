@@ -123,13 +123,6 @@ def test_a_frame_without_neighbours_counts_for_two_and_one_with_them_for_one():
         assert not confirmed(suspect, suspect, apart, least=most + 1).any()
 
 
-def test_the_score_of_a_frame_is_that_of_its_label_and_none_of_unknown_ones():
-    found = labels(".iu")
-    found.scores[:] = np.arange(found.scores.size).reshape(found.scores.shape)
-    place = found.classes.index("impact")
-    assert [found.score(frame) for frame in range(3)] == [0.0, len(CLASSES) + place, 0.0]
-
-
 def test_no_frames_are_confirmed_of_none():
     none = np.zeros(0, dtype=bool)
     assert confirmed(none, none, none).shape == (0,)
@@ -213,10 +206,3 @@ def test_the_step_of_labels_does_not_depend_on_where_the_last_frame_lies(last):
     assert Labels(start, start + LENGTH, names, np.zeros((6, 3)), CLASSES).step == pytest.approx(
         HOP
     )
-
-
-def test_labels_are_a_table_of_frames():
-    table = labels(".IIu").to_arrow()
-    assert table.column("debounced").to_pylist() == ["ok", "impact", "impact", "impact"]
-    assert table.column("novel").null_count == 4
-    assert table.column("score.impact").to_pylist() == [0.0] * 4

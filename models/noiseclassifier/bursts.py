@@ -51,31 +51,20 @@ ABOVE = 20.0
 
 @dataclass
 class Line:
-    """A line that is prominent in a window.
+    """A line that is prominent in a window."""
 
-    Attributes:
-        row: The joint.
-        places: Its frequencies.
-        power: Its mean square.
-        near: Sum of these over the windows nearby, and its own.
-        windows: How many these are.
-        first: Number of its first sample.
-    """
-
-    row: int
-    places: slice
-    power: float
-    near: float
-    windows: int
-    first: int
+    row: int  # the joint
+    places: slice  # its frequencies
+    power: float  # its mean square
+    near: float  # sum of these over the windows nearby, and its own
+    windows: int  # how many these are
+    first: int  # number of its first sample
 
 
 class Bursts(Windows):
     """Finds bursts in signals that come in chunks of any size.
 
     Args:
-        rate: Sample rate, in [Hz].
-        start: Time of the first sample, in [s].
         whole: Whether the signal is known to its end before `events` are asked for: a file, and no
             stream.
     """
@@ -133,12 +122,9 @@ class Bursts(Windows):
 
 
 def prominent(power: Array, frequency: Array, rate: float) -> list[tuple[int, slice]]:
-    """Prominent lines of a window: the joint, and its frequencies.
+    """Joint and frequencies of each prominent line of a window.
 
-    Args:
-        power: Mean square of each line, shape (joints, frequencies).
-        frequency: In [Hz].
-        rate: Sample rate, in [Hz].
+    The power is the mean square at each frequency, shape (joints, frequencies).
     """
     loud = power >= 10.0 ** (LEVEL / 10.0)
     loud &= (frequency >= LOWEST) & (frequency <= HIGHEST * rate)

@@ -62,28 +62,17 @@ UNBOUNDED = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Classifier:
-    """A trained model: predicts the class of frames of noise.
-
-    Attributes:
-        profile: How a signal becomes features.
-        classes: Names of the classes that it was trained with, in the profile's order.
-        estimator: Decides on standardised features.
-        mean, scale: Of each feature, to be subtracted and divided by, shape (features,).
-        runs: SHA-256 of each training recording, by name.
-        metrics: Measures of the training set, and of a validation set if one was given.
-        versions: Of the software that trained it.
-        sha256: SHA-256 of the file that it was loaded from; empty if it was not.
-    """
+    """A trained model: predicts the class of frames of noise."""
 
     profile: Profile
-    classes: tuple[str, ...]
-    estimator: Estimator
-    mean: Array
-    scale: Array
-    runs: Mapping[str, str] = field(default_factory=dict)
-    metrics: Mapping[str, Any] = field(default_factory=dict)
-    versions: Mapping[str, str] = field(default_factory=dict)
-    sha256: str = ""
+    classes: tuple[str, ...]  # that it was trained with, in the profile's order
+    estimator: Estimator  # decides on standardised features
+    mean: Array  # of each feature, to be subtracted, shape (features,)
+    scale: Array  # of each feature, to be divided by, shape (features,)
+    runs: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of training recordings, by name
+    metrics: Mapping[str, Any] = field(default_factory=dict)  # of training and validation set
+    versions: Mapping[str, str] = field(default_factory=dict)  # of the software that trained it
+    sha256: str = ""  # of the file that it was loaded from
 
     @classmethod
     def train(
@@ -177,15 +166,13 @@ class Classifier:
     ) -> Labels:
         """Label all frames of a signal that comes in pieces, as of the whole one.
 
-        Memory does not grow with the signal, but for the labels.
-
-        Features are relative to the past of the signal, which is silent before a robot's first
-        step. Where the signal is whole, what is found has to stand out from the rest of it, too:
-        relative to the past and to the rest, the decision with the lower failure score counts.
+        Memory does not grow with the signal, but for the labels. Features are relative to the past
+        of the signal, which is silent before a robot's first step.
 
         Args:
             pieces: Signals and their validity, one piece or more; all else as `classify` has it.
-            whole: Whether what is found is compared with the rest of the signal.
+            whole: Whether what is found has to stand out from the rest of the signal, too: of both
+                decisions, the one with the lower failure score counts then.
         """
         self.check_rate(rate, "lower the signal's rate, or take another model")
         starts: list[Index] = []
@@ -246,14 +233,11 @@ class Stream:
     """A classifier of samples one by one, or in chunks of any size.
 
     `Classifier.classify` gives the same labels for the whole signal: both have the same features
-    and decision values of each frame, bit for bit (of support vector machines, decision values up
-    to rounding: one product of matrices is faster for many frames, but its rounding depends on how
-    many they are). The label of a frame comes with its last sample.
+    and decision values of each frame, bit for bit (of support vector machines, up to rounding). The
+    label of a frame comes with its last sample.
 
     Args:
-        classifier: The model.
-        rate: Sample rate of the signal, in [Hz], which must be the model's; the model's unless
-            given.
+        rate: Sample rate of the signal, in [Hz]; the model's unless given.
         start: Time of the first sample, in [s].
         joints: Number of joints, if the model takes signals joint by joint.
 
@@ -333,13 +317,7 @@ def targets_of(labels: Words, known: Sequence[str]) -> tuple[tuple[str, ...], In
 
 @dataclass(frozen=True, eq=False)
 class General:
-    """A model for any rate, and for whatever signals there are.
-
-    Attributes:
-        recipe: Bands, frames and settings of the estimator, for any rate.
-        estimator: Trees on all features.
-        mean, scale, classes, runs, metrics, versions, sha256: As of a `Classifier`.
-    """
+    """A model for any rate, and for whatever signals there are; fields as of a `Classifier`."""
 
     recipe: LogBands
     classes: tuple[str, ...]
@@ -410,11 +388,7 @@ class General:
         return Classifier(profile, self.classes, estimator, mean, scale, *known)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write a model file, whole or not at all; the same model gives the same bytes.
-
-        Raises:
-            OutputError: If the file exists or cannot be written.
-        """
+        """Write a model file, as `Classifier.save` does."""
         profile = self.recipe.bound(HIGHEST).as_dict()
         settings = {"recipe": asdict(self.recipe), "profile": profile, "rate": HIGHEST}
         modelfile.write(path, self, settings, overwrite=overwrite)

@@ -21,20 +21,12 @@ OPEN_END = 1000
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """Labelled frames by their features; recordings and their blocks keep their order.
+    """Labelled frames by their features; recordings and their blocks keep their order."""
 
-    Attributes:
-        features: Not yet standardised; of logs of any rates, NaN where one is missing, shape
-            (frames, features).
-        labels: Class of each frame, shape (frames,).
-        runs: Name of the recording that each frame is from, shape (frames,).
-        hashes: SHA-256 of each recording, by name.
-    """
-
-    features: Real
-    labels: Words
-    runs: Words
-    hashes: Mapping[str, str]
+    features: Real  # not yet standardised, shape (frames, features); NaN where one is missing
+    labels: Words  # class of each frame
+    runs: Words  # name of the recording that each frame is from
+    hashes: Mapping[str, str]  # SHA-256 of each recording, by name
 
     @classmethod
     def of(

@@ -17,14 +17,11 @@ From frames to findings, the same for every estimator that gives probabilities:
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from noiseclassifier.signals import Array, Index, Mask, Words
-
-if TYPE_CHECKING:
-    import pyarrow
 
 UNKNOWN = "unknown"
 """Label of a frame that is out of distribution and below the alarm threshold."""
@@ -61,32 +58,17 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Predictions for each frame of a signal, in order of time.
+    """Predictions for each frame of a signal, in order of time."""
 
-    Attributes:
-        start: When each frame starts, shape (frames,), in [s].
-        stop: When it stops, shape (frames,), in [s].
-        label: Its class, or `unknown`, by the frame alone, shape (frames,).
-        scores: How certain each class is, shape (frames, classes); comparable within one model.
-        classes: Names of the classes, `ok` first.
-        above_threshold: Whether a frame is above the alarm threshold, shape (frames,); None if
-            each frame that is not `ok` is.
-        novel: Whether a frame is out of distribution, shape (frames,); None if the estimator has
-            no measure of that.
-        unknown_is_finding: Whether `unknown` frames are evidence; if not, they raise nothing.
-        hop: Time from one frame to the next, in [s]; None takes the smallest distance of frames
-            but the last, which may be flush with the end of the signal.
-    """
-
-    start: Array
-    stop: Array
-    label: Words
-    scores: Array
-    classes: tuple[str, ...]
-    above_threshold: Mask | None = None
-    novel: Mask | None = None
-    unknown_is_finding: bool = True
-    hop: float | None = None
+    start: Array  # when each frame starts, shape (frames,), in [s]
+    stop: Array  # when it stops
+    label: Words  # its class, or `unknown`, by the frame alone
+    scores: Array  # how certain each class is, shape (frames, classes); comparable in one model
+    classes: tuple[str, ...]  # their names, `ok` first
+    above_threshold: Mask | None = None  # the alarm threshold; None: each frame that is not `ok`
+    novel: Mask | None = None  # out of distribution; None: the estimator has no measure of that
+    unknown_is_finding: bool = True  # whether `unknown` frames are evidence, or raise nothing
+    hop: float | None = None  # from one frame to the next, in [s]; None: the smallest distance
 
     @property
     def step(self) -> float:
@@ -147,12 +129,6 @@ class Labels:
         keep = self.above_threshold | np.isin(self.label, ("ok", UNKNOWN))
         return np.where(keep, self.label, "ok")
 
-    def score(self, frame: int) -> float:
-        """Give the score of a frame's label; 0 if it is unknown."""
-        label = str(self.label[frame])
-        known = label in self.classes
-        return float(self.scores[frame, self.classes.index(label)]) if known else 0.0
-
     def events(self) -> tuple[Event, ...]:
         """Findings in order of time, none overlaps another: one for each stretch of flagged frames.
 
@@ -194,27 +170,6 @@ class Labels:
         """Fields with an entry for each frame."""
         names = ("start", "stop", "label", "scores", "above_threshold", "novel")
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-
-    def to_arrow(self) -> "pyarrow.Table":
-        """Give a table with a row for each frame.
-
-        Returns:
-            Columns ``start`` and ``stop`` in [s], ``label``, ``debounced``, ``flagged``, ``novel``
-            (null if the estimator has no measure of it) and ``score.<class>`` for each class.
-        """
-        import pyarrow
-
-        novel = [None] * len(self) if self.novel is None else self.novel.tolist()
-        columns = {
-            "start": self.start,
-            "stop": self.stop,
-            "label": self.label.tolist(),
-            "debounced": self.debounced.tolist(),
-            "flagged": self.flagged,
-            "novel": pyarrow.array(novel, pyarrow.bool_()),
-        }
-        scores = {f"score.{name}": self.scores[:, i] for i, name in enumerate(self.classes)}
-        return pyarrow.table({**columns, **scores})
 
     def __len__(self) -> int:
         return len(self.label)

@@ -78,11 +78,7 @@ class Line:
 class Windows(ABC):
     """Cuts signals that come in chunks of any size into windows, none of which touches a gap.
 
-    Args:
-        rate: Sample rate, in [Hz].
-        window: Duration of a window, in [s].
-        hop: Time from one to the next, in [s].
-        start: Time of the first sample, in [s].
+    Rate in [Hz]; window, hop and start in [s].
     """
 
     def __init__(self, rate: float, window: float, hop: float, start: float) -> None:
@@ -139,21 +135,13 @@ class Windows(ABC):
 
 
 class Lasting(Windows):
-    """Finds lines that last in signals that come in chunks of any size.
-
-    Args:
-        rate: Sample rate, in [Hz].
-        start: Time of the first sample, in [s].
-
-    Attributes:
-        examined: Windows that were examined; 0 where each stretch is shorter than ``SHORTEST``.
-    """
+    """Finds lines that last in signals that come in chunks of any size."""
 
     def __init__(self, rate: float, *, start: float = 0.0) -> None:
         super().__init__(rate, WINDOW, HOP, start)
         self._margin = round(MARGIN * rate)
         self._windows = 0  # of the stretch
-        self.examined = 0
+        self.examined = 0  # windows; none where each stretch is shorter than ``SHORTEST``
         self._lines: list[Line] = []  # of the latest window
         self._events: list[Event] = []
 

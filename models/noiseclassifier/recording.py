@@ -24,42 +24,23 @@ from noiseclassifier.signals import NOISE, Array, Index, Mask, Signals, by_joint
 class Block(NamedTuple):
     """An annotated stretch of a recording."""
 
-    start: float
-    """When it starts, in [s]."""
-    stop: float
-    """When it stops, in [s]; infinity if it lasts to the end."""
+    start: float  # in [s]
+    stop: float  # in [s]; infinity if it lasts to the end
     label: str
-    """Its class."""
 
 
 class Fault(NamedTuple):
     """A fault that was injected into a recording, whether it is detectable or not."""
 
-    start: float
-    """When its cause begins, in [s]."""
+    start: float  # of its cause, in [s]
     stop: float
-    """When its cause ends, in [s]."""
-    label: str
-    """The class of the failure that it leads to."""
-    felt: bool = True
-    """Whether it has an annotated block."""
+    label: str  # class of the failure that it leads to
+    felt: bool = True  # whether it has an annotated block
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Annotated noise, checked when it is made.
-
-    Attributes:
-        name: Name of the recording in messages and models.
-        signal: The noise estimate, shape (samples,), or signals by name, each of that shape, or
-            joint by joint of shape (joints, samples).
-        rate: Sample rate, in [Hz].
-        blocks: Annotations; what overlaps must agree.
-        start: Time of the first sample, in [s].
-        valid: False in gaps, shape (samples,); None if there are none.
-        sha256: Hash of where the recording comes from; by default, of its samples.
-        events: All injected faults, detectable or not; empty if none was, or that is not known.
-        facts: What else is known, by ``robot``, ``scenario`` and ``domain``.
 
     Raises:
         RecordingError: If shapes do not fit, a value is not finite, or a block is reversed, lies
@@ -67,14 +48,14 @@ class Recording:
     """
 
     name: str
-    signal: Signals
-    rate: float
-    blocks: tuple[Block, ...] = ()
-    start: float = 0.0
-    valid: Mask | None = None
-    sha256: str = ""
-    events: tuple[Fault, ...] = ()
-    facts: Mapping[str, str] = field(default_factory=dict)
+    signal: Signals  # the noise estimate, shape (samples,), or signals by name
+    rate: float  # in [Hz]
+    blocks: tuple[Block, ...] = ()  # annotations; what overlaps must agree
+    start: float = 0.0  # time of the first sample, in [s]
+    valid: Mask | None = None  # False in gaps, shape (samples,); None if there are none
+    sha256: str = ""  # of where the recording comes from; by default, of its samples
+    events: tuple[Fault, ...] = ()  # all injected faults; empty if none was, or that is not known
+    facts: Mapping[str, str] = field(default_factory=dict)  # robot, scenario and domain, if known
 
     def __post_init__(self) -> None:
         """Check everything once, and hash what came without a hash."""
@@ -170,11 +151,10 @@ def folds(groups: Sequence[str], count: int) -> list[tuple[Index, Index]]:
     to the one that has least of all.
 
     Args:
-        groups: Group of each recording or frame, shape (items,).
+        groups: Group of each recording or frame.
 
     Returns:
-        For each fold, indices of the training items, and of the test items; each item is
-        measured once.
+        For each fold, indices of the training items, and of the test items.
 
     Raises:
         DatasetError: If there are fewer groups than folds, or fewer than two folds.
