@@ -18,6 +18,7 @@ import noisemodel as nm
 from inspector.analysis import analyse
 from inspector.library import Library, load_library
 from noiseclassifier import Event
+from noiseclassifier.scenarios.faults import octave
 from noisemodel.types import Array
 
 TONES = (0.3, 1.0, 3.0)
@@ -59,10 +60,7 @@ def toned(
 
 def octave_level(signal: Array, rate: float, frequency: float) -> float:
     """Root mean square of a signal in the octave around a frequency."""
-    waves = np.fft.rfft(signal)
-    own = np.fft.rfftfreq(len(signal), 1.0 / rate)
-    waves[(own < frequency / np.sqrt(2.0)) | (own > frequency * np.sqrt(2.0))] = 0.0
-    return float(np.sqrt(np.mean(np.fft.irfft(waves, len(signal)) ** 2)))
+    return float(np.sqrt(np.mean(octave(signal, frequency, 1.0 / rate) ** 2)))
 
 
 def standing_out(run: nm.Run, start: float, stop: float) -> float:

@@ -1,6 +1,8 @@
 """Efforts of wide domains: drives show the torques that physics asks for, and pushes of hands."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +39,17 @@ def twin():
 @pytest.fixture(scope="module")
 def pushed():
     return simulated("panda", "push", STANDS, duration=SECONDS, wide=True)
+
+
+def test_the_same_seed_gives_the_same_file_in_another_process(twin, tmp_path):
+    here, there = tmp_path / "here.npz", tmp_path / "there.npz"
+    twin.save(here)
+    code = (
+        "import sys; from noiseclassifier.scenarios import simulate;"
+        f"simulate('panda', 'good', {STANDS}, duration={SECONDS}, wide=True).save(sys.argv[1])"
+    )
+    subprocess.run([sys.executable, "-c", code, str(there)], check=True)
+    assert here.read_bytes() == there.read_bytes()
 
 
 def real_panda():

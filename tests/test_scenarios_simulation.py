@@ -147,17 +147,6 @@ def test_an_unplanned_contact_is_recorded_with_its_impulse(runs):
     assert not any(event["label"] == "impact" for event in runs["force-jump", 5].meta["events"])
 
 
-def test_the_same_seed_gives_the_same_file_in_another_process(runs, tmp_path):
-    here, there = tmp_path / "here.npz", tmp_path / "there.npz"
-    runs["straight", 5].save(here)
-    code = (
-        "import sys; from noiseclassifier import scenarios;"
-        "scenarios.simulate('panda', 'straight', 5, duration=float(sys.argv[1])).save(sys.argv[2])"
-    )
-    subprocess.run([sys.executable, "-c", code, str(SHORT), str(there)], check=True)
-    assert here.read_bytes() == there.read_bytes()
-
-
 def with_defect(monkeypatch, defect):
     line = replace(
         scenarios.SCENARIOS["obstacle-full"], name="special", cases={"arm": Case(Picks(), defect)}

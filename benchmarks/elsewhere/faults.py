@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
@@ -204,15 +203,8 @@ def _decalibration(control: Control, at: _Place) -> Control:
     return replace(control, offset=offset, events=(*control.events, event))
 
 
-ADD: Mapping[str, Callable[[Control, _Place], Control]] = MappingProxyType(
-    dict(
-        zip(
-            KINDS,
-            (_push, _throw, _latency, _chatter, _jump, _hold, _decalibration),
-            strict=True,
-        )
-    )
-)
+_ADDING = (_push, _throw, _latency, _chatter, _jump, _hold, _decalibration)
+ADD: Mapping[str, Callable[[Control, _Place], Control]] = dict(zip(KINDS, _ADDING, strict=True))
 """Function that adds a fault to a control, by kind."""
 
 

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
 from noiseclassifier.scenarios.faults import Faults, Imperfections
-from noiseclassifier.scenarios.loop import Control, Reference, Scene, force
+from noiseclassifier.scenarios.loop import Reference, Scene, force
 from noiseclassifier.scenarios.motions import (
     TICK,
     Box,
@@ -23,7 +23,6 @@ from noiseclassifier.scenarios.motions import (
     ScenarioError,
     Tip,
     Units,
-    bump,
     minimum_jerk,
     times,
 )
@@ -470,7 +469,8 @@ def _sample(segments: list[Segment]) -> tuple[list[Array], list[Array], list[Arr
         there = np.array(segment.position)
         path = here + np.outer(share, there - here)
         if any(segment.bend):
-            path += np.outer(bump(np.arange(ticks) / ticks), segment.bend)
+            along = np.arange(ticks) / ticks  # away and back, at rest at both ends
+            path += np.outer(16 * along**2 * (1 - along) ** 2, segment.bend)
         positions.append(path)
         yaws.append(turned + share * (segment.yaw - turned))
         onset = minimum_jerk(np.clip(np.arange(ticks) * TICK / 0.15, 0, 1))
@@ -574,7 +574,7 @@ def scene(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) ->
     return Scene(
         model=world,
         start=rest - faults.offsets(len(rest)),  # the encoders read the rest position
-        control=_control(arm, plan, faults, imperfections),
+        tick=_control(arm, plan, faults, imperfections).tick,
         effectors=1,
         settling=SETTLING,
         noise=np.array([imperfections.force_noise]),
@@ -583,7 +583,9 @@ def scene(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) ->
     )
 
 
-def _control(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) -> Control:
+def _control(
+    arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections
+) -> JointControl | ToolControl:
     """Controller of the tool, or of the joints, that rests at first."""
     tool = Tool(arm)
     if isinstance(plan, ReachPlan):

@@ -585,7 +585,7 @@ def scene(robot: Humanoid, plan: WalkPlan, faults: Faults, imperfections: Imperf
     return Scene(
         model=world,
         start=start,
-        control=control,
+        tick=control.tick,
         fallen=control.fallen,
         effectors=len(robot.effectors),
         settling=SETTLING,

@@ -5,7 +5,7 @@ Forces from outside are weights, obstacles in the air, end stops and hands.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import mujoco
 import numpy as np
@@ -226,21 +226,13 @@ class Reference:
     lift: Array  # of the joints per height of each effector, shape (effectors, joints), in [rad/m]
 
 
-class Control(Protocol):
-    """A controller: from a plan and the sensors to references."""
-
-    def tick(self, number: int, sensors: Array) -> Reference:
-        """Advance by one tick, with the mean of each sensor over the tick before."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A robot in its environment, ready to be simulated."""
 
     model: Any
     start: Array
-    control: Control
+    tick: Callable[[int, Array], Reference]  # by number and sensors' means over the tick before
     effectors: int
     settling: int
     noise: Array  # standard deviation of each sensor's noise per tick, shape (sensors,)
@@ -300,7 +292,7 @@ def record(
     The overlay is added to the reference of the drives: heights of the effectors and their rates,
     shape (samples, effectors, 2), in [m] and [m/s].
     """
-    model, control = scene.model, scene.control
+    model = scene.model
     data = mujoco.MjData(model)
     data.qpos[:] = scene.start
     samples, joints = encoder_error.shape
@@ -315,7 +307,7 @@ def record(
         now = slice(tick * STEPS, (tick + 1) * STEPS)
         for geom, present in scene.changes.get(tick - scene.settling, ()):
             set_collision(model, geom, present=present)
-        reference = control.tick(tick, sensors + error)
+        reference = scene.tick(tick, sensors + error)
         before = before or replace(reference, velocity=still, planned=still)  # robots start at rest
         targets, rates, motion.planned[now] = _between(before, reference)
         motion.commanded[now], before = rates, reference

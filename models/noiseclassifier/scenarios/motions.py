@@ -57,11 +57,6 @@ def minimum_jerk(share: Array) -> Array:
     return share**3 * (10 - 15 * share + 6 * share**2)
 
 
-def bump(share: Array) -> Array:
-    """Path away and back over time from 0 to 1, 1 in the middle, at rest at both ends."""
-    return np.asarray(16 * share**2 * (1 - share) ** 2)
-
-
 def multiplied(value: Any, factor: float) -> Any:
     """A value, or nested tuples of values, times a factor; None stays."""
     if isinstance(value, tuple):

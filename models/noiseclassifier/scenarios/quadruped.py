@@ -652,7 +652,7 @@ def scene(robot: Quadruped, plan: GaitPlan, faults: Faults, imperfections: Imper
     return Scene(
         model=world,
         start=start,
-        control=control,
+        tick=control.tick,
         fallen=control.fallen,
         effectors=len(robot.effectors),
         settling=SETTLING,
