@@ -115,9 +115,9 @@ def places() -> list[list[Mutant]]:
 
 def modules(place: Path) -> list[Path]:
     """A module, or those of a folder, without scenarios, whose tests are left out."""
-    return (
-        [place] if place.suffix else [p for p in place.rglob("*.py") if "scenarios" not in p.parts]
-    )
+    if place.suffix:
+        return [place]
+    return [p for p in place.rglob("*.py") if "scenarios" not in p.relative_to(place).parts]
 
 
 def wanted(operator: str) -> bool:

@@ -70,7 +70,9 @@ def test_our_twists_are_those_of_the_loop_that_they_are_timed_with(bench):
 def test_mutants_are_of_what_fast_tests_measure(bench):
     mutation = bench("mutation")
     files = {
-        path.as_posix() for place in mutation.MEASURED for path in mutation.modules(ROOT / place)
+        path.relative_to(ROOT).as_posix()
+        for place in mutation.MEASURED
+        for path in mutation.modules(ROOT / place)
     }
     assert all(any(place in file for file in files) for place in mutation.MEASURED)
     assert not any("scenarios" in file for file in files)
