@@ -238,10 +238,10 @@ class Noise:
             left["picture"].write_bytes(drawn)
         number = len(events) + len(verdict.missing)
         by = f", {verdict.beside.words}" if verdict.beside else f", by model {analysis.model}"
-        first = told(verdict, events[0], short=True) if events else str(verdict.missing[0])
+        first = told(events[0], verdict.beside, short=True) if events else str(verdict.missing[0])
         lines = [f"noise: {first} ({verdict.path})"]
         lines += [f"{number} finding{'s' * (number != 1)} in {shown}{by}"]
-        lines += [f"  {told(verdict, event)}" for event in events]
+        lines += [f"  {told(event, verdict.beside)}" for event in events]
         lines += [f"  {each}" for each in verdict.missing]
         for what, path in left.items():
             self._node.user_properties.append((f"noise_{what}", str(path)))

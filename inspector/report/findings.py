@@ -7,6 +7,7 @@ of which some may not count. Both are localised by the same words.
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TypeVar
 
 from inspector.analysis import Analysis
@@ -15,14 +16,13 @@ from inspector.localisation.localise import fault_links, has_stages
 from inspector.localisation.stage import Localisation
 from inspector.reference.store import REPETITION
 from inspector.text import counted
-from inspector.verdict import UNREAD, Finding, Verdict
+from inspector.verdict import UNREAD, Beside, Finding, Verdict
 from noiseclassifier import UNKNOWN, Event
 from noiseclassifier.labels import interval
 from noisemodel import Block
 
 TOGETHER = 0.25
-"""Onsets this close, of one class or joint in repetitions, are one row, in [s]: the hop of frames
-is 0.1 s or 0.2 s."""
+"""Onsets this close in repetitions are one row, in [s]: the hop of frames is 0.1 s or 0.2 s."""
 WORDS = {
     Status.INTERNAL_ERROR: "internal error",
     Status.BAD_INPUT: "bad input",
@@ -31,12 +31,8 @@ WORDS = {
     Status.OK: "ok",
 }
 """How people read a status."""
-COUNTED = WORDS | {Status.FINDINGS: "with findings"}
-"""How people count them."""
-LEAST = 0.05
-"""Joints with a smaller share are left out."""
-PRECISE = 10.0
-"""A lag is given to a tenth of a millisecond up to this, in [ms]."""
+COUNTED = WORDS | {Status.FINDINGS: "with findings"}  # how people count them
+LEAST = 0.05  # joints with a smaller share are left out
 LOCALISATION = ("shows first in", "by joints", "band", "links, shares of the excess")
 """Names of the columns of a localisation."""
 SPOKEN = {"highaccelerations": "high accelerations"}
@@ -52,16 +48,10 @@ def spoken(text: str) -> str:
 
 
 def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
-    """Stage with its lead over the next, joints with their shares, and band; empty if not known.
-
-    Args:
-        quote: Mark around the names of stages, say a backtick in Markdown.
-    """
+    """Stage with its lead over the next, joints with their shares, and band; empty if not known."""
     stage = f"{quote}{found.stage}{quote}" if found.stage else ""
     if found.lag > 0.0:
-        lag_ms = 1e3 * found.lag
-        lead = f"{lag_ms:.1f} ms" if lag_ms < PRECISE else f"{lag_ms:.0f} ms"
-        stage = f"{stage}, {lead} before {quote}{found.following}{quote}"
+        stage = f"{stage}, {1e3 * found.lag:.1f} ms before {quote}{found.following}{quote}"
     joints = ", ".join(f"{joint} {share:.0%}" for joint, share in found.joints if share >= LEAST)
     low, high = (f"{frequency:.0f}" for frequency in found.band or (0.0, 0.0))
     band = f"{low} Hz" if low == high else f"{low}-{high} Hz"
@@ -179,43 +169,35 @@ def localised(
 
 def note(analysis: Analysis) -> str:
     """Why no failure has a stage; empty if the run has stages."""
-    if not analysis.localisations or has_stages(analysis.run):
-        return ""
-    return "No stages: the run has neither desired velocities nor named stages of the control flow."
+    without = analysis.localisations and not has_stages(analysis.run)
+    return "No stages: the run has no desired velocities and no named stages." if without else ""
 
 
 # --- of verdicts
 
 
-def row(verdict: Verdict, event: Finding, runs: str = "") -> tuple[str, str, str, str, str]:
-    """A finding as cells: time, class, joints, band, and the rest.
-
-    Args:
-        runs: In how many repetitions it is.
-    """
-    known, by = event.localisation, event.evidence
-    _, joints, band = words(known) if known else ("", "", "")
-    over = ""
-    if verdict.beside is not None and not by.excused:
-        over = "by the general model"
+def row(event: Finding, beside: Beside | None, runs: str = "") -> tuple[str, ...]:
+    """A finding as cells: time, class, joints, band, and the rest, with its number of runs."""
+    by = event.evidence
+    _, joints, band = words(event.localisation) if event.localisation else ("", "", "")
+    over = "by the general model" if beside is not None and not by.excused else ""
     if by.db is not None and not by.excused:
-        number = verdict.beside.repetitions if verdict.beside else 0
-        several = number and by.kind == "repetitions"
-        over = f"{by.db:+.0f} dB over {counted(number, 'repetition') if several else by.kind}"
+        several = beside is not None and beside.repetitions and by.kind == "repetitions"
+        of = counted(beside.repetitions, "repetition") if beside and several else by.kind
+        over = f"{by.db:+.0f} dB over {of}"
         joints = joints or by.joint
-        if by.octave and not band:
-            band = f"{by.octave[0]:.0f}-{by.octave[1]:.0f} Hz"
-    ruled, order = event.became, "" if event.order is None else str(event.order)
-    rest = (event.novelty.removeprefix(", "), order, over, runs, ruled and f"({ruled})")
-    when = f"{event.start:6.2f} - {event.stop:6.2f} s"
-    return when, event.label, joints, band, _listed(*rest)
+        band = band or (f"{by.octave[0]:.0f}-{by.octave[1]:.0f} Hz" if by.octave else "")
+    order, ruled = str(event.order or ""), event.became and f"({event.became})"
+    rest = _listed(event.novelty.removeprefix(", "), order, over, runs, ruled)
+    return f"{event.start:6.2f} - {event.stop:6.2f} s", event.label, joints, band, rest
 
 
-def told(verdict: Verdict, event: Finding, runs: str = "", *, short: bool = False) -> str:
+def told(event: Finding, beside: Beside | None, runs: str = "", *, short: bool = False) -> str:
     """The same as a sentence, or short, for lines that are cut."""
-    _, label, *rest = row(verdict, event, runs)
+    _, label, *rest = row(event, beside, runs)
     when = f"from {interval(event.start, event.stop)}"
-    return _listed(f"{label} {f'{event.start:.2f}-{event.stop:.2f} s' if short else when}", *rest)
+    when = f"{event.start:.2f}-{event.stop:.2f} s" if short else when
+    return _listed(f"{label} {when}", *rest)
 
 
 def _listed(*parts: str) -> str:
@@ -225,12 +207,13 @@ def _listed(*parts: str) -> str:
 
 def failing(verdict: Verdict) -> list[str]:
     """Sentences on what fails a run."""
-    return [*(told(verdict, event) for event in verdict.failing), *map(str, verdict.missing)]
+    findings = [told(event, verdict.beside) for event in verdict.failing]
+    return [*findings, *map(str, verdict.missing)]
 
 
 def excused(verdict: Verdict) -> list[str]:
     """Sentences on findings that do not."""
-    return [told(verdict, event) for event in verdict.excused]
+    return [told(event, verdict.beside) for event in verdict.excused]
 
 
 def timeline(verdict: Verdict, width: int = 60) -> str:
@@ -264,22 +247,15 @@ class Group:
         """The verdict that stands for all."""
         return self.verdicts[0]
 
-    def found(self, *, fails: bool) -> list[tuple[Verdict, Finding, str]]:
+    def found(self, *, fails: bool) -> list[tuple[Finding, Beside | None, str]]:
         """Findings that fail their runs, or that do not; repetitions of one finding count once."""
         every = [
             (verdict, event)
             for verdict in self.verdicts
             for event in (verdict.failing if fails else verdict.excused)
         ]
-        several = len(self.verdicts)
-        result = []
-        for each in folded(every, _alike):
-            number = len({id(verdict) for verdict, _ in each})
-            runs = f"{number} of {counted(several, 'run')}" if several > 1 else ""
-            (label, _), *_ = Counter(event.label for _, event in each).most_common(1)
-            named = [one for one in each if one[1].label == label]
-            result.append((*max(named, key=lambda one: one[1].score), runs))
-        return result
+        groups = folded(every, lambda each: (each[0].path, each[1]), len(self.verdicts))
+        return [(event, verdict.beside, runs) for (verdict, event), runs in groups]
 
     @property
     def words(self) -> str:
@@ -294,27 +270,35 @@ class Group:
         return list(dict.fromkeys(each.told for one in self.verdicts for each in one.missing))
 
 
-def _alike(one: tuple[Verdict, Finding], other: tuple[Verdict, Finding]) -> bool:
-    """Whether two findings of repetitions are one."""
-    (first, event), (second, same) = one, other
-    joint = event.evidence.joint
-    return (
-        (event.label == same.label or bool(joint and joint == same.evidence.joint))
-        and abs(event.start - same.start) <= TOGETHER
-        and event.became == same.became
-        and (first is not second or event is same)
-    )
+def folded(
+    items: Sequence[Item], of: Callable[[Item], tuple[Path, Finding]], runs: int
+) -> list[tuple[Item, str]]:
+    """Findings of repetitions: the loudest of those that are one, and how many of the runs have it.
 
-
-def folded(items: Sequence[Item], alike: Callable[[Item, Item], bool]) -> list[list[Item]]:
-    """Groups of items that are like the first one of their group, in order."""
+    Args:
+        of: Run and finding of an item.
+    """
     groups: list[list[Item]] = []
     for item in items:
-        group = next((each for each in groups if alike(each[0], item)), None)
-        if group is None:
-            groups.append(group := [])
-        group.append(item)
-    return groups
+        run, event = of(item)
+        for group in groups:
+            path, other = of(group[0])
+            joint = event.evidence.joint == other.evidence.joint and event.evidence.joint != ""
+            near = abs(event.start - other.start) <= TOGETHER
+            same = event.label == other.label or joint
+            if same and near and run != path and event.became == other.became:
+                group.append(item)
+                break
+        else:
+            groups.append([item])
+    result = []
+    for group in groups:
+        (label, _), *_ = Counter(of(each)[1].label for each in group).most_common(1)
+        named = [each for each in group if of(each)[1].label == label]
+        number = len({of(each)[0] for each in group})
+        worst = max(named, key=lambda each: (of(each)[1].evidence.db or 0.0, of(each)[1].score))
+        result.append((worst, f"{number} of {counted(runs, 'run')}" if runs > 1 else ""))
+    return result
 
 
 def each_missing(verdicts: Sequence[Verdict]) -> list[Verdict]:

@@ -6,7 +6,6 @@ be read, of verdicts and of differences alike.
 
 import hashlib
 import json
-import math
 import re
 import shlex
 from collections import Counter
@@ -25,7 +24,6 @@ from inspector.reference import difference as diff
 from inspector.reference.difference import LOUDER, NEW, RESOLVED, Difference
 from inspector.report.findings import (
     COUNTED,
-    TOGETHER,
     WORDS,
     Group,
     each_missing,
@@ -41,15 +39,12 @@ from inspector.report.findings import (
 from inspector.text import counted, program_version
 from inspector.verdict import UNREAD, Verdict, counts, exit_status
 
-ANNOTATIONS = 10
-"""GitHub silently drops what goes beyond ten of a kind per step."""
-COMMENT = 60_000
-"""Most characters of the Markdown: GitHub refuses comments of more than 65,536."""
+ANNOTATIONS = 10  # GitHub silently drops what goes beyond ten of a kind per step
+COMMENT = 60_000  # most characters of the Markdown: GitHub refuses comments of more than 65,536
 MARKER, DIFF_MARKER = "<!-- noise-inspector -->", "<!-- noise-inspector diff -->"
 """First line of the Markdown, by which a script finds its own comment to replace it: a job may have
 one of verdicts and one of a difference."""
-RESULTS = 5000
-"""GitHub shows no more results of one SARIF file."""
+RESULTS = 5000  # GitHub shows no more results of one SARIF file
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 RULES = {
     "missing-log": "A scenario that was accepted has no log.",
@@ -57,12 +52,9 @@ RULES = {
 }
 MOST, MOST_OF_KIND = 20, 5
 """Findings of a scenario that are listed, and of a difference those of each kind."""
-REPEATED = r"\d+% by \d+ repetitions? of "
-"""What the line on the reference says for all runs."""
+REPEATED = r"\d+% by \d+ repetitions? of "  # what the line on the reference says for all runs
 AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
 """By what else remarks of runs differ that say the same."""
-SHORT = 0.5
-"""Up to this, in [s], the onset tells when a finding is."""
 
 
 class Outcome(StrEnum):
@@ -180,10 +172,9 @@ def _plain(value: object) -> str:
 
 
 def github(job: Job) -> str:
-    """Write a job as GitHub workflow commands: the ten worst, and the counts.
+    """Write a job as GitHub workflow commands: the ten worst, and the counts of several cases.
 
-    One case that is annotated needs no counts. Of ten errors, those that cannot be read take five
-    at most where others fail, so that they hide none. Cases that are skipped are warnings.
+    Files that cannot be read take five of ten errors at most where others fail.
     """
     bad, failed, skipped = (
         [case for case in job.ranked if case.outcome is outcome]
@@ -216,10 +207,7 @@ def _escaped(value: str) -> str:
 
 
 def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
-    """Write a job for its summary or a comment: a table, the worst first, and a picture.
-
-    GitHub takes no pictures inside the text: the worst case's is linked if its address is
-    known, and else its file is named.
+    """Write a job for its summary or a comment: a table, the worst first, and a linked picture.
 
     Args:
         notes: Title of what does not fail its case.
@@ -305,8 +293,7 @@ def _listed(numbers: Mapping[str, int]) -> str:
 def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
     """Verdicts as text: a line for each finding; of several runs a row per scenario, worst first.
 
-    What limits a verdict is said once at the end, and what to type next. Bad inputs are left out:
-    the command line prints them on stderr.
+    Bad inputs are left out: the command line prints them on stderr.
 
     Args:
         verbose: Whether to name the runs of each scenario, and their models.
@@ -335,7 +322,7 @@ def _one(verdict: Verdict) -> list[str]:
     facts = facts if verdict.rate else ""
     by = f"by {verdict.expectations}" if verdict.expectations and verdict.of_run else ""
     head = "   ".join(filter(None, [str(verdict.path), status, facts, by]))
-    found = [row(verdict, event) for event in (*verdict.failing, *verdict.excused)]
+    found = [row(event, verdict.beside) for event in (*verdict.failing, *verdict.excused)]
     return [head, *(f"  {line}" for line in [*table(found), *map(str, verdict.missing)])]
 
 
@@ -376,14 +363,10 @@ def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
         yield f"note:    {message}{several}"
     known = [each.beside for each in verdicts if each.beside and each.beside.repetitions]
     if known and not verbose:
-        number = len({each.scenarios for each in known})
-        fewest, most = (of(each.repetitions for each in known) for of in (min, max))
-        margins = [each.margins_db.get("repetitions", 0.0) for each in known]
-        many = counted(most, "repetition") if fewest == most else f"{fewest} to {most} repetitions"
-        each_of = f"each of {number} scenarios" if number > 1 else " and ".join(known[0].scenarios)
-        low, high = f"{min(margins):.1f}", f"{max(margins):.1f}"
-        margin = low if low == high else f"{low} to {high}"
-        yield f"reference: {many} of {each_of}, margin {margin} dB"
+        scenarios = counted(len({each.scenarios for each in known}), "scenario")
+        most = counted(max(each.repetitions for each in known), "repetition")
+        margin = max(each.margins_db.get("repetitions", 0.0) for each in known)
+        yield f"reference: {scenarios}, up to {most}, margin up to {margin:.1f} dB"
 
 
 def as_json(verdicts: Sequence[Verdict]) -> str:
@@ -401,9 +384,8 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
 def sarif(verdicts: Sequence[Verdict]) -> str:
     """Write the findings that count as SARIF 2.1.0, the worst runs first.
 
-    The location of a finding is its run's file: GitHub shows no result without one, and takes its
-    first line where there is no other. Expected findings are counted, but no results: GitHub would
-    show them. Bad input is a notification of the tool, and so is what cannot be told.
+    A finding lies in the first line of its run's file: GitHub shows no result without a location.
+    Bad input and what cannot be told are notifications of the tool.
     """
     job = _of_verdicts(verdicts, ())
     ranked = sorted(each_missing(verdicts), key=lambda verdict: verdict.severity)
@@ -452,7 +434,7 @@ def _results(verdict: Verdict, case: Case) -> Iterator[dict[str, Any]]:
     facts: list[tuple[str, str, dict[str, float]]] = [
         (
             each.label,
-            told(verdict, each),
+            told(each, verdict.beside),
             {"start": round(each.start, 6), "stop": round(each.stop, 6)},
         )
         for each in verdict.failing
@@ -589,32 +571,14 @@ def _told(of: diff.Row) -> list[str]:
 
 
 def _folded(of: diff.Row, kind: str) -> list[str]:
-    """Findings of a kind, one line for what repetitions share: the loudest of them.
-
-    A line has the class that most of them have, time, joint, octave, and how much louder it is.
-    """
-
-    def alike(one: diff.ChangedFinding, other: diff.ChangedFinding) -> bool:
-        joint, same = one.event.evidence.joint, one.event.label == other.event.label
-        near = abs(one.event.start - other.event.start) <= TOGETHER
-        alike = joint == other.event.evidence.joint and (same or joint != "")
-        return alike and near and one.run != other.run
-
+    """Findings of a kind, one line for what repetitions share."""
     runs = len(of.before if kind == RESOLVED else of.after)
-    groups = folded([each for each in of.findings if each.kind == kind], alike)
-    lines = []
-    for group in groups[:MOST_OF_KIND]:
-        (label, _), *_ = Counter(each.event.label for each in group).most_common(1)
-        known = [each.event.evidence.db for each in group]
-        exceed = [-math.inf if each is None else each for each in known]
-        worst = group[exceed.index(max(exceed))].event
-        start, stop, by = worst.start, worst.stop, worst.evidence
-        when = f"{start:.2f} s" if stop - start < SHORT else f"{start:.2f}-{stop:.2f} s"
-        band = f"{by.octave[0]:.0f}-{by.octave[1]:.0f} Hz" if by.octave else ""
-        over = "" if by.db is None else f"{by.db:+.0f} dB"
-        several = f"{len({each.run for each in group})} of {runs} runs" if runs > 1 else ""
-        parts = [f"{label} {when}", by.joint, band, over, several]
-        lines.append(f"{kind}: {', '.join(filter(None, parts))}")
+    own = [each for each in of.findings if each.kind == kind]
+    groups = folded(own, lambda each: (each.run, each.event), runs)
+    lines = [
+        f"{kind}: {told(each.event, None, number, short=True)}"
+        for each, number in groups[:MOST_OF_KIND]
+    ]
     left = len(groups) - MOST_OF_KIND
     return lines + ([f"and {left} more {kind} (--format json)"] if left > 0 else [])
 

@@ -21,8 +21,7 @@ from inspector.text import counted, natural
 from inspector.verdict import Verdict, read_results
 from noisemodel.types import Array
 
-SHORTEST = 4
-"""Commits from which a stretch has a level of its own."""
+SHORTEST = 4  # commits from which a stretch has a level of its own
 LEAST_DB, LEAST_FINDINGS = 2.0, 0.5
 """Smallest change that the page names: of a level in [dB], and of findings per run."""
 WIDTH, HEIGHT = 900, 120
@@ -70,14 +69,9 @@ class History:
         """The changes, a line each."""
         yield f"{counted(len(self.commits), 'commit')}, {self.commits[0]} to {self.commits[-1]}"
         yield from self.notes
-        quiet = 0
         for series in self.series:
-            found = changes(series)
-            quiet += not found
-            for change in found:
+            for change in changes(series):
                 yield f"{series.name}: {self.told(series, change)}"
-        if quiet:
-            yield f"{quiet} of {len(self.series)} series without a change"
 
     def told(self, series: Series, change: Change) -> str:
         """A change in words."""
@@ -110,10 +104,8 @@ def read(folder: Path) -> History:
         why = f"; {problems[0]}" if problems else ""
         raise InspectorError(f"{folder}: no result of `classify --write json=FILE`{why}")
 
-    def most(series: Series) -> float:
-        return max((abs(change.by) for change in changes(series)), default=0.0)
-
-    series = sorted(_series(results), key=most, reverse=True)
+    series = list(_series(results))
+    series.sort(key=lambda each: -max([abs(change.by) for change in changes(each)], default=0.0))
     return History(tuple(commits), tuple(series), tuple(problems), tuple(notes))
 
 

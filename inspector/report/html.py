@@ -58,8 +58,7 @@ th { font-weight: 600; }
 td.number, th.number { text-align: right; }
 li { margin: .2rem 0; }
 """
-MOST = 20
-"""Links and joints that are listed, the loudest first."""
+MOST = 20  # links and joints that are listed, the loudest first
 
 
 @dataclass(frozen=True)
@@ -93,8 +92,7 @@ def page(
 
     Args:
         audit: What the log can show, a line each; may be empty.
-        verdict: The verdict beside a reference; None without.
-        beside: How the run compares with the reference; None without.
+        verdict: The verdict beside a reference, and how the run compares with it in `beside`.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
     html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
@@ -109,7 +107,8 @@ def page(
         _add_list(body, "Does not count", excused(verdict))
     add_text(body, "h2", "Over time")
     image = f"data:image/png;base64,{_encoded(picture(analysis, beside, floor=floor))}"
-    ET.SubElement(body, "img", src=image, alt=_described(analysis, beside))
+    described = f"Noise, classes and spectrograms over {analysis.run.duration:.2f} s"
+    ET.SubElement(body, "img", src=image, alt=f"{described}; the tables have the findings")
     _add_sound(body, analysis)
     for table in parts(analysis):
         _add_table(body, table)
@@ -194,32 +193,24 @@ def _encoded(data: bytes) -> str:
     return b64encode(data).decode("ascii")
 
 
-def _described(analysis: Analysis, beside: Comparison | None) -> str:
-    """What the picture shows, for readers without it."""
-    rows = ["classes", "noise", "its level above 10 Hz", "probability of a failure"]
-    if beside is not None:
-        rows[2:] = ["its level and that of the repetitions", "joints over the reference"]
-    rows += ["spectrogram of the worst joint", "levels of joints"]
-    rows += ["levels of links"] if analysis.links is not None else []
-    return f"Over {analysis.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"
-
-
 # --- tables
 
 
 def facts(analysis: Analysis) -> Table:
     """List what the run is."""
-    run, rows = analysis.run, list[tuple[str, str]]()
-    for key in ("scenario", "seed", "source"):
-        if key in run.meta:
-            value = run.meta[key]
-            rows.append((key, ", ".join(map(str, value if isinstance(value, list) else [value]))))
-    rows[:0] = [
+    run = analysis.run
+    rows = [
         ("robot", run.robot or "not named"),
         ("duration", f"{run.duration:.2f} s at {run.rate:g} Hz"),
         ("joints", str(len(run.joint_names))),
         ("model", analysis.model or "none"),
     ]
+    for key in ("scenario", "seed", "source"):
+        if key in run.meta:
+            value = run.meta[key]
+            rows.append(
+                (key, ", ".join(map(str, value)) if isinstance(value, list) else str(value))
+            )
     return Table("", ("", ""), rows)
 
 
@@ -314,8 +305,7 @@ def _ranked(
 
 PAGE = "index.html"
 PICTURES = "pictures"
-WIDTH = 1000
-"""Width of a timeline, in units of its own."""
+WIDTH = 1000  # width of a timeline, in units of its own
 INDEX_POLICY = "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'"
 """Policy for browsers: nothing but the pictures is fetched, also from a page on a disk."""
 ROWS = """
@@ -350,9 +340,6 @@ section h2 { margin: 0 0 .4rem; overflow-wrap: anywhere; }
 section p { margin: .2rem 0; overflow-wrap: anywhere; }
 section img { background: #fff; border-radius: .2rem; }
 @media (max-width: 60rem) { section { display: block; } td.line, th.line { display: none; } }
-@media print { :root { --ink: #000; --dim: #444; --line: #bbb; --back: #fff; --bad: #a40e26;
-  --warn: #7d4e00; --good: #116329; } body { margin: 0; max-width: none; font-size: 12px; }
-  thead { display: table-header-group; } tr { break-inside: avoid; } }
 """
 
 
@@ -502,7 +489,7 @@ def _add_run(body: ET.Element, verdict: Verdict, number: int, shared: Sequence[s
     if verdict.picture is not None:
         source = f"{PICTURES}/{verdict.picture.name}"
         link = ET.SubElement(ET.SubElement(part, "div"), "a", href=source)
-        described = f"{verdict.path} over time: classes, noise, spectrogram"
+        described = f"{verdict.path} over time"
         ET.SubElement(link, "img", src=source, alt=described, loading="lazy")
 
 

@@ -1,7 +1,6 @@
 """A run over time as a picture on paper, as a recording shows it."""
 
 import io
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -25,18 +24,14 @@ if TYPE_CHECKING:
 WIDTH, DPI = 9.6, 120
 INK, LINE = "#24292f", "#0072b2"
 POINTS = 4000
-ORDERS, TIMES = 3, 6
-"""Most orders that are written, and most times of each."""
-ROW = 0.24
-"""Height of a class, a joint or a link, in [inch]."""
+ORDERS = 3  # most orders that are written
+ROW = 0.24  # height of a class, a joint or a link, in [inch]
 GAP, TITLE, BELOW, RIGHT = 0.14, 0.22, 0.55, 0.95
 """Between panels, above one with a title, below and at the right of all, in [inch]."""
 LETTER, LABELS, LONGEST = 0.085, 1.2, 32
 """Width of a letter and least width of labels, in [inch], and letters of a name that are shown."""
-SHADE = 0.35
-"""Opacity of a finding behind a curve."""
-MOST_OVER_DB = 12.0
-"""Largest level over the reference that has a colour of its own."""
+SHADE = 0.35  # opacity of a finding behind a curve
+MOST_OVER_DB = 12.0  # largest level over the reference that has a colour of its own
 
 
 def require(what: str = "a picture") -> None:
@@ -48,10 +43,9 @@ def require(what: str = "a picture") -> None:
 def picture(
     analysis: Analysis, beside: Comparison | None = None, *, floor: float | None = None
 ) -> bytes:
-    """Draw an inspected run.
+    """Draw an inspected run; how it compares with a reference takes the place of the probability.
 
     Args:
-        beside: How it compares with its reference, which takes the place of the probability.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
     run, links = analysis.run, analysis.links
@@ -119,14 +113,13 @@ def _panels(
 ) -> "tuple[Figure, dict[str, Axes]]":
     """A figure with panels over time below each other, those that have a height.
 
-    Placing them by hand takes half the time of matplotlib's layout.
-
     Args:
         heights: Of each panel and of its title, in [inch].
         names: What stands at the left of rows.
     """
     from matplotlib.figure import Figure
 
+    # Placing panels by hand takes half the time of matplotlib's layout.
     longest = max((len(_short(name)) for name in names), default=0)
     left = max(LABELS, LETTER * longest + 0.15)
     shown = {name: each for name, each in heights.items() if each[0]}
@@ -182,14 +175,8 @@ def _classes(axes: "Axes", analysis: Analysis, names: Sequence[str], told: Seque
 
 
 def _told(analysis: Analysis) -> list[str]:
-    """What is drawn, and what goes with the speed of a joint and when: a line for each order."""
-    when: dict[str, list[str]] = defaultdict(list)
-    for event, order in analysis.orders.items():
-        when[str(order)].append(f"{event.start:.2f}")
-    lines = [
-        f"at {', '.join(times[:TIMES])}{', …' * (len(times) > TIMES)} s: {order}"
-        for order, times in when.items()
-    ]
+    """What is drawn, and what goes with the speed of a joint: a line for each order."""
+    lines = [f"at {event.start:.2f} s: {order}" for event, order in analysis.orders.items()]
     hatched = "; hatched: annotated" if analysis.run.blocks else ""
     return [f"filled: found{hatched}", *lines[:ORDERS], *["…"] * (len(lines) > ORDERS)]
 
