@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from inspector.errors import EXIT, OUTPUT_LOST, OptionError, Status
-from inspector.text import printable
+from inspector.text import printable, program_version
 
 PANELS = {
     "Inspect": {
@@ -125,8 +125,7 @@ OUTPUTS = frozenset(
 UNSET = OUTPUTS | {"overwrite", "write", "in_ci", "help"}
 """Names of parameters that no file of settings sets."""
 
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as of a shell."""
+INTERRUPTED = 130  # exit status after Ctrl-C, as of a shell
 UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.EROFS, errno.EIO)
 """Errors of the system about a path that a user typed, or of a disk: no bugs."""
 
@@ -249,12 +248,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import PackageNotFoundError, version
-
-        try:
-            typer.echo(f"inspector {version('noise-inspector')}")
-        except PackageNotFoundError:  # run from its folder
-            typer.echo("inspector, not installed")
+        typer.echo(f"inspector {program_version()}")
         raise typer.Exit
 
 
@@ -301,8 +295,7 @@ def help_(
 FILES = ("inspector.toml", "pyproject.toml")
 TABLE = "noise-inspector"
 MOST_BYTES = 2**20
-SHARED = frozenset(("model", "jobs"))
-"""Settings of all commands, besides those on reading logs."""
+SHARED = frozenset(("model", "jobs"))  # settings of all commands, besides those on reading logs
 PATHS = {"mapping", "desired", "model", "reference", "candidate", "runs", "package-root"}
 """Settings that are paths, which are meant from the folder of the file."""
 

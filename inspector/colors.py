@@ -37,8 +37,7 @@ VERDICTS: dict[str, Color] = {
 NOISE: Color = (160, 196, 255)
 LEVEL: Color = (240, 228, 140)
 BAND: Color = (150, 156, 168)
-THRESHOLD: Color = (235, 235, 235)
-"""Alarm threshold, ticks and gaps."""
+THRESHOLD: Color = (235, 235, 235)  # alarm threshold, ticks and gaps
 SERIES: tuple[Color, ...] = (
     (86, 180, 233),
     (230, 159, 0),

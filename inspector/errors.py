@@ -32,15 +32,9 @@ EXIT = {
     Status.OK: 0,
 }
 """Exit status of each, the worst first."""
-
-OUTPUT_LOST = 5
-"""Exit status if an output could not be written."""
-
-WORST = (70, OUTPUT_LOST, 3, 1, 4, 0)
-"""Exit statuses, the worst first."""
-
-IGNORED = "unknown frames are ignored"
-"""What outputs say where they are."""
+OUTPUT_LOST = 5  # exit status if an output could not be written
+WORST = (70, OUTPUT_LOST, 3, 1, 4, 0)  # exit statuses, the worst first
+IGNORED = "unknown frames are ignored"  # what outputs say where they are
 
 
 def worst(codes: Iterable[int]) -> int:
@@ -57,11 +51,7 @@ class OptionError(InspectorError):
 
 
 class FileError(InspectorError):
-    """A file of the inspector's own that is wrong; subclasses say what to do about it.
-
-    Args:
-        problem: What is wrong with it, in one line.
-    """
+    """A file of the inspector's own that is wrong; subclasses say what to do about it."""
 
     advice = ""
 
@@ -71,12 +61,7 @@ class FileError(InspectorError):
 
 
 class LogError(InspectorError):
-    """A log that cannot be read as the motion of a robot.
-
-    Args:
-        problem: What is wrong with it, in one line.
-        row: The line of the file where that is (the header is line 1), if it is in one place.
-    """
+    """A log that cannot be read as the motion of a robot, in a line of it (the header is 1)."""
 
     def __init__(self, path: Path, problem: str, row: int | None = None) -> None:
         self.path, self.problem, self.row = path, problem, row

@@ -2,16 +2,19 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
+from inspector.analysis import analyse
 from inspector.commands.shared import ModelFiles, Overwrite, RunFile, argument, opened, option
 from inspector.errors import EXIT, OUTPUT_LOST, Status, worst
-
-if TYPE_CHECKING:
-    from inspector.library import Library
-    from noisemodel import Run
+from inspector.export.labels import read_labels, write_labels
+from inspector.library import Library, load_library
+from inspector.logs.read import import_logs, listing
+from inspector.text import counted, printable, progress
+from noisemodel import Run
+from noisemodel.files import refuse_existing
 
 
 def import_(
@@ -33,9 +36,6 @@ def import_(
 
     The exit status is 3 if a log cannot be read, 5 if a run file cannot be written; the others are.
     """
-    from inspector.logs.read import import_logs, listing
-    from inspector.text import printable, progress
-
     reading = ctx.obj
     if list_:
         for line in (line for log in logs for line in listing(log, reading.options)):
@@ -96,9 +96,6 @@ def export(
     Foxglove and PlotJuggler read MCAP, which holds the joints' motion as well; data frames read
     CSV and Parquet; annotation tools and spreadsheets read label files.
     """
-    from inspector.library import load_library
-    from noisemodel.files import refuse_existing
-
     if labels and annotate:
         raise typer.BadParameter("name one of --labels and --annotate")
     refuse_existing(output, overwrite=overwrite)
@@ -122,22 +119,15 @@ def export(
         typer.echo(f"  layouts: {', '.join(str(output.with_suffix(each)) for each in LAYOUTS)}")
 
 
-def _annotate(run: "Run", labels: Path, output: Path, *, overwrite: bool) -> None:
+def _annotate(run: Run, labels: Path, output: Path, *, overwrite: bool) -> None:
     """Write a run with the labels of a file."""
-    from inspector.export.labels import read_labels
-    from inspector.text import counted
-
     blocks = read_labels(labels, run)
     replace(run, blocks=blocks).save(output, overwrite=overwrite)
     typer.echo(f"{output}: {counted(len(blocks), 'label')}")
 
 
-def _labels(run: "Run", library: "Library", kind: str, output: Path, *, overwrite: bool) -> None:
+def _labels(run: Run, library: Library, kind: str, output: Path, *, overwrite: bool) -> None:
     """Write the findings of a run, or its annotated blocks, as a label file."""
-    from inspector.analysis import analyse
-    from inspector.export.labels import write_labels
-    from inspector.text import counted
-
     spans = analyse(run, library).findings if kind == "findings" else run.blocks
     write_labels(spans, output, overwrite=overwrite)
     for each in spans:

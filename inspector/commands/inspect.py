@@ -2,12 +2,24 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import date
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from tempfile import TemporaryDirectory
+from typing import Annotated, Literal
 
 import typer
 
+import noisemodel as nm
+from inspector.analysis import (
+    Analysis,
+    analyse_file,
+    default_kinds,
+    estimate,
+    noise_level,
+    write_csv,
+)
+from inspector.audit.audit import text
 from inspector.commands.shared import (
     Geometries,
     Kind,
@@ -22,19 +34,23 @@ from inspector.commands.shared import (
     option,
     say_warnings,
 )
-from inspector.errors import EXIT, Status
-
-if TYPE_CHECKING:
-    from inspector.analysis import Analysis
-    from inspector.library import Library
-    from inspector.logs.read import Opened, Reading
-    from inspector.reference.judging import Comparison
-    from inspector.verdict import Verdict
+from inspector.errors import EXIT, InspectorError, Status
+from inspector.export import sound as sonification
+from inspector.export.sound import of_recording, worst_time
+from inspector.library import Library, demo_run, load_library
+from inspector.logs.read import Opened, Reading
+from inspector.reference.judging import Comparison
+from inspector.reference.store import Reference
+from inspector.reference.verdicts import References, seen
+from inspector.report import findings, html
+from inspector.report.picture import require
+from inspector.text import progress
+from inspector.verdict import EXPECTED, Verdict
+from noisemodel.files import refuse_existing
 
 # --- view
 
-SUFFIXES = ("", ".rrd", ".png", ".html")
-"""Of what is written; without a suffix a recording."""
+SUFFIXES = ("", ".rrd", ".png", ".html")  # of what is written; without a suffix a recording
 SIZE = "1440x900"
 
 Shown = Annotated[
@@ -64,8 +80,8 @@ GoodRuns = Annotated[
 class Request:
     """What is shown of runs, and how."""
 
-    reading: "Reading"
-    library: "Library"
+    reading: Reading
+    library: Library
     links: str  # kind of the noise of the links; empty where no robot is drawn
     floor: float | None
     terms: bool
@@ -100,9 +116,7 @@ def view(
 
     Runs that cannot be read are named, and the others shown (exit status 3).
     """
-    from inspector.library import demo_run, load_library
     from inspector.recording import viewer
-    from noisemodel.files import refuse_existing
 
     paths = runs or [demo_run()]
     one_at_a_time(ctx.obj, len(paths))
@@ -149,9 +163,6 @@ def _check(paths: list[Path], target: Path, asked: Request) -> None:
 
 def _picture(run: Path, output: Path, request: Request) -> None:
     """Write a PNG of what the viewer shows, without a display."""
-    from tempfile import TemporaryDirectory
-
-    from inspector.export.sound import worst_time
     from inspector.recording import viewer
     from inspector.recording.run import write
 
@@ -180,10 +191,6 @@ def _picture(run: Path, output: Path, request: Request) -> None:
 
 def _page(run: Path, output: Path, request: Request) -> None:
     """Write one HTML page about a run: pictures, tables, sound."""
-    from inspector.audit.audit import text
-    from inspector.report import html
-    from inspector.report.picture import require
-
     require("a report")
     found, verdict, beside = _analysed(opened(run, request.reading), request)
     assert found.audit is not None
@@ -199,11 +206,8 @@ def _page(run: Path, output: Path, request: Request) -> None:
     typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
 
 
-def _read(paths: list[Path], reading: "Reading") -> list["Opened"]:
+def _read(paths: list[Path], reading: Reading) -> list[Opened]:
     """Open the runs that can be read, and name the others; their remarks are printed later."""
-    from inspector.errors import InspectorError
-    from inspector.verdict import EXPECTED
-
     found = []
     for path in paths:
         try:
@@ -217,16 +221,8 @@ def _read(paths: list[Path], reading: "Reading") -> list["Opened"]:
     return found
 
 
-def _analysed(
-    run: "Opened", request: Request
-) -> "tuple[Analysis, Verdict | None, Comparison | None]":
+def _analysed(run: Opened, request: Request) -> tuple[Analysis, Verdict | None, Comparison | None]:
     """A run with what was found in it, beside its reference if there is one."""
-    from datetime import date
-
-    from inspector.analysis import analyse_file
-    from inspector.reference.verdicts import References, seen
-    from inspector.verdict import Verdict
-
     kind, path = request.links, run.source.shown
     found = analyse_file(run, request.library, links=bool(kind), kind=kind, terms=request.terms)
     if request.reference is None:
@@ -237,11 +233,9 @@ def _analysed(
     return seen(found, verdict), verdict, beside
 
 
-def _one(runs: list["Opened"], target: Path, request: Request) -> float:
+def _one(runs: list[Opened], target: Path, request: Request) -> float:
     """Write the recording of a run; returns the time of its worst moment, in [s]."""
-    from inspector.export.sound import of_recording, worst_time
     from inspector.recording.run import write
-    from inspector.report import findings
 
     (run,) = runs
     found, verdict, beside = _analysed(run, request)
@@ -258,7 +252,7 @@ def _one(runs: list["Opened"], target: Path, request: Request) -> float:
     return worst_time(found)
 
 
-def _two(runs: list["Opened"], target: Path, request: Request) -> None:
+def _two(runs: list[Opened], target: Path, request: Request) -> None:
     """Write the recording of a run before and after a change."""
     from inspector.compare.pair import Align, changes, compare, summary
     from inspector.compare.recording import write
@@ -273,7 +267,7 @@ def _two(runs: list["Opened"], target: Path, request: Request) -> None:
         typer.echo(f"  {each}")
 
 
-def _several(runs: list["Opened"], target: Path, request: Request) -> None:
+def _several(runs: list[Opened], target: Path, request: Request) -> None:
     """Write the recording of several runs, side by side."""
     from inspector.compare.many import lay, write
 
@@ -347,11 +341,7 @@ def noise(
             raise typer.BadParameter("--picture takes --compare")
         _print_levels((runs or [])[0], ctx.obj, kinds, csv, overwrite=overwrite)
         return
-    import noisemodel as nm
     from inspector.compare.models import draw, write_csv
-    from inspector.report.picture import require
-    from inspector.text import progress
-    from noisemodel.files import refuse_existing
 
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
     sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
@@ -381,11 +371,9 @@ def noise(
 
 
 def _print_levels(
-    run: Path, reading: "Reading", kinds: list[str], csv: Path | None, *, overwrite: bool
+    run: Path, reading: Reading, kinds: list[str], csv: Path | None, *, overwrite: bool
 ) -> None:
     """Print the noise levels of a run, and write the noise over time."""
-    from inspector.analysis import default_kinds, estimate, noise_level, write_csv
-
     recorded = opened(run, reading).run
     say_warnings(recorded)
     estimates = tuple(estimate(recorded, each) for each in kinds or default_kinds(recorded))
@@ -416,8 +404,6 @@ def listen(
     overwrite: Overwrite = False,
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
-    from inspector.export import sound as sonification
-
     one_at_a_time(ctx.obj, len(runs))
     settings = sonification.Settings(kind, joint, link, speed)
     paths = sonification.output_paths(output, len(runs), overwrite=overwrite)
@@ -483,10 +469,8 @@ def live(
     """
     import sys
 
-    from inspector.library import load_library
     from inspector.live import LiveError, LiveSession
     from inspector.live.pipe import Gate, follow
-    from inspector.reference.store import Reference
 
     del package_root, limit  # have been set
     if sys.stdin.isatty():
@@ -531,10 +515,9 @@ def robots() -> None:
     Others are given by the path of a URDF or of an MJCF (robot.xml). Robots of MuJoCo Menagerie are
     listed if mujoco-menagerie is installed, which downloads each at its first use.
     """
-    from noisemodel import ROBOTS
     from noisemodel.robot import menagerie_names
 
-    for name, robot in ROBOTS.items():
+    for name, robot in nm.ROBOTS.items():
         base = "floating" if robot.floating_base else "fixed"
         typer.echo(f"{name:28} {base:10} {robot.urdf}")
     for name, category in menagerie_names().items():

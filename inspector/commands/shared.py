@@ -6,16 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar, get_args
+from typing import Annotated, Any, Literal, NoReturn, TypeVar, get_args
 
 import typer
 
 from inspector.errors import OUTPUT_LOST, InspectorError, Unknown, worst
-
-if TYPE_CHECKING:
-    from inspector.logs.read import Opened, Reading
-    from noisemodel import Run
-    from noisemodel.parallel import Jobs
+from inspector.logs.mapping import read_options
+from inspector.logs.plausibility import check_joints, limit_warnings
+from inspector.logs.read import Opened, Reading, open_run
+from noisemodel import OutputError, Run
+from noisemodel.files import refuse_existing, write_whole
+from noisemodel.parallel import Jobs
 
 Result = TypeVar("Result")
 
@@ -24,8 +25,7 @@ Kinds = Literal["normal", "rms", "mean", "paper", "A", "B", "C"]
 Geometries = Literal["visual", "collision", "hull", "auto"]
 LIMITS = ("joints", "columns", "triangles", "bodies")
 
-ASSUMED = 100
-"""Most characters of what was assumed of a log, unless all is asked for."""
+ASSUMED = 100  # most characters of what was assumed of a log, unless all is asked for
 
 
 def option(text: str, *names: str, **settings: Any) -> Any:
@@ -166,14 +166,8 @@ def log_options(
         float | None,
         _log_option("Add to the timestamps of --desired, in seconds; else estimated."),
     ] = None,
-) -> Any:
-    """Options on reading logs, the same in all commands that read logs, as a ``read.Reading``.
-
-    They are in the help of `import` only; the others take them as well (`inspector.cli`).
-    """
-    from inspector.logs.mapping import read_options
-    from inspector.logs.read import Reading
-
+) -> Reading:
+    """Options on reading logs: in the help of `import` only; others take them, too (`cli`)."""
     del package_root, max_unpacked, limit  # have been set
     options = read_options(
         map_ or (),
@@ -190,26 +184,22 @@ def log_options(
     return Reading(options, desired, tuple(episode or ()), without_robot=robot == "none")
 
 
-def opened(path: Path, reading: "Reading", *, said: bool = True) -> "Opened":
+def opened(path: Path, reading: Reading, *, said: bool = True) -> Opened:
     """Open a run or a log for a command, and say on standard error what was assumed."""
-    from inspector.logs.read import open_run
-
     found = open_run(path, reading)
     if said:
         say_assumed({str(path): found.assumed})
     return found
 
 
-def one_at_a_time(reading: "Reading", runs: int) -> None:
+def one_at_a_time(reading: Reading, runs: int) -> None:
     """Refuse a log with the desired motion, which belongs to one run, for several."""
     if reading.desired and runs > 1:
         raise typer.BadParameter(f"belongs to one log, {runs} are given", param_hint="'--desired'")
 
 
-def say_warnings(run: "Run") -> None:
+def say_warnings(run: Run) -> None:
     """Print what hints at another robot than the run names on standard error."""
-    from inspector.logs.plausibility import check_joints, limit_warnings
-
     check_joints(run.joint_names, run.robot)
     for warning in limit_warnings(run):
         typer.echo(f"  {warning}", err=True)
@@ -230,7 +220,7 @@ def say_assumed(lines: dict[str, str], *, verbose: bool = True) -> None:
 # --- where commands work, and what they write
 
 
-def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
+def jobs_or_dask(jobs: int, dask: str) -> Jobs:
     """Where to work: the number of processes, or the address of a Dask scheduler."""
     if dask and jobs > 1:
         raise typer.BadParameter("--jobs and --dask exclude each other")
@@ -239,8 +229,6 @@ def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
 
 def prepare(folder: Path, *files: str, overwrite: bool) -> None:
     """Make the folder of a report before long work is done for it; it has none of the files."""
-    from noisemodel.files import refuse_existing
-
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -253,8 +241,6 @@ def outputs_of(
     given: Sequence[str] | None, formats: Mapping[str, Callable[[Result], str]], *, overwrite: bool
 ) -> dict[Path, Callable[[Result], object]]:
     """What writes each file of `--write FORMAT=FILE`; none of them exists or is read."""
-    from noisemodel.files import refuse_existing, write_whole
-
     outputs: dict[Path, Callable[[Result], object]] = {}
     for each in given or ():
         name, _, path = each.partition("=")
@@ -276,7 +262,6 @@ def written(
     outputs: Mapping[Path, Callable[[Result], object]],
 ) -> list[str]:
     """Print a result, and write it to outputs; what is lost, a line each."""
-    from noisemodel import OutputError
 
     def show(result: Result) -> None:
         typer.echo(printed(result))
