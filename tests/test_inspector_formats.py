@@ -182,6 +182,12 @@ def test_json_is_noise_verdict_3():
     assert (loud["model"], loud["model_sha256"]) == ("general", "1f2e")
     assert (slow["status"], slow["events"]) == ("cannot-tell", [])
     assert slow["message"] == "30 Hz is below every model"
+    expected, lacking = json.loads(as_json([EXPECTED, LACKING]))["runs"]
+    blow = expected["events"][0]
+    assert (blow["fails"], blow["ruling"], blow["reason"]) == (False, "allowed", "the pick")
+    assert lacking["expectations"] == "expect.toml"
+    missing = {"label": "impact", "start": 1.1, "stop": 1.3, "reason": "the pick"}
+    assert lacking["missing"] == [missing]
 
 
 def test_json_fits_its_published_schema():
@@ -199,16 +205,6 @@ def test_json_fits_its_published_schema():
     written["runs"][1]["events"][0]["ruling"] = "forgiven"
     with pytest.raises(jsonschema.ValidationError, match="'forgiven' is not one of"):
         jsonschema.Draft202012Validator(schema).validate(written)
-
-
-def test_json_has_what_became_of_each_finding_and_what_is_missing():
-    expected, lacking = json.loads(as_json([EXPECTED, LACKING]))["runs"]
-    blow = expected["events"][0]
-    assert (blow["fails"], blow["ruling"], blow["reason"]) == (False, "allowed", "the pick")
-    assert lacking["expectations"] == "expect.toml"
-    assert lacking["missing"] == [
-        {"label": "impact", "start": 1.1, "stop": 1.3, "reason": "the pick"}
-    ]
 
 
 def test_json_has_the_localisation_of_findings_that_were_localised():
@@ -279,11 +275,6 @@ def test_junit_has_one_case_with_time_type_and_picture_for_each_run():
     assert (numbers["runs.internal-error"], numbers["findings.waived"]) == ("1", "1")
 
 
-def test_junit_names_each_case_once():
-    names = [case.get("name") for case in ET.fromstring(junit([LOUD, LOUD])).iter("testcase")]
-    assert names == ["loud.npz", "loud.npz (2)"]
-
-
 def test_ignored_bad_input_is_skipped_and_a_warning():
     ignored = replace(BROKEN, ignored=True)
     assert (
@@ -294,12 +285,10 @@ def test_ignored_bad_input_is_skipped_and_a_warning():
     assert "1 of the bad input ignored" in text([ignored, QUIET])
 
 
-def test_junit_drops_control_characters_that_xml_forbids():
+def test_names_and_texts_are_kept_apart_and_escaped():
     odd = Verdict(Path("a\x00b\x1b.npz"), Status.BAD_INPUT, message="x\x07y")
-    assert ET.fromstring(junit([odd])).find(".//testcase").get("name") == "ab.npz"
-
-
-def test_github_annotations_escape_what_would_end_them():
+    cases = ET.fromstring(junit([odd, LOUD, LOUD])).iter("testcase")
+    assert [case.get("name") for case in cases] == ["ab.npz", "loud.npz", "loud.npz (2)"]
     line = github([BROKEN])
     assert line == "::error file=broken%2C1.npz::bad-input: not a run file: 100%25%0Abad"
 
