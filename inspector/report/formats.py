@@ -348,16 +348,15 @@ def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
     runs: Counter[str] = Counter()
     for verdict in verdicts:
         if verdict.status is not Status.CANNOT_TELL:
-            quiet = NOTHING if len(verdicts) > 1 else ""
-            runs.update(filter(None, [re.sub(quiet, "", verdict.message)]))
+            runs[re.sub(NOTHING if len(verdicts) > 1 else "", "", verdict.message)] += 1
         if verdict.beside and verbose:
-            runs.update(filter(None, [verdict.beside.words]))
+            runs[verdict.beside.words] += 1
         elif verdict.beside:
             parts = verdict.beside.words.split("; ")
-            parts = [each for each in parts if each and not re.match(REPEATED, each)]
-            runs.update(re.sub(AMOUNT, "", each) for each in parts)
+            runs.update(re.sub(AMOUNT, "", each) for each in parts if not re.match(REPEATED, each))
         elif len(verdicts) > 1 and verdict.expectations:
-            runs.update([f"by {verdict.expectations}"])
+            runs[f"by {verdict.expectations}"] += 1
+    del runs[""]
     for message, number in runs.items():
         several = f" ({number} of {len(verdicts)} runs)" if 1 < len(verdicts) != number else ""
         yield f"note:    {message}{several}"
@@ -387,7 +386,7 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
     A finding lies in the first line of its run's file: GitHub shows no result without a location.
     Bad input and what cannot be told are notifications of the tool.
     """
-    job = _of_verdicts(verdicts, ())
+    job = _job(verdicts, ())
     ranked = sorted(each_missing(verdicts), key=lambda verdict: verdict.severity)
     cases = [(verdict, _case(verdict)) for verdict in ranked]
     results = [
@@ -511,25 +510,19 @@ def _of_group(group: Group) -> Case:
     )
 
 
-def _of_verdicts(verdicts: Sequence[Verdict], cases: Sequence[Case]) -> Job:
+def _job(verdicts: Sequence[Verdict], cases: Sequence[Case]) -> Job:
     ignoring = any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
     return Job("Noise", summary(verdicts), counts(verdicts), cases, (IGNORED,) if ignoring else ())
 
 
-def _by_run(verdicts: Sequence[Verdict]) -> Job:
-    """All runs as cases, for programs that count runs."""
-    return _of_verdicts(verdicts, [_case(each) for each in each_missing(verdicts)])
-
-
 def _by_scenario(verdicts: Sequence[Verdict]) -> Job:
-    """All scenarios as cases, for people."""
-    return _of_verdicts(verdicts, [_of_group(group) for group in groups(verdicts)])
+    return _job(verdicts, [_of_group(group) for group in groups(verdicts)])
 
 
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
     "text": text,
     "json": as_json,
-    "junit": lambda verdicts: junit(_by_run(verdicts)),
+    "junit": lambda verdicts: junit(_job(verdicts, list(map(_case, each_missing(verdicts))))),
     "github": lambda verdicts: github(_by_scenario(verdicts)),
     "sarif": sarif,
     "markdown": lambda verdicts: markdown(

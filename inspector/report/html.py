@@ -34,6 +34,8 @@ from inspector.report.findings import (
 from inspector.report.formats import summary
 from inspector.report.picture import picture, require
 from inspector.verdict import Finding, Verdict
+from noiseclassifier import Event
+from noisemodel import Block
 from noisemodel.files import replacing
 from noisemodel.noise import REFERENCE_POWER, decibel, vibrating_pieces
 from noisemodel.types import Array
@@ -216,35 +218,27 @@ def facts(analysis: Analysis) -> Table:
 
 def found(analysis: Analysis) -> Iterator[Table]:
     """List findings and annotated blocks, those that there are."""
-    remark = note(analysis)
+    remark, times = note(analysis), ("class", "from [s]", "to [s]")
     if analysis.findings:
-        findings = [
-            (
-                f"{spoken(event.label)}{event.novelty}",
-                f"{event.start:.2f}",
-                f"{event.stop:.2f}",
-                f"{event.score:.2f}",
-                *localised(analysis, event),
-                *([str(event.evidence)] if isinstance(event, Finding) else []),
-            )
-            for event in analysis.findings
-        ]
-        evidence = ("evidence",) if isinstance(analysis.findings[0], Finding) else ()
-        head = ("class", "from [s]", "to [s]", "score", *LOCALISATION, *evidence)
+        findings = []
+        for event in analysis.findings:
+            evidence = [str(event.evidence)] if isinstance(event, Finding) else []
+            cells = (*_span(event), f"{event.score:.2f}", *localised(analysis, event), *evidence)
+            findings.append((f"{spoken(event.label)}{event.novelty}", *cells))
+        beside = ("evidence",) if isinstance(analysis.findings[0], Finding) else ()
+        head = (*times, "score", *LOCALISATION, *beside)
         yield Table("Findings", head, findings, (1, 2, 3), remark)
     if analysis.run.blocks:
         annotated = [
-            (
-                spoken(block.label),
-                f"{block.start:.2f}",
-                f"{block.stop:.2f}",
-                matched(analysis, block),
-                *localised(analysis, block),
-            )
-            for block in analysis.run.blocks
+            (spoken(each.label), *_span(each), matched(analysis, each), *localised(analysis, each))
+            for each in analysis.run.blocks
         ]
-        head = ("class", "from [s]", "to [s]", "found", *LOCALISATION)
+        head = (*times, "found", *LOCALISATION)
         yield Table("Annotated", head, annotated, (1, 2), "" if analysis.findings else remark)
+
+
+def _span(of: Event | Block) -> tuple[str, str]:
+    return f"{of.start:.2f}", f"{of.stop:.2f}"
 
 
 def parts(analysis: Analysis) -> Iterator[Table]:
@@ -345,8 +339,6 @@ section img { background: #fff; border-radius: .2rem; }
 
 def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, folder: Path) -> Path:
     """Draw a run over time into the folder; the picture is named after the verdict's file."""
-    from inspector.report.picture import picture
-
     path = verdict.path
     if beside is not None:
         analysis = seen(analysis, verdict)
@@ -455,7 +447,7 @@ def _add_timeline(cell: ET.Element, verdict: Verdict) -> None:
     drawn = ET.SubElement(cell, "svg", box)
     sentences = [*failing(verdict), *excused(verdict)]
     told = f"{verdict.duration:.2f} s: {'; '.join(sentences) or 'no finding'}"
-    ET.SubElement(drawn, "title").text = told
+    add_text(drawn, "title", told)
     scale = WIDTH / verdict.duration
     spans = [
         (event.start, event.stop, "" if event.fails else "excused", event.label)
