@@ -101,12 +101,8 @@ def files(tmp_path_factory):
     for number in range(1, 11):
         good = smooth(run, np.random.default_rng(number))
         side = number > 5
-        for place in (
-            "",
-            f"{('before', 'after')[side]}/",
-            f"policy-{'ab'[side]}/",
-            "episodes/",
-        ):
+        sides = f"{('before', 'after')[side]}/", f"policy-{'ab'[side]}/"
+        for place in ("", *sides, "episodes/"):
             save(good, folder / f"{place}{'pick-' if place else 'good'}{number}")
     for name, own in {"measured": kinds[:2], "desired": kinds[2:], "log": kinds}.items():
         table = np.column_stack((run.time, *(signals[kind] for kind in own)))
@@ -133,15 +129,8 @@ def smooth(run, random):
     phase = 0.9 * run.time[:, None] + random.uniform(0, 6, len(run.joint_names))
     desired, noise = 0.5 * np.sin(phase), random.normal(0.0, 0.003, run.velocity.shape)
     position = -0.55 * np.cos(phase)
-    return replace(
-        run,
-        velocity=desired + noise,
-        velocity_desired=desired,
-        position=position,
-        blocks=(),
-        stages={},
-        meta={},
-    )
+    signals = {"velocity": desired + noise, "velocity_desired": desired, "position": position}
+    return replace(run, **signals, blocks=(), stages={}, meta={})
 
 
 @pytest.fixture

@@ -33,11 +33,8 @@ def job(tmp_path):
 
     def run(*command, **variables):
         path = f"{tmp_path / 'bin'}{os.pathsep}{os.environ['PATH']}"
-        env = (
-            os.environ
-            | {"PATH": path, "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'models'}"}
-            | variables
-        )
+        code = f"{ROOT}{os.pathsep}{ROOT / 'models'}"
+        env = os.environ | {"PATH": path, "PYTHONPATH": code} | variables
         return subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
 
     run.folder = tmp_path
@@ -67,15 +64,8 @@ def bash(script):
 def check(job, **inputs):
     """Run the step of the action that checks; outputs by name besides."""
     (job.folder / "temp").mkdir(exist_ok=True)
-    variables = {
-        "RUNS": "logs",
-        "OPTIONS": "",
-        "REPORT": "noise-report",
-        "DIFF": "",
-        "REFERENCE": "",
-        "ACCEPT": "",
-        "NAME": "noise",
-    }
+    variables = {"RUNS": "logs", "REPORT": "noise-report", "NAME": "noise"}
+    variables |= dict.fromkeys(("OPTIONS", "DIFF", "REFERENCE", "ACCEPT"), "")
     files = {"RUNNER_TEMP": "temp", "GITHUB_STEP_SUMMARY": "summary.md", "GITHUB_OUTPUT": "outputs"}
     (job.folder / "outputs").write_text("")
     done = job(*bash(steps()["Check"]["run"]), **(variables | inputs), **files)
@@ -114,12 +104,8 @@ def test_the_action_takes_names_with_spaces_and_nothing_that_is_typed_is_a_comma
     assert not (job.folder / "pwned").exists()
     for hostile in ("--help", "--model=/etc/passwd"):  # are names of runs, not options
         assert check(job, RUNS=hostile)[0].returncode == 3
-    for inputs in (
-        {"RUNS": "'logs"},
-        {"OPTIONS": "'--no-reference"},
-        {"NAME": "a b"},
-        {"NAME": "../x"},
-    ):
+    wrong = {"RUNS": "'logs"}, {"OPTIONS": "'--no-reference"}, {"NAME": "a b"}, {"NAME": "../x"}
+    for inputs in wrong:
         done, outputs = check(job, **inputs)
         assert (done.returncode, outputs) == (2, "")
         assert done.stdout.startswith("::error::")
@@ -302,18 +288,14 @@ def test_runs_are_accepted_changed_shown_and_accepted_after_review(job):
     assert "9 runs: 9 ok" in (repository.folder / "comment" / "body.md").read_text()
 
 
-def test_the_workflow_uses_inputs_that_the_action_has():
+def test_the_workflow_uses_inputs_of_the_action_and_only_accepting_writes_to_the_repository():
     workflow = read("examples/ci/github.yml")
-    for each in workflow["jobs"].values():
-        (used,) = [step for step in each["steps"] if "with" in step]
-        assert set(used["with"]) <= set(read("action.yml")["inputs"])
     assert len((ROOT / "examples/ci/github.yml").read_text().splitlines()) <= 15
-
-
-def test_only_the_job_that_accepts_may_write_to_the_repository():
-    workflow = read("examples/ci/github.yml")
     assert workflow["permissions"]["contents"] == "read"
     jobs = workflow["jobs"]
+    for each in jobs.values():
+        (used,) = [step for step in each["steps"] if "with" in step]
+        assert set(used["with"]) <= set(read("action.yml")["inputs"])
     may = {name: each.get("permissions") for name, each in jobs.items()}
     assert may == {"noise": None, "accept": {"contents": "write"}}
     known = {"inputs": {}, "github.event_name": "pull_request"}

@@ -227,12 +227,7 @@ def test_json_has_the_localisation_of_findings_that_were_localised():
 
 def test_junit_counts_runs_and_states_reasons():
     suite = ET.fromstring(junit([QUIET, LOUD, SLOW, BROKEN])).find("testsuite")
-    assert {key: suite.get(key) for key in ("tests", "failures", "errors", "skipped")} == {
-        "tests": "4",
-        "failures": "1",
-        "errors": "1",
-        "skipped": "1",
-    }
+    assert [suite.get(key) for key in ("tests", "failures", "errors", "skipped")] == list("4111")
     failure = suite.find("testcase[@name='loud.npz']/failure")
     both = "impact from 1.00 s to 1.50 s; oscillations from 2.00 s to 3.00 s, out of distribution"
     assert failure.get("message") == both
@@ -257,6 +252,7 @@ def test_ignored_unknown_frames_are_stated_in_every_format(write, verdict):
     ignoring = replace(verdict, unknown=Unknown.IGNORE, message="Unknown frames are ignored.")
     assert "ignore" in write([ignoring])
     assert "ignore" not in write([verdict])
+    assert isinstance(write([]), str)
 
 
 def test_junit_has_one_case_with_time_type_and_picture_for_each_run():
@@ -277,10 +273,8 @@ def test_junit_has_one_case_with_time_type_and_picture_for_each_run():
 
 def test_ignored_bad_input_is_skipped_and_a_warning():
     ignored = replace(BROKEN, ignored=True)
-    assert (
-        ET.fromstring(junit([ignored])).find(".//skipped").get("message")
-        == "not a run file: 100%\nbad"
-    )
+    skipped = ET.fromstring(junit([ignored])).find(".//skipped")
+    assert skipped.get("message") == "not a run file: 100%\nbad"
     assert github([ignored]).startswith("::warning file=broken")
     assert "1 of the bad input ignored" in text([ignored, QUIET])
 
@@ -323,18 +317,15 @@ def test_sarif_has_a_result_for_each_finding_that_fails_its_run():
     assert log["version"] == "2.1.0"
     (run,) = log["runs"]
     results = run["results"]
-    assert [each["ruleId"] for each in results] == ["impact", "oscillations", "missing-impact"]
-    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == [
-        "impact", "oscillations", "missing-impact",
-    ]  # fmt: skip
+    rules = ["impact", "oscillations", "missing-impact"]
+    assert [each["ruleId"] for each in results] == rules
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == rules
     for result in results:
         assert result["message"]["text"]
         (location,) = result["locations"]
-        assert location["physicalLocation"]["artifactLocation"]["uri"] in (
-            "loud.npz",
-            "lacking.npz",
-        )
-        assert location["physicalLocation"]["region"]["startLine"] == 1
+        place = location["physicalLocation"]
+        assert place["artifactLocation"]["uri"] in ("loud.npz", "lacking.npz")
+        assert place["region"]["startLine"] == 1
     prints = {each["partialFingerprints"]["primaryLocationLineHash"] for each in results}
     assert len(prints) == len(results)
     (invocation,) = run["invocations"]
@@ -344,20 +335,19 @@ def test_sarif_has_a_result_for_each_finding_that_fails_its_run():
     assert run["properties"]["counts"]["findings"]["allowed"] == 1
 
 
-def test_sarif_names_files_by_addresses():
+def test_sarif_names_files_by_addresses_and_keeps_fingerprints_when_findings_move():
     odd = replace(LOUD, path=Path("a folder/50%.npz"))
     far = replace(LOUD, path=Path("/elsewhere/run.npz"))
-    results = json.loads(sarif([odd, far]))["runs"][0]["results"]
-    places = [each["locations"][0]["physicalLocation"]["artifactLocation"] for each in results]
-    assert {place["uri"] for place in places} == {
+    moved = replace(far, events=(replace(BLOW, start=1.01), RATTLE))
+    first, *_, last = json.loads(sarif([odd, far]))["runs"][0]["results"]
+    places = [
+        each["locations"][0]["physicalLocation"]["artifactLocation"] for each in (first, last)
+    ]
+    assert [place["uri"] for place in places] == [
         "a%20folder/50%25.npz", "file:///elsewhere/run.npz",
-    }  # fmt: skip
-
-
-def test_a_fingerprint_stays_when_a_finding_moves():
-    moved = replace(LOUD, events=(replace(BLOW, start=1.01), RATTLE))
-    first, second = (json.loads(sarif([each]))["runs"][0]["results"][0] for each in (LOUD, moved))
-    assert first["partialFingerprints"] == second["partialFingerprints"]
+    ]  # fmt: skip
+    before, after = (json.loads(sarif([e]))["runs"][0]["results"][0] for e in (far, moved))
+    assert before["partialFingerprints"] == after["partialFingerprints"]
 
 
 def test_scenarios_without_a_log_have_a_fingerprint_each():
@@ -408,8 +398,3 @@ def test_markdown_keeps_what_a_run_is_named_in_its_cell():
     odd = replace(LACKING, path=Path("a|b`c<i>.npz"), missing=(Missing("x|y<b>"),))
     row = next(line for line in markdown([odd]).splitlines() if line.startswith("| `"))
     assert row == "| `a\\|b'c<i>.npz` | FAIL | missing: x\\|y&lt;b> |"
-
-
-def test_an_empty_list_of_verdicts_is_valid_in_every_format():
-    for write in FORMATS.values():
-        assert isinstance(write([]), str)

@@ -80,9 +80,6 @@ def test_what_is_so_of_all_runs_is_said_once():
     found = page([replace(each, message="Nothing above 440 Hz.") for each in LONG])
     assert found.count("Nothing above 440 Hz.") == 1
     assert found.count("model general") == 1
-
-
-def test_an_empty_page_is_a_page():
     assert "0 runs: none" in page([])
 
 

@@ -43,17 +43,15 @@ def test_settings_hold_for_commands_and_the_command_line_wins(project):
     assert "/log.csv   " in out
     assert "elbow" in err
     status, out, _ = call("config")
-    assert (status, out.splitlines()) == (
-        0,
-        [
-            f"{project}/pyproject.toml:",
-            '  map = ["velocity.elbow=elbow"]',
-            "  rate = 90.0",
-            '  audit.format = "json"',
-            '  classify.runs = ["log.csv"]',
-            "  classify.min-duration = 0.5",
-        ],
-    )
+    assert status == 0
+    assert out.splitlines() == [
+        f"{project}/pyproject.toml:",
+        '  map = ["velocity.elbow=elbow"]',
+        "  rate = 90.0",
+        '  audit.format = "json"',
+        '  classify.runs = ["log.csv"]',
+        "  classify.min-duration = 0.5",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -200,20 +198,16 @@ def test_results_that_a_rebase_replaced_are_left_out_and_told(tmp_path):
         os.utime(path, (time, time))
     status, out, err = call("history", tmp_path)
     assert (status, err) == (0, "")
-    assert out.splitlines()[:2] == [
-        "2 commits, new to old",
-        "1-old.json: replaced by 1-new.json",
-    ]
+    told = ["2 commits, new to old", "1-old.json: replaced by 1-new.json"]
+    assert out.splitlines()[:2] == told
 
 
 def test_results_without_a_number_all_count(tmp_path):
-    for name in ("2024-01-05", "2024-01-06", "nightly-3f2a", "nightly-9c1b", "-3", "last"):
+    names = {"2024-01-05", "2024-01-06", "nightly-3f2a", "nightly-9c1b", "-3", "last"}
+    for name in names:
         results(tmp_path / f"{name}.json", Verdict(Path("a.npz"), Status.OK))
     found = history.read(tmp_path)
-    assert not found.notes
-    assert set(found.commits) == {
-        "2024-01-05", "2024-01-06", "nightly-3f2a", "nightly-9c1b", "-3", "last",
-    }  # fmt: skip
+    assert (found.notes, set(found.commits)) == ((), names)
 
 
 def test_a_folder_without_results_is_one_line(tmp_path):
