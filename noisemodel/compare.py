@@ -30,20 +30,18 @@ if TYPE_CHECKING:
 
 SIMPLIFIED = "simplified"
 
+# The kinds that are compared unless others are named.
 COMPARED = (SIMPLIFIED, "C", "paper", "mean", "rms", "normal")
-"""The kinds that are compared unless others are named."""
-
 TERMS = ("A", "B", "C")  # the terms of the paper's mean speed
 REFERENCES = ("normal", "mean")  # the others are compared with the first of these, if it is there
 
+# Parts of the spectrum for which distances are given one by one, in [Hz].
 BANDS = {
     "0-20 Hz": (0.0, 20.0),
     "20-100 Hz": (20.0, 100.0),
     "100-500 Hz": (100.0, 500.0),
     "500 Hz up": (500.0, np.inf),
 }
-"""Parts of the spectrum for which distances are given one by one, in [Hz]."""
-
 ENVELOPE = 0.02  # stretch of time whose root mean square is one value of the envelope, in [s]
 WINDOW = 0.1024  # length of a spectrum's Hann window, in [s]: the paper's 1024 samples at 10 kHz
 DYNAMICS_DB = 100.0  # what lies further below a signal's loudest line counts as this far below
@@ -63,11 +61,10 @@ SHAKES = {"shake-near": (1.0, 1.8), "shake-far": (2.6, 3.4)}
 JERK = (4.6, 4.8)
 JERK_DECAY = 0.03  # time constant of the decay of the jump, in [s]
 
+# A robot, its listed name or the path of its URDF or MJCF; or a run, or the path of a run file.
 Source: TypeAlias = Robot | Run | Path | str
-"""A robot, its listed name or the path of its URDF or MJCF; or a run, or the path of a run file."""
-
+# Takes an iterable and its length (``total``), and yields its items, as tqdm does.
 Progress: TypeAlias = Callable[..., "Iterable[Comparison | LeftOut]"]
-"""Takes an iterable and its length (``total``), and yields its items, as tqdm does."""
 
 
 # The results, and how they print.

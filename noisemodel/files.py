@@ -21,20 +21,19 @@ Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 EXISTS = "{}: exists already; choose another name, or overwrite it (--overwrite)"
 
+# Joints of a robot or a run, columns of a CSV log, triangles of a mesh, bodies and geoms of an
+# MJCF.
 LIMITS = MappingProxyType(
     {"joints": 1000, "columns": 10_000, "triangles": 2_000_000, "bodies": 20_000}
 )
-"""Joints of a robot or a run, columns of a CSV log, triangles of a mesh, bodies and geoms of an
-MJCF."""
-
 PREFIX = "NOISE_LIMIT_"  # of environment variables with other limits: NOISE_LIMIT_JOINTS=2000
 MAX_BYTES = 64 * 2**20  # most bytes of a URDF or an MJCF
 MAX_DEPTH = 500  # most elements of XML within each other, as in MuJoCo; parsers that recurse crash
 MAX_ATTRIBUTES = 200  # most attributes of an element; Pinocchio compares each with all others
 DIGEST = 32  # bytes after a cached archive that show that it is whole, and made for its key
 
+# What the running command reads; None outside of one, where programs decide for themselves.
 _read: dict[Path, None] | None = None
-"""What the running command reads; None outside of one, where programs decide for themselves."""
 
 
 @contextmanager

@@ -20,12 +20,10 @@ import numpy as np
 from noisemodel.files import Arrays, beyond, cached, limit, parsed_xml
 from noisemodel.types import Array, Indices, MeshError
 
+# Points, shape (points, 3), and triangles as indices of points, shape (triangles, 3).
 Mesh: TypeAlias = tuple[Array, Indices]
-"""Points, shape (points, 3), and triangles as indices of points, shape (triangles, 3)."""
-
+# Elements by the address that others call them: # and their id.
 Named: TypeAlias = Mapping[str, ET.Element]
-"""Elements by the address that others call them: # and their id."""
-
 VERSION = 1  # of the code that reads triangles; to be raised with every change of its results
 TRIANGLE_BYTES = 134  # most bytes of a file by triangle: more than a binary STL has, 256 MiB in all
 TAIL = 1024  # bytes at the end of a file among which its closing word is

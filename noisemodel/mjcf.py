@@ -30,10 +30,9 @@ from noisemodel.files import beyond, limit, read_xml
 from noisemodel.types import Array, RobotError
 from noisemodel.urdf import HINT, LinkShape, Mimic, box, capsule, cylinder, sphere
 
+# By index of a geom that is a mesh of a file: the mesh's address relative to the model's folder,
+# and from the file's numbers to the geom's axes a matrix, shape (3, 3), and a shift, shape (3,).
 Meshes: TypeAlias = dict[int, tuple[str, Array, Array]]
-"""By index of a geom that is a mesh of a file: the mesh's address relative to the model's folder,
-and from the file's numbers to the geom's axes a matrix, shape (3, 3), and a shift, shape (3,)."""
-
 SUFFIXES = (".xml", ".mjcf")
 
 DRAWN_GROUPS = 3  # MuJoCo draws groups 0, 1 and 2 unless told otherwise; collision shapes are in 3

@@ -25,8 +25,7 @@ SOUND_SPEED = 343.2  # in air at 20 °C, in [m/s]
 REFERENCE_POWER = 1e-12  # 0 dB of sound power, in [W]
 CHUNK = 4096  # samples worked on at once: few enough for the cache, with little overhead of Python
 
-KINDS = ("paper", "A", "B", "C", "mean", "rms", "normal")
-"""The kinds of mean speed."""
+KINDS = ("paper", "A", "B", "C", "mean", "rms", "normal")  # the kinds of mean speed
 QUADRATIC = ("rms", "normal")  # their squares are quadratic forms of a link's twist
 
 BLOCK_OF_POINTS = 256  # samples of all points of a link that fit into the cache

@@ -25,9 +25,8 @@ from noisemodel.types import NoiseModelError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+# How many items to work on at once in this machine, or the address of a Dask scheduler.
 Jobs: TypeAlias = int | str
-"""How many items to work on at once in this machine, or the address of a Dask scheduler."""
-
 FRESH = 3.0  # work in [s] below which two fresh interpreters are not faster than this one alone
 POLL = 0.5  # time after which a worker looks whether its parent is still there, in [s]
 REACHED, STAFFED = 10.0, 60.0  # in [s]: until a Dask scheduler answers, and until it has a worker

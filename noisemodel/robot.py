@@ -34,9 +34,9 @@ from noisemodel.urdf import Mimic
 MENAGERIE = "menagerie/"  # the names of MuJoCo Menagerie's robots begin so: menagerie/unitree_go2
 PACKAGE_ROOT = "NOISE_PACKAGE_ROOT"  # environment variable: a further folder of meshes
 PACKAGE = re.compile(rb"package:///?([^/\"'<>\s]+)/")  # the package in the address of a mesh
+# Folders beside a URDF's or MJCF's own that belong to the robot if no package says so.
 BESIDE = ("meshes", "visual", "collision", "assets")
-"""Folders beside a URDF's or MJCF's own that belong to the robot if no package says so."""
-
+# Pinocchio's joint types by what they do; a URDF has no others.
 KINDS = {
     r"R[XYZ]|RevoluteUnaligned": "revolute",
     r"RUB[XYZ]|RevoluteUnboundedUnaligned": "continuous",
@@ -44,8 +44,6 @@ KINDS = {
     "FreeFlyer": "floating",
     "Planar": "planar",
 }
-"""Pinocchio's joint types by what they do; a URDF has no others."""
-
 SINGLE = ("revolute", "continuous", "prismatic")  # the types of joints that a run can name
 CHUNK = 4096  # samples worked on at once: few enough for the cache, with little overhead of Python
 
@@ -61,10 +59,10 @@ class Listed:
 _tables = tomllib.loads(Path(__file__).with_name("robots.toml").read_text())
 _paths = {(name, base): path for base, table in _tables.items() for name, path in table.items()}
 
+# The listed robots by name.
 ROBOTS: Mapping[str, Listed] = MappingProxyType(
     {name: Listed(path, base == "floating") for (name, base), path in sorted(_paths.items())}
 )
-"""The listed robots by name."""
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,11 @@ from noisemodel.files import beyond, limit
 from noisemodel.runfile import OnDemand, either_way, one_line, pieces, rows_at_once
 from noisemodel.types import Array, Mask, Real, RunError, RunFileError
 
+# The fields of a run that hold a row or a value for each sample; ``stages`` hold such fields.
 SAMPLED = (
     *("time", "velocity", "position", "velocity_desired", "position_desired"),
     *("effort", "valid", "base_pose", "base_velocity"),
 )
-"""The fields of a run that hold a row or a value for each sample; ``stages`` hold such fields."""
 
 # The fields of a run that a classifier takes signals of.
 MOTION = ("velocity", "velocity_desired", "effort", "base_velocity")

@@ -29,6 +29,7 @@ from noisemodel.types import Array, OutputError, RunFileError, hint
 FORMAT = "noise-run/1"
 STAGE = "stage_"
 
+# The arrays of a run file: the kind of number or text that each holds, and its axes.
 ARRAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time": ("f", ("samples",)),
     "velocity": ("f", ("samples", "joints")),
@@ -48,7 +49,6 @@ ARRAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "format": ("U", ()),
     "meta": ("U", ()),
 }
-"""The arrays of a run file: the kind of number or text that each holds, and its axes."""
 STAGE_ARRAY = ("f", ("samples", "joints"))
 KIND_WORDS = {"f": "numbers", "b": "booleans", "U": "text"}
 
@@ -61,13 +61,12 @@ MAX_UNPACKED = "NOISE_MAX_UNPACKED"  # environment variable with another limit t
 UNPACKED = 512 * 2**20  # bytes that any compressed file may unpack to
 RATIO = 20  # a large file may unpack to so many times its size; the numbers of logs hardly shrink
 
+# What zipfile and NumPy raise on archives that are broken, encrypted, of a kind that zipfile does
+# not read, or state a wrong size.
 DAMAGE = (
     *(EOFError, MemoryError, RuntimeError, UnicodeDecodeError),
     *(struct.error, zlib.error, lzma.LZMAError),
 )
-"""What zipfile and NumPy raise on archives that are broken, encrypted, of a kind that zipfile does
-not read, or state a wrong size."""
-
 TEXT = 64 * 2**20  # most bytes of a text that is read at once
 PIECE = 2**20  # bytes that are unpacked at once
 # NumPy's; zipfile has others, which unpack a few bytes to gigabytes at once.

@@ -16,6 +16,7 @@ from noisemodel.robot import Robot
 from noisemodel.types import Array, GeometryError, Indices, MeshError
 from noisemodel.urdf import LinkShape, find_mesh, shapes_in
 
+# The geometries, and the shapes of the URDF or MJCF that each takes: the first that a link has.
 GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "visual": ("visual",),
@@ -24,8 +25,6 @@ GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "auto": ("visual", "collision"),
     }
 )
-"""The geometries, and the shapes of the URDF or MJCF that each takes: the first that a link has."""
-
 VERSION = "link-3"  # changes with what is computed here, so that the cache gives nothing older
 HALVINGS = 8  # 1024 points for each link: mean speeds are right to about 1e-3, whatever the motion
 FINENESS = 2.0  # panels of the fine points go this many times into the surface's thickness

@@ -266,6 +266,7 @@ def _on_sphere(points: Array) -> Array:
     return np.asarray(points / np.linalg.norm(points, axis=-1, keepdims=True))
 
 
+# The simple shapes: the attributes with their sizes, how many these are, and what draws them.
 SOLIDS: Mapping[str, tuple[tuple[str, ...], int, Callable[..., Array]]] = MappingProxyType(
     {
         "box": (("size",), 3, box),
@@ -274,7 +275,6 @@ SOLIDS: Mapping[str, tuple[tuple[str, ...], int, Callable[..., Array]]] = Mappin
         "sphere": (("radius",), 1, sphere),
     }
 )
-"""The simple shapes: the attributes with their sizes, how many these are, and what draws them."""
 
 
 # Where the mesh is that a URDF names: inside of the robot's own folders, or nowhere.

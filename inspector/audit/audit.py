@@ -41,11 +41,10 @@ from noisemodel.run import part
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
 
+# The paper's band of oscillations (table of scenarios, 11 to 19), in [Hz].
 OSCILLATIONS = (20.0, 1000.0)
-"""The paper's band of oscillations (table of scenarios, 11 to 19), in [Hz]."""
-
+# What the reason begins with where a class is observable in all of its band, if it is loud.
 MASKED = "quantisation masks amplitudes"
-"""What the reason begins with where a class is observable in all of its band, if it is loud."""
 
 
 class Observability(StrEnum):
@@ -58,24 +57,16 @@ class Observability(StrEnum):
 
 @dataclass(frozen=True)
 class ClassObservability:
-    """Observability of one failure class.
-
-    Attributes:
-        label: The class.
-        observability: The degree.
-        low: Lowest frequency at which it is observable, in [Hz]; 0 if there is none.
-        high: Highest frequency at which it is observable, in [Hz]; 0 if there is none.
-        needed: Sample rate that makes all of it observable, or any of it, in [Hz]; None where a
-            higher one would not help.
-        reason: Cause of the limit, a clause; empty for what is observable.
-    """
+    """Observability of one failure class."""
 
     label: str
     observability: Observability
-    low: float = 0.0
-    high: float = 0.0
+    low: float = 0.0  # lowest frequency at which it is observable, in [Hz]; 0 if there is none
+    high: float = 0.0  # highest frequency at which it is observable, in [Hz]; 0 if there is none
+    # Sample rate that makes all of it observable, or any of it, in [Hz]; None where a higher one
+    # would not help.
     needed: float | None = None
-    reason: str = ""
+    reason: str = ""  # cause of the limit, a clause; empty for what is observable
 
     def __str__(self) -> str:
         """Format as a line."""
@@ -199,17 +190,11 @@ def _rate_for(frequency: float, library: Library) -> float:
 
 @dataclass(frozen=True)
 class Gaps:
-    """Gaps of a run.
-
-    Attributes:
-        count: Number of gaps.
-        total: Their total duration, in [s].
-        longest: Duration of the longest, in [s].
-    """
+    """Gaps of a run."""
 
     count: int = 0
-    total: float = 0.0
-    longest: float = 0.0
+    total: float = 0.0  # their total duration, in [s]
+    longest: float = 0.0  # duration of the longest, in [s]
 
     def __str__(self) -> str:
         """Format as a clause."""
@@ -221,29 +206,19 @@ class Gaps:
 
 @dataclass(frozen=True)
 class Audit:
-    """Rate, gaps, bandwidth and observable classes of a run.
+    """Rate, gaps, bandwidth and observable classes of a run."""
 
-    Attributes:
-        rate: Sample rate, in [Hz].
-        duration: In [s].
-        joints: Number of joints.
-        jitter: Deviation of the stamps' steps before they were made uniform, root mean square and
-            largest, in [s]; None if the run's ``meta`` has none.
-        gaps: Its gaps.
-        bandwidth: Its bandwidth.
-        warnings: Signs of wrong units, copies, zero-order hold or filters; a clause each.
-        notes: Differentiation, quantisation, missing signals; a clause each.
-        classes: Observability of each failure class.
-    """
-
-    rate: float
-    duration: float
+    rate: float  # sample rate, in [Hz]
+    duration: float  # in [s]
     joints: int
+    # Deviation of the stamps' steps before they were made uniform, root mean square and largest, in
+    # [s]; None if the run's ``meta`` has none.
     jitter: tuple[float, float] | None
     gaps: Gaps
     bandwidth: Bandwidth
+    # Signs of wrong units, copies, zero-order hold or filters; a clause each.
     warnings: tuple[str, ...]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # differentiation, quantisation, missing signals; a clause each
     classes: tuple[ClassObservability, ...]
 
     @property
@@ -342,8 +317,7 @@ def gaps_of(run: Run) -> Gaps:
     return Gaps(len(lengths), float(lengths.sum()), float(lengths.max()))
 
 
-LONGEST = 60_000
-"""Samples of an excerpt: a minute at 1 kHz."""
+LONGEST = 60_000  # samples of an excerpt: a minute at 1 kHz
 
 
 def excerpt(run: Run) -> Run:
@@ -368,8 +342,7 @@ def excerpt(run: Run) -> Run:
 
 # As text and JSON
 
-ROUNDING = 1e-9
-"""Deviation of a stamp that is rounding, in [s]: stamps have nanoseconds at best."""
+ROUNDING = 1e-9  # deviation of a stamp that is rounding, in [s]: stamps have nanoseconds at best
 
 
 def text(name: str, audit: Audit, assumed: str = "") -> str:
@@ -479,14 +452,10 @@ def _plain(name: str, audit: Audit) -> dict[str, Any]:
 class Audits(NamedTuple):
     """Audits of many files, each by the name of its run."""
 
-    found: dict[str, Audit]
-    """Of what could be read."""
-    failed: dict[str, str]
-    """Why a file cannot be read."""
-    assumed: dict[str, str]
-    """What was assumed when a log was read, in a line; empty of a run file."""
-    others: str
-    """Which files of folders were not taken for logs; empty if there are none."""
+    found: dict[str, Audit]  # of what could be read
+    failed: dict[str, str]  # why a file cannot be read
+    assumed: dict[str, str]  # what was assumed when a log was read, in a line; empty of a run file
+    others: str  # which files of folders were not taken for logs; empty if there are none
 
 
 def audit_all(paths: Sequence[Path], library: Library, reading: Reading | None = None) -> Audits:

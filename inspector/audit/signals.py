@@ -16,32 +16,20 @@ from noisemodel.types import Array, Mask, Real
 
 # Spectrum
 
+# Shortest segment that is transformed: the paper's frame (Sec. III-A), in [s].
 SEGMENT = 0.4
-"""Shortest segment that is transformed: the paper's frame (Sec. III-A), in [s]."""
-
-FEWEST_SAMPLES = 128
-"""Fewest samples of a segment, so that slow logs have a spectrum too."""
-
-MOST = 256
-"""Most segments that are averaged, evenly spread, which limits the cost of long logs."""
-
-PER_OCTAVE = 4
-"""Bands of a smoothed spectrum in an octave."""
+FEWEST_SAMPLES = 128  # fewest samples of a segment, so that slow logs have a spectrum too
+MOST = 256  # most segments that are averaged, evenly spread, which limits the cost of long logs
+PER_OCTAVE = 4  # bands of a smoothed spectrum in an octave
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """A one-sided power spectral density.
+    """A one-sided power spectral density."""
 
-    Attributes:
-        frequency: Above 0, rising, shape (frequency,), in [Hz].
-        density: Of each joint, shape (frequency, joints), in [(rad/s)²/Hz].
-        rate: Of the samples, in [Hz].
-    """
-
-    frequency: Array
-    density: Array
-    rate: float
+    frequency: Array  # above 0, rising, shape (frequency,), in [Hz]
+    density: Array  # of each joint, shape (frequency, joints), in [(rad/s)²/Hz]
+    rate: float  # of the samples, in [Hz]
 
     @property
     def total(self) -> Array:
@@ -107,27 +95,17 @@ def _square(amplitude: NDArray[np.complex128]) -> Array:
 
 # Velocities that were differentiated
 
-EXACT = 1e-12
-"""Largest deviation of a difference of positions, as a share of the largest velocity."""
-
-COMPARED = 1000
-"""Samples that are compared, evenly spread, or a few more."""
-
-COARSE = 1e-4
-"""Largest share of floating-point rounding in a velocity that is compared."""
+EXACT = 1e-12  # largest deviation of a difference of positions, as a share of the largest velocity
+COMPARED = 1000  # samples that are compared, evenly spread, or a few more
+COARSE = 1e-4  # largest share of floating-point rounding in a velocity that is compared
 
 
 @dataclass(frozen=True)
 class Differentiator:
-    """Method by which velocities were computed from positions.
-
-    Attributes:
-        name: The method.
-        weights: Of the positions before and after, evenly about the middle, times the rate;
-            shape (taps,).
-    """
+    """Method by which velocities were computed from positions."""
 
     name: str
+    # Of the positions before and after, evenly about the middle, times the rate; shape (taps,).
     weights: tuple[float, ...]
 
     def response(self, frequency: Array, rate: float) -> Array:
@@ -210,14 +188,9 @@ def _same(difference: Array, tolerance: float) -> bool:
 
 # Quantisation
 
-MOST_SAMPLES = 20_000
-"""Most samples of a signal that are used, evenly spread."""
-
-LEVELS = 8
-"""Fewest different values of a signal that have a step."""
-
-WHOLE = 0.02
-"""Largest deviation of the distance of two values from a whole number of steps."""
+MOST_SAMPLES = 20_000  # most samples of a signal that are used, evenly spread
+LEVELS = 8  # fewest different values of a signal that have a step
+WHOLE = 0.02  # largest deviation of the distance of two values from a whole number of steps
 
 
 def step_of(values: Real) -> float:
@@ -277,38 +250,29 @@ def floor_frequency(spectrum: Spectrum, floor: Array) -> float:
 
 # Bandwidth
 
+# Least amplitude in one window of the shipped models: no encoder has less noise, in [rad/s].
 ENCODER_NOISE = LogBands().floor
-"""Least amplitude in one window of the shipped models: no encoder has less noise, in [rad/s]."""
-
-RESOLUTION = 1.0 / LogBands().window
-"""Frequency resolution of one window of those models, in [Hz]."""
+RESOLUTION = 1.0 / LogBands().window  # frequency resolution of one window of those models, in [Hz]
 
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """The frequencies that a log holds.
+    """The frequencies that a log holds."""
 
-    Attributes:
-        nyquist: Half the sample rate, in [Hz].
-        hold: Length of the zero-order hold of measured values, in samples; 1 without one.
-        differentiator: How velocities were computed from positions; None if they were measured.
-        corner: -3 dB frequency of a filter, in [Hz]; None without a sign of one.
-        step: Largest quantisation step, in [rad/s], or in [rad] of the positions that were
-            differentiated; 0 without one.
-        floor_from: Frequency above which the spectrum is at the quantisation floor, in [Hz]; None
-            if it stays above, or the run is too short for a spectrum.
-        floor_amplitude: Largest oscillation that quantisation masks at ``floor_from``, in [rad/s].
-        quiet_from: Frequency above which the level is below any encoder's noise, in [Hz]; None if
-            it stays above.
-    """
-
-    nyquist: float
-    hold: float = 1.0
+    nyquist: float  # half the sample rate, in [Hz]
+    hold: float = 1.0  # length of the zero-order hold of measured values, in samples; 1 without one
+    # How velocities were computed from positions; None if they were measured.
     differentiator: Differentiator | None = None
-    corner: float | None = None
+    corner: float | None = None  # -3 dB frequency of a filter, in [Hz]; None without a sign of one
+    # Largest quantisation step, in [rad/s], or in [rad] of the positions that were differentiated;
+    # 0 without one.
     step: float = 0.0
+    # Frequency above which the spectrum is at the quantisation floor, in [Hz]; None if it stays
+    # above, or the run is too short for a spectrum.
     floor_from: float | None = None
+    # Largest oscillation that quantisation masks at ``floor_from``, in [rad/s].
     floor_amplitude: float = 0.0
+    # Frequency above which the level is below any encoder's noise, in [Hz]; None if it stays above.
     quiet_from: float | None = None
 
     @property
@@ -366,19 +330,15 @@ def bandwidth(run: Run) -> Bandwidth:
     )
 
 
-FLAT = 4.5
-"""Most variation in a flat octave, less than the 6 of a first-order filter, in [dB]."""
-
+FLAT = 4.5  # most variation in a flat octave, less than the 6 of a first-order filter, in [dB]
+# Least slope of a filter: below second order's 12, above the 6 with which encoders and drives
+# attenuate white noise, in [dB] an octave.
 STEEP = 9.0
-"""Least slope of a filter: below second order's 12, above the 6 with which encoders and drives
-attenuate white noise, in [dB] an octave."""
-
+# Least attenuation of a filter within two octaves or up to the Nyquist frequency, in [dB].
 DROP = 15.0
-"""Least attenuation of a filter within two octaves or up to the Nyquist frequency, in [dB]."""
-
+# Root mean square from which an octave is vibration, not background noise: no filter ends it. The
+# threshold of the scenarios' labels, in [rad/s].
 LOUD = 0.03
-"""Root mean square from which an octave is vibration, not background noise: no filter ends it. The
-threshold of the scenarios' labels, in [rad/s]."""
 
 
 def corner(spectrum: Spectrum, floor: Array) -> float | None:
@@ -420,33 +380,22 @@ def _goes_on(level: Array, above: Mask, place: int) -> bool:
 
 # Copies, units, and placeholders
 
-FARTHEST = 10
-"""Largest lag of a copy, before or after, in samples."""
-
-EXAMINED = 1000
-"""Samples in motion that are compared, evenly spread, or a few more."""
-
-SAME = 0.99
-"""Least share of equal samples, bit for bit, among those in motion."""
+FARTHEST = 10  # largest lag of a copy, before or after, in samples
+EXAMINED = 1000  # samples in motion that are compared, evenly spread, or a few more
+SAME = 0.99  # least share of equal samples, bit for bit, among those in motion
 
 
+# Samples by which a lag is looked at first, and the share of equal ones from which it is again.
 PROBED, LIKELY = 50, 0.9
-"""Samples by which a lag is looked at first, and the share of equal ones from which it is again."""
 
 
 @dataclass(frozen=True)
 class Copy:
-    """A measured signal that equals the desired one.
+    """A measured signal that equals the desired one."""
 
-    Attributes:
-        signal: "position" or "velocity".
-        joints: Its joints.
-        lag: Samples by which the measured signal comes after the desired one.
-    """
-
-    signal: str
+    signal: str  # "position" or "velocity"
     joints: tuple[str, ...]
-    lag: int
+    lag: int  # samples by which the measured signal comes after the desired one
 
 
 def copies(run: Run) -> tuple[Copy, ...]:
@@ -490,14 +439,9 @@ def _lag(measured: Real, desired: Real) -> int | None:
     return None
 
 
-TURNS = 4 * np.pi
-"""Largest plausible position of a joint that is not continuous, in [rad]."""
-
-FAST = 100.0
-"""Largest plausible velocity of a joint, in [rad/s]."""
-
-ROUND_ENDS = (1.0, 100.0)
-"""Ends of the ranges that positions are normalised to."""
+TURNS = 4 * np.pi  # largest plausible position of a joint that is not continuous, in [rad]
+FAST = 100.0  # largest plausible velocity of a joint, in [rad/s]
+ROUND_ENDS = (1.0, 100.0)  # ends of the ranges that positions are normalised to
 
 
 def unit_warnings(run: Run) -> Iterator[str]:
@@ -538,18 +482,14 @@ def _stops_at(run: Run, end: float) -> int:
     return int(np.sum((there[1:] & there[:-1]).any(axis=0)))
 
 
+# Speed from which a joint moves, in [rad/s] or [m/s]: pushes on a standing arm peak below.
 MOVES = 0.1
-"""Speed from which a joint moves, in [rad/s] or [m/s]: pushes on a standing arm peak below."""
-MOVING_TIME = 2.0
-"""Stretch of time in which it has to move, in [s]."""
-MOVING_SHARE = 0.75
-"""Share of that time: a motion reverses now and then, a push is over sooner."""
-CHANGE = 1e-6
-"""Change of a desired position from which it changes, in [rad] or [m]."""
-AT_ONCE = 1_000_000
-"""Samples that are counted at once."""
+MOVING_TIME = 2.0  # stretch of time in which it has to move, in [s]
+MOVING_SHARE = 0.75  # share of that time: a motion reverses now and then, a push is over sooner
+CHANGE = 1e-6  # change of a desired position from which it changes, in [rad] or [m]
+AT_ONCE = 1_000_000  # samples that are counted at once
+# Most quantisation noise of a differentiated velocity, RMS in [rad/s]: faults begin there.
 FAINTEST = 0.05
-"""Most quantisation noise of a differentiated velocity, RMS in [rad/s]: faults begin there."""
 
 
 def placeholder(run: Run) -> str:

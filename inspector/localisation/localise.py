@@ -45,25 +45,19 @@ from noisemodel import Block, Run
 from noisemodel.noise import FAST, LinkNoise
 from noisemodel.types import Array, Indices, Mask, Real
 
-BIN = 0.001
-"""Time over which power is taken, in [s], or one sample if that is longer."""
+BIN = 0.001  # time over which power is taken, in [s], or one sample if that is longer
+# Time of the past mean that is subtracted, twice, in [s]: what is slower than 10 Hz is motion.
 PAST = 0.05
-"""Time of the past mean that is subtracted, twice, in [s]: what is slower than 10 Hz is motion."""
-WARM = 0.02
-"""Time after the start of the run or the end of a gap whose power is not used, in [s]."""
-SHORTEST_LEVEL = 0.005
-"""Shortest time that has a level, in [s]."""
-BEYOND = 0.05
-"""Time after the first frame that counts towards the level after an onset, in [s]."""
-INDEPENDENT = 0.02
-"""Time that counts as one independent sample, in [s]."""
+WARM = 0.02  # time after the start of the run or the end of a gap whose power is not used, in [s]
+SHORTEST_LEVEL = 0.005  # shortest time that has a level, in [s]
+BEYOND = 0.05  # time after the first frame that counts towards the level after an onset, in [s]
+INDEPENDENT = 0.02  # time that counts as one independent sample, in [s]
+# Means of the priors: from the onset to the stop of the first frame, and from the end to the stop
+# of the last frame, in hops.
 ONSET, END = 0.9, 2.0
-"""Means of the priors: from the onset to the stop of the first frame, and from the end to the stop
-of the last frame, in hops."""
-DEVIATION = 0.35
-"""Standard deviation of both, in hops."""
+DEVIATION = 0.35  # standard deviation of both, in hops
+# Share of the whole energy that is added to each side, so that silence has a logarithm.
 LEAST = 1e-6
-"""Share of the whole energy that is added to each side, so that silence has a logarithm."""
 
 
 def extent(
@@ -179,8 +173,7 @@ def _gain(power: Array, known: Mask, shortest: int) -> Array:
     return np.asarray(np.where(enough & (high > low), gain, 0.0).mean(axis=1))
 
 
-ANNOTATED = 0.1
-"""How long after the start of an annotation its failure may set in, in [s]."""
+ANNOTATED = 0.1  # how long after the start of an annotation its failure may set in, in [s]
 
 
 def localise(
@@ -212,15 +205,13 @@ def has_stages(run: Run) -> bool:
     return bool(run.stages) or run.velocity_desired is not None
 
 
+# Windows of the spectrum, in [s]: as long as the failure, between these.
 SHORTEST, LONGEST = 0.1, 0.4
-"""Windows of the spectrum, in [s]: as long as the failure, between these."""
-MOST = 16
-"""Most windows of a failure."""
+MOST = 16  # most windows of a failure
+# Percentile of the quiet stretches' spectra that is subtracted: vibration of a robot that walks
+# comes and goes.
 PERCENTILE = 90.0
-"""Percentile of the quiet stretches' spectra that is subtracted: vibration of a robot that walks
-comes and goes."""
-SHARE = 0.7
-"""Share of the excess power that lies in the band."""
+SHARE = 0.7  # share of the excess power that lies in the band
 
 
 def band(
@@ -283,13 +274,10 @@ def _narrowest(excess: Array) -> tuple[int, int]:
     return int(best), int(ends[best]) - 1
 
 
-Failure: TypeAlias = Event | Block
-"""A finding, or an annotated block."""
-
-NAMED = 3
-"""Most links that are named."""
+Failure: TypeAlias = Event | Block  # a finding, or an annotated block
+NAMED = 3  # most links that are named
+# Time after the onset of a blow or jump in which its excess power is measured, in [s].
 BEGINNING = 0.05
-"""Time after the onset of a blow or jump in which its excess power is measured, in [s]."""
 
 
 def fault_links(

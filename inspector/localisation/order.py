@@ -43,60 +43,41 @@ from noisemodel.noise import vibrating
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
-LOWEST = 10.0
-"""Lowest frequency, in [Hz]; what is slower is motion."""
-HIGHEST = 0.4
-"""Highest frequency, by the sample rate: interpolation loses 3 % of its amplitude."""
+LOWEST = 10.0  # lowest frequency, in [Hz]; what is slower is motion
+HIGHEST = 0.4  # highest frequency, by the sample rate: interpolation loses 3 % of its amplitude
+# Length of each of two moving means, in [s], of which the frequency response is 0 at 10 Hz.
 SMOOTH = 0.1
-"""Length of each of two moving means, in [s], of which the frequency response is 0 at 10 Hz."""
-SHORTEST, LONGEST = 0.8, 1.6
-"""Duration of a part, in [s]: as long as the finding, between these."""
-MOST = 16
-"""Most parts of a finding."""
-SLOWEST = 0.05
-"""A joint is at rest below this, in [rad/s]."""
+SHORTEST, LONGEST = 0.8, 1.6  # duration of a part, in [s]: as long as the finding, between these
+MOST = 16  # most parts of a finding
+SLOWEST = 0.05  # a joint is at rest below this, in [rad/s]
+# Steps of time and angle per sample, the latter where the joint is fastest. Where it is slower by
+# more than this factor, spectra over angle would alias: there it counts as at rest.
 FINER = 4
-"""Steps of time and angle per sample, the latter where the joint is fastest. Where it is
-slower by more than this factor, spectra over angle would alias: there it counts as at rest."""
-PADDED = 4
-"""Factor by which spectra are padded, so that peaks can be interpolated."""
+PADDED = 4  # factor by which spectra are padded, so that peaks can be interpolated
+# Least number of periods of an order in a piece, else it explains nothing there, and in all of
+# them, by Hann weights: 10 in a lone piece of steady motion.
 FEWEST, PERIODS = 4.0, 5.0
-"""Least number of periods of an order in a piece, else it explains nothing there, and in all of
-them, by Hann weights: 10 in a lone piece of steady motion."""
-LEAST = 0.25
-"""Least share of the energy that an order explains."""
-MARGIN = 0.15
-"""Least excess of that over the share that a fixed frequency explains."""
+LEAST = 0.25  # least share of the energy that an order explains
+MARGIN = 0.15  # least excess of that over the share that a fixed frequency explains
 
 
 @dataclass(frozen=True)
 class Order:
-    """An order: what goes with a joint's speed.
-
-    Attributes:
-        joint: Name of the joint.
-        periods_per_turn: Periods of the vibration per turn of the joint.
-    """
+    """An order: what goes with a joint's speed."""
 
     joint: str
-    periods_per_turn: float
+    periods_per_turn: float  # periods of the vibration per turn of the joint
 
     def __str__(self) -> str:
         return f"goes with the speed of {self.joint}: {self.periods_per_turn:.0f} periods per turn"
 
 
 class Piece(NamedTuple):
-    """Motion of a joint in one direction, or its rest; arrays have shape (samples,).
+    """Motion of a joint in one direction, or its rest; arrays have shape (samples,)."""
 
-    Attributes:
-        wave: Vibration, in [rad/s].
-        angle: Since the start of the piece, increasing, in [rad].
-        speed: Its derivative, in [rad/s]; 0 at rest.
-    """
-
-    wave: Array
-    angle: Array
-    speed: Array
+    wave: Array  # vibration, in [rad/s]
+    angle: Array  # since the start of the piece, increasing, in [rad]
+    speed: Array  # its derivative, in [rad/s]; 0 at rest
 
 
 def order(run: Run, failure: Event | Block) -> Order | None:
@@ -300,14 +281,11 @@ def _peak(orders: Real, lines: Array) -> float:
     return float(orders[best] + offset * (orders[1] - orders[0]))
 
 
+# Length of a window of a spectrogram, in [s]: at 1 rad/s it resolves 8 periods per turn.
 WINDOW = 0.8
-"""Length of a window of a spectrogram, in [s]: at 1 rad/s it resolves 8 periods per turn."""
-SHOWN = (10.0, 3000.0)
-"""Orders that are shown, in periods per turn."""
-LINES = 96
-"""Orders that are shown, in equal ratios."""
-COLUMNS = 200
-"""Most windows of a spectrogram."""
+SHOWN = (10.0, 3000.0)  # orders that are shown, in periods per turn
+LINES = 96  # orders that are shown, in equal ratios
+COLUMNS = 200  # most windows of a spectrogram
 
 
 def order_spectrogram(run: Run, noise: Array, joint: int) -> Spectrogram | None:

@@ -35,8 +35,7 @@ from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array, Indices, Mask
 
-MOST = 16
-"""Most stretches that are picked; a long run is not read whole."""
+MOST = 16  # most stretches that are picked; a long run is not read whole
 
 
 def quiet_stretches(
@@ -64,23 +63,15 @@ DESIRED, MEASURED = "desired", "measured"
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The velocities of a stretch of a run at each stage of the control flow.
+    """The velocities of a stretch of a run at each stage of the control flow."""
 
-    Attributes:
-        names: Of the stages: those that the run names, in its order, then desired and measured.
-        joints: Their names.
-        velocity: Shape (stages, samples, joints), in [rad/s] or [m/s].
-        time: Shape (samples,), in [s].
-        valid: False in gaps, shape (samples,).
-        rate: Samples per second, in [Hz].
-    """
-
+    # Of the stages: those that the run names, in its order, then desired and measured.
     names: tuple[str, ...]
     joints: tuple[str, ...]
-    velocity: Array
-    time: Array
-    valid: Mask
-    rate: float
+    velocity: Array  # shape (stages, samples, joints), in [rad/s] or [m/s]
+    time: Array  # shape (samples,), in [s]
+    valid: Mask  # False in gaps, shape (samples,)
+    rate: float  # samples per second, in [Hz]
 
     def samples(self, seconds: float) -> int:
         """Number of samples in a time, at least one."""
@@ -114,57 +105,39 @@ def flow(run: Run, part: slice) -> Flow:
     )
 
 
-SPAN = 0.001
-"""Time over which a velocity's change is taken, in [s]."""
-TRAIL = 0.02
-"""Time of the mean that is subtracted from changes, in [s]."""
+SPAN = 0.001  # time over which a velocity's change is taken, in [s]
+TRAIL = 0.02  # time of the mean that is subtracted from changes, in [s]
+# Lags of the prediction, in [s].
 LAGS = (0.0, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.006, 0.008, 0.012)
-"""Lags of the prediction, in [s]."""
-LENGTH = 0.1
-"""Length of a quiet stretch, in [s]."""
-WARM = TRAIL + LAGS[-1] + SPAN
-"""Transient of filters and prediction, in [s]."""
-PARTS = 16
-"""Most quiet stretches that the prediction is fitted to."""
-ROWS = 3000
-"""Most samples of the least squares."""
-RIDGE = 1e-3
-"""Regularisation of the least squares, as a share of the mean power."""
+LENGTH = 0.1  # length of a quiet stretch, in [s]
+WARM = TRAIL + LAGS[-1] + SPAN  # transient of filters and prediction, in [s]
+PARTS = 16  # most quiet stretches that the prediction is fitted to
+ROWS = 3000  # most samples of the least squares
+RIDGE = 1e-3  # regularisation of the least squares, as a share of the mean power
 
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
-    """Innovation of a stretch of a run.
+    """Innovation of a stretch of a run."""
 
-    Attributes:
-        change: Sudden changes, shape (stages, samples, joints), in [rad/s²].
-        residual: Their prediction residual, of the same shape.
-        total: Norm of the changes over the joints, shape (stages, samples), in [rad/s²].
-        level: Norm of the residual, but no more than ``total``, shape (stages, samples), in
-            [rad/s²]: a change that was predicted and does not occur is no innovation.
-    """
-
-    change: Array
-    residual: Array
-    total: Array
+    change: Array  # sudden changes, shape (stages, samples, joints), in [rad/s²]
+    residual: Array  # their prediction residual, of the same shape
+    total: Array  # norm of the changes over the joints, shape (stages, samples), in [rad/s²]
+    # Norm of the residual, but no more than ``total``, shape (stages, samples), in [rad/s²]: a
+    # change that was predicted and does not occur is no innovation.
     level: Array
 
 
 @dataclass(frozen=True, eq=False)
 class QuietStatistics:
-    """Prediction and innovation of a run's stages in its quiet stretches.
+    """Prediction and innovation of a run's stages in its quiet stretches."""
 
-    Attributes:
-        weights: Of the linear prediction of each stage but the first, shape
-            (stages - 1, joints, lags).
-        power: 90th percentile over the stretches of the innovation's mean square, shape
-            (stages,), in [rad²/s⁴].
-        peak: 90th percentile of its peak, shape (stages,), in [rad/s²].
-    """
-
+    # Of the linear prediction of each stage but the first, shape (stages - 1, joints, lags).
     weights: Array
+    # 90th percentile over the stretches of the innovation's mean square, shape (stages,), in
+    # [rad²/s⁴].
     power: Array
-    peak: Array
+    peak: Array  # 90th percentile of its peak, shape (stages,), in [rad/s²]
 
     def innovation(self, stages: Flow) -> Innovation:
         """Compute the innovation of a stretch of the run."""
@@ -249,72 +222,47 @@ def _lags(rate: float) -> Indices:
     return np.unique(np.round(np.array(LAGS) * rate).astype(np.int64))
 
 
-EARLY = 0.015
-"""How long before its start a failure may have set in, in [s]."""
-BEFORE, AFTER = 0.1 + WARM, 0.05
-"""Time before and after a failure that is used, in [s]."""
-LONGEST = 1.0
-"""Time of a failure that is used, in [s]."""
-BIN = 0.05
-"""Time over which a vibration's power is taken, in [s]."""
-LOUD = 0.25
-"""Share of the loudest bin's power from which a bin counts: -6 dB."""
-LASTING = 0.3
-"""Loud time of a lasting vibration, in [s]."""
+EARLY = 0.015  # how long before its start a failure may have set in, in [s]
+BEFORE, AFTER = 0.1 + WARM, 0.05  # time before and after a failure that is used, in [s]
+LONGEST = 1.0  # time of a failure that is used, in [s]
+BIN = 0.05  # time over which a vibration's power is taken, in [s]
+LOUD = 0.25  # share of the loudest bin's power from which a bin counts: -6 dB
+LASTING = 0.3  # loud time of a lasting vibration, in [s]
+# Least share of the innovation in a stage's changes; with less it passes on the stage before.
 PASSED_ON = 0.2
-"""Least share of the innovation in a stage's changes; with less it passes on the stage before."""
-EXCEEDS = 1.5
-"""Factor by which the first stage's peak has to exceed that in quiet stretches."""
-RESPONSE = 0.003
-"""Time within which the second stage else has to follow the first, in [s]."""
-ADDS = 0.25
-"""Share of the largest excess power from which a stage counts as adding to a vibration."""
-MORE = 2.0
-"""Factor by which the power of a stage that adds exceeds that in quiet stretches."""
-JOINTS = 3
-"""Most joints that are named."""
-SPREAD = 0.005
-"""Time after its onset in which a blow or jump has not spread over the robot, in [s]."""
-SLOWEST = 0.02
-"""Longest lag between two stages that vibrate together, in [s]."""
-
-AHEAD, BACK = 0.01, 0.05
-"""Times after and before a moment that are compared, in [s]."""
+EXCEEDS = 1.5  # factor by which the first stage's peak has to exceed that in quiet stretches
+RESPONSE = 0.003  # time within which the second stage else has to follow the first, in [s]
+ADDS = 0.25  # share of the largest excess power from which a stage counts as adding to a vibration
+MORE = 2.0  # factor by which the power of a stage that adds exceeds that in quiet stretches
+JOINTS = 3  # most joints that are named
+SPREAD = 0.005  # time after its onset in which a blow or jump has not spread over the robot, in [s]
+SLOWEST = 0.02  # longest lag between two stages that vibrate together, in [s]
+AHEAD, BACK = 0.01, 0.05  # times after and before a moment that are compared, in [s]
+# Times before and after the steepest rise in which the onsets of stages lie, in [s].
 AROUND = (0.02, 0.03)
-"""Times before and after the steepest rise in which the onsets of stages lie, in [s]."""
-STEEP = 0.25
-"""Least steepness of a rise, as a share of the steepest."""
-PEAK = 4.0
-"""Least peak of a stage that shows a failure, in multiples of the level before."""
-CLEAR = 2.0
-"""Level at the onset, in multiples of the level before."""
-SHARE = 0.2
-"""Level at the onset, as a share of the peak."""
+STEEP = 0.25  # least steepness of a rise, as a share of the steepest
+PEAK = 4.0  # least peak of a stage that shows a failure, in multiples of the level before
+CLEAR = 2.0  # level at the onset, in multiples of the level before
+SHARE = 0.2  # level at the onset, as a share of the peak
 
 
 @dataclass(frozen=True)
 class Localisation:
-    """Where a failure enters the control flow, and its frequencies.
+    """Where a failure enters the control flow, and its frequencies."""
 
-    Attributes:
-        stage: First stage of the control flow in which it shows; empty if no stage shows it, or
-            if the run has the measured one alone.
-        following: Next stage in which it shows; empty if it is in no other.
-        lag: Time from the first of these stages to the next, in [s].
-        lasting: Whether the failure is a vibration that lasts, and not a blow or jump.
-        joints: Up to three joints and their shares of the innovation's power in that stage, the
-            largest first.
-        onset: When a blow or jump sets in, in [s]; None of a vibration that lasts.
-        band: Lowest and highest frequency of its vibration, in [Hz]; None if it is not louder
-            than quiet stretches.
-    """
-
+    # First stage of the control flow in which it shows; empty if no stage shows it, or if the run
+    # has the measured one alone.
     stage: str = ""
-    following: str = ""
-    lag: float = 0.0
-    lasting: bool = False
+    following: str = ""  # next stage in which it shows; empty if it is in no other
+    lag: float = 0.0  # time from the first of these stages to the next, in [s]
+    lasting: bool = False  # whether the failure is a vibration that lasts, and not a blow or jump
+    # Up to three joints and their shares of the innovation's power in that stage, the largest
+    # first.
     joints: tuple[tuple[str, float], ...] = ()
+    # When a blow or jump sets in, in [s]; None of a vibration that lasts.
     onset: float | None = None
+    # Lowest and highest frequency of its vibration, in [Hz]; None if it is not louder than quiet
+    # stretches.
     band: tuple[float, float] | None = None
 
 
