@@ -34,17 +34,13 @@ CONFIRM = 2
 class Event:
     """A finding: neighbouring frames of one failure class, as one."""
 
-    label: str
-    """The class."""
-    start: float
-    """When its first frame starts, in [s]."""
-    stop: float
-    """When its last frame stops, in [s]."""
+    label: str  # the class
+    start: float  # when its first frame starts, in [s]
+    stop: float  # when its last frame stops, in [s]
     score: float
     """The highest probability of any failure in one of its frames, which the alarm threshold is of
     too; of a model without one, the highest score of the class."""
-    novel: bool = False
-    """Whether one of its frames is out of distribution."""
+    novel: bool = False  # whether one of its frames is out of distribution
 
     @property
     def novelty(self) -> str:

@@ -78,61 +78,43 @@ class Profile:
         ProfileError: If a setting is out of its range, or two do not fit together.
     """
 
-    classes: tuple[str, ...] = CLASSES
-    """Names of the classes, `ok` first."""
+    classes: tuple[str, ...] = CLASSES  # names of the classes, `ok` first
     signals: tuple[str, ...] = ("noise",)
     """Input signals, all in [rad/s]: noise estimates, norms of velocities, and after those the ones
     joint by joint (`signals.JOINTS`), of which the loudest joint counts."""
-    rate: float = 10_000.0
-    """Sample rate of the signal, in [Hz]."""
-    length: int = 4000
-    """Samples of a frame."""
-    hop: int = 1000
-    """Samples from the start of one frame to the start of the next."""
-    window: int = 1024
-    """Samples of the Hann window of one Fourier transform."""
-    stride: int = 834
-    """Samples from one Fourier transform to the next (the paper's s_fft)."""
+    rate: float = 10_000.0  # sample rate of the signal, in [Hz]
+    length: int = 4000  # samples of a frame
+    hop: int = 1000  # samples from the start of one frame to the start of the next
+    window: int = 1024  # samples of the Hann window of one Fourier transform
+    stride: int = 834  # samples from one Fourier transform to the next (the paper's s_fft)
     bands: Literal["adjacent", "comb", "log"] = "adjacent"
     """How bins become bands: three adjacent ones as in the paper, NoisyTest's comb, or ``edges``.
     NoisyTest's profile also rounds times, samples and features to 32-bit floats, and loses the
     first sample of a recording (its reader takes that row for the header)."""
-    edges: tuple[float, ...] = ()
-    """Edges of the bands of ``log``, ascending, in [Hz]."""
-    quick_window: int = 0
-    """Samples of a second, shorter Hann window beside the first; 0 for none."""
-    quick_stride: int = 0
-    """Samples from one of its transforms to the next."""
-    quick_edges: tuple[float, ...] = ()
-    """Edges of its bands, ascending, in [Hz]."""
+    edges: tuple[float, ...] = ()  # edges of the bands of ``log``, ascending, in [Hz]
+    quick_window: int = 0  # samples of a second, shorter Hann window beside the first; 0 for none
+    quick_stride: int = 0  # samples from one of its transforms to the next
+    quick_edges: tuple[float, ...] = ()  # edges of its bands, ascending, in [Hz]
     relative: bool = False
     """Whether log-band energies are relative to the level of the frame, and differences from the
     signal before are features, too; of models of earlier versions."""
     reference: bool = False
     """Whether log-band energies and their differences from the signal before are features as they
     are, and once more relative to a reference (`features.RunningReference`)."""
-    floor: float = 1e-6
-    """Added to an amplitude before its logarithm."""
+    floor: float = 1e-6  # added to an amplitude before its logarithm
     least_deviation: float = 0.0
     """Least standard deviation in the standardisation of features by the training set; 0 leaves
     them as they are."""
     estimator: EstimatorKind = "svm"
     """Support vector machines, or trees that first tell failures from `ok` and then name them
     (``detector``); networks and other trees are of model files of earlier versions."""
-    kernel: Kernel = "rbf"
-    """Kernel of the support vector machine."""
-    regularization: float = 1.1
-    """C of the support vector machine."""
-    gamma: float = 5.7e-4
-    """Kernel parameter; the linear kernel has none."""
-    multiclass: Multiclass = "one-vs-rest"
-    """How two-class SVMs are combined for more classes."""
-    rounds: int = 100
-    """Rounds of boosting; each adds a tree for each class."""
-    leaves: int = 16
-    """Leaves of a tree at most."""
-    alarm: float = 0.5
-    """Alarm threshold: a probability of any failure."""
+    kernel: Kernel = "rbf"  # kernel of the support vector machine
+    regularization: float = 1.1  # C of the support vector machine
+    gamma: float = 5.7e-4  # kernel parameter; the linear kernel has none
+    multiclass: Multiclass = "one-vs-rest"  # how two-class SVMs are combined for more classes
+    rounds: int = 100  # rounds of boosting; each adds a tree for each class
+    leaves: int = 16  # leaves of a tree at most
+    alarm: float = 0.5  # alarm threshold: a probability of any failure
 
     def __post_init__(self) -> None:
         """Check every setting once."""
@@ -382,27 +364,20 @@ class LogBands:
     floor: float = 3e-5
     """Added to the amplitude of a band, in [rad/s]: about the noise of the best encoders."""
     # In seconds and hertz:
-    frame: float = 0.4
-    """Duration of a frame, in [s]."""
-    hop: float = 0.1
-    """Time from the start of one frame to the start of the next, in [s]."""
-    window: float = 0.1
-    """Duration of the window of one Fourier transform, in [s]."""
-    stride: float = 0.025
-    """Time from one Fourier transform to the next, in [s]."""
+    frame: float = 0.4  # duration of a frame, in [s]
+    hop: float = 0.1  # time from the start of one frame to the start of the next, in [s]
+    window: float = 0.1  # duration of the window of one Fourier transform, in [s]
+    stride: float = 0.025  # time from one Fourier transform to the next, in [s]
     lowest: float = 15.0
     """Lower edge of the first band: below, the mean leaks through a Hann window, in [Hz]."""
-    highest: float = 5000.0
-    """No band reaches beyond, in [Hz]."""
+    highest: float = 5000.0  # no band reaches beyond, in [Hz]
     per_octave: float = 4.0
     """Bands in an octave, where they are wider than what the window resolves."""
     quick: float = 0.0
     """Duration of a second, shorter window, in [s]; 0 for none. Its bands are few and wide: it
     resolves time rather than frequency."""
-    quick_stride: float = 0.01
-    """Time from one of its transforms to the next, in [s]."""
-    speed: bool = False
-    """Whether the first quick band, below all others, is the speed itself."""
+    quick_stride: float = 0.01  # time from one of its transforms to the next, in [s]
+    speed: bool = False  # whether the first quick band, below all others, is the speed itself
     softness: float = 0.5
     """Kernel parameter times the number of features: below 1, frames out of distribution still get
     the class of the nearest training frames."""
