@@ -66,23 +66,14 @@ Localise = Callable[[Recording, Labels], tuple[tuple[Event, ...], tuple[Event, .
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """All measures of a model.
+    """All measures of a model."""
 
-    Attributes:
-        runs: How many recordings have a verdict.
-        groups: How many groups of them that share their motion.
-        copies: Recordings that were left out, and the equal one of each, by name.
-        seen: Recordings that the model was trained on, and what of them, by name.
-        protocol: Measures of the findings as they are reported, robots weighed alike.
-        evaluation: All frames that are cut from blocks.
-    """
-
-    runs: int
-    groups: int
-    copies: dict[str, str]
-    seen: dict[str, str]
-    protocol: Protocol
-    evaluation: Evaluation
+    runs: int  # recordings that have a verdict
+    groups: int  # groups of them that share their motion
+    copies: dict[str, str]  # recordings that were left out, and the equal one of each, by name
+    seen: dict[str, str]  # recordings that the model was trained on, and what of them, by name
+    protocol: Protocol  # measures of the findings as they are reported
+    evaluation: Evaluation  # all frames that are cut from blocks
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
