@@ -62,8 +62,12 @@ class Names:
     renamed: Mapping[str, str]
 
     def __call__(self, name: str) -> Any:
-        """Return what the checkout has under a new name."""
-        return resolve(older(name, self.renamed))
+        """Return what the checkout has under a new name; what only moved has its own there."""
+        packages = {new: old for new, old in self.renamed.items() if "." not in new}
+        try:
+            return resolve(older(name, packages))
+        except (AttributeError, ModuleNotFoundError):
+            return resolve(older(name, self.renamed))
 
     def field(self, name: str, of: Any) -> Any:
         """Value of an attribute of an object, by the new dotted name of class and attribute."""
