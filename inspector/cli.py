@@ -72,7 +72,7 @@ EXAMPLES = {
     "diff": "diff reference/ candidate/ --report changes/",
     "accept": 'accept runs/ --reason "first release"',
     "audit": "audit run.npz",
-    "smoothness": "smoothness episodes/ --picture smoothness.png",
+    "smoothness": "smoothness episodes/ --by sparc",
     "merge": "merge one.json two.json --report noise/",
     "history": "history results/ -o history.html",
     "import": "import log.csv -o run.npz",

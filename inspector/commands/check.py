@@ -126,10 +126,8 @@ def classify(
         resume=resume,
     )
     known = {each.path: each for each in progress(classified, "classify", total=len(found))}
-    ignore, address = (
-        on_bad_input == "ignore",
-        partial(published, folder=report, address=report_url),
-    )
+    ignore = on_bad_input == "ignore"
+    address = partial(published, folder=report, address=report_url)
     verdicts = [_judged(known[path], references, gate, ignore, address) for path in shown]
     verdicts += references.absent(verdicts, [each for each in runs if each.is_dir()])
 
