@@ -374,15 +374,10 @@ def excitation(robot: Robot, *, seed: int = 0) -> Run:
     """Motion of any robot without a simulator: slow sines, ripple, two shakes, a jerk.
 
     Every joint follows three slow sines with a small ripple at all frequencies above, as of real
-    drives. A floating base moves in the same way at a tenth of the speed. There are three events:
-
-    - ``shake-near`` and ``shake-far``: the joint that carries most of the robot and the one at the
-      end of the longest chain vibrate, one after the other, equally fast and at one frequency. The
-      simplified noise does not distinguish them;
-    - ``jerk``: the speed of all joints jumps within one sample, and the jump decays.
-
-    Positions keep to the limits of the robot: the motion of a joint with a small range or speed is
-    scaled down. Joints that mimic another one follow it; the base's pose stays at the origin.
+    drives; a floating base at a tenth of the speed. In ``shake-near`` and ``shake-far`` the joint
+    that carries most of the robot and the one at the end of the longest chain vibrate equally,
+    which the simplified noise does not distinguish; in ``jerk`` all joints jump within one sample.
+    Motions are scaled down to the limits of the robot; its pose stays at the origin.
     """
     random = np.random.default_rng(seed)
     time = np.arange(round(SECONDS * RATE)) / RATE

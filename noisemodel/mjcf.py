@@ -1,14 +1,12 @@
 """A robot from an MJCF file: Pinocchio's model of its joints, and the geometry of its bodies.
 
-MuJoCo reads the file, with its defaults, included and attached files; the joints are then added to
-a Pinocchio model one by one. Pinocchio's own reader of MJCF (``pinocchio.buildModelFromMJCF``,
-4.1) gives the same joints where it can, and a test holds this module to it; but it leaves out
-included files, bodies without a name and all trees but the first, and merges the joints of a body
-into one, all without an error. Meshes are not opened here: they are read as a URDF's are.
+MuJoCo reads the file; the joints are then added to a Pinocchio model one by one. Pinocchio's own
+reader of MJCF gives the same joints where it can, and a test holds this module to it; but it leaves
+out included files, bodies without a name and all trees but the first, and merges the joints of a
+body into one, all without an error. Meshes are not opened here: they are read as a URDF's are.
 
 A few bytes of MJCF can ask MuJoCo for any memory and time, or crash it. So it compiles in a process
-of its own, within limits, in a folder of its own; what is left here is to look at the files that it
-may open.
+of its own, within limits; what is left here is to look at the files that it may open.
 """
 
 import json

@@ -493,10 +493,9 @@ def by_moments(
 ) -> list[Array]:
     """Average powers that are quadratic in velocities, from second moments instead of samples.
 
-    Within a bin of some ten milliseconds the robot hardly moves. With a link's Jacobian J as it
-    is in the middle of the bin, < nu' M nu > = < v' J' M J v > = sum_jk (J' M J)_jk < v_j v_k >.
-    ``q`` are these configurations, shape (bins, nq). Each motion is one of ``QUADRATIC`` with mean
-    products of velocities, shape (bins, nv, nv), and gets powers, shape (bins, links), in [W].
+    Within some ten milliseconds the robot hardly moves. With a link's Jacobian J in the middle of a
+    bin, < nu' M nu > = < v' J' M J v > = sum_jk (J' M J)_jk < v_j v_k >. ``q``, (bins, nq), and
+    mean products, (bins, nv, nv), of each of ``QUADRATIC`` give powers, (bins, links), in [W].
     """
     jacobians = _jacobians(robot, q)
     # Bins lie next to each other in memory: all of them are worked on at once.

@@ -315,10 +315,9 @@ def locate(name: str | Path) -> Path:
 def package_roots(name: str | Path, package_root: str | Path | None = None) -> tuple[Path, ...]:
     """Folders that a robot's meshes are searched in, and outside of which none may lie.
 
-    Listed robots share their folders. For another file it is the nearest folder above that a
-    ``package://`` address in it names; else the nearest one with a package.xml; else the file's own
-    folder and those of ``BESIDE``. The root of the disk, a home, and what contains a home are never
-    among them. ``package_root``, or the environment variable ``NOISE_PACKAGE_ROOT``, adds one.
+    For a file that is not listed it is the nearest folder above that a ``package://`` address in it
+    names; else the nearest one with a package.xml; else its own and those of ``BESIDE``; never the
+    root of the disk or a home. ``package_root``, or ``NOISE_PACKAGE_ROOT``, adds one.
     """
     named = package_root or os.environ.get(PACKAGE_ROOT)
     further = () if not named else (Path(named).resolve(),)

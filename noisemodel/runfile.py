@@ -1,8 +1,7 @@
 """Run files and other .npz files, read within limits, and arrays that stay in their file.
 
-Sizes are checked before an array is made: a file of some kilobytes may state any. A run of an hour
-at 10 kHz is gigabytes an array. What goes through a run piece by piece (`pieces`) takes the memory
-of a piece, whether its arrays are in memory or in a file.
+Sizes are checked before an array is made: a file of some kilobytes may state any. What goes through
+a run piece by piece (`pieces`) takes the memory of a piece, also of a run of gigabytes.
 """
 
 import lzma
@@ -135,8 +134,7 @@ def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
 def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
     """Write the arrays of a run file whole or not at all: as ``np.savez_compressed``, but faster.
 
-    Compression hardly makes the noise of a log smaller, and to undo it takes most of the time of
-    loading: what it would not make smaller by a fifth is left as it is, as are large arrays.
+    What is large, or would not become smaller by a fifth, is not compressed: noise hardly does.
     """
     with replacing(path, overwrite=overwrite) as temporary:
         try:
@@ -161,8 +159,7 @@ def _shrinks(array: Any) -> bool:
 class OnDemand(NDArrayOperatorsMixin):
     """An array whose rows are read when they are needed: ``read`` has the first and the last + 1.
 
-    It can stand in for a NumPy array. Slices and indices of rows read these; whatever else is done
-    with it reads it whole, once, and keeps it in memory. What is ``checked`` once is not again.
+    Slices and indices of rows read these; whatever else is done with it reads it whole, once.
     """
 
     def __init__(

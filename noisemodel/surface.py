@@ -173,10 +173,7 @@ class Cloud:
 
 
 def fine(triangles: Array) -> Cloud:
-    """Place thousands of points, so densely that means of speeds are right to 1e-4.
-
-    Means of polynomials of degree 2 are exact. Some of the triangles must have an area.
-    """
+    """Place thousands of points, so densely that means of speeds are right to 1e-4."""
     triangles, areas, _ = _faces(triangles)
     _, (covariance,) = _statistics(*_edge_points(triangles, areas), ALL)
     spread = np.linalg.eigvalsh(covariance)
@@ -221,9 +218,8 @@ def _on_triangle(along: int, across: int) -> tuple[Array, Array]:
 def reduced(cloud: Cloud, *, halvings: int) -> Cloud:
     """Replace the points by up to 4 * 2**halvings, cell by cell, with each cell's moments.
 
-    Mean and covariance of each cell stay: so means of polynomials of degree 2 stay as they are, and
-    weights stay positive. The mean speed over the new points, too, is at most their root mean
-    square, which is exact.
+    So means of polynomials of degree 2 stay, weights stay positive, and the mean speed stays at or
+    below the root-mean-square speed, which is exact.
     """
     points, weights, starts = _cells(cloud, halvings)
     share = np.add.reduceat(weights, starts)
@@ -290,10 +286,9 @@ def _cell(starts: Indices, points: int) -> Indices:
 
 
 def rounding(inertia: Array) -> Array:
-    """Axes in which rotations of equal size have the same root-mean-square speed.
+    """Axes U in which rotations of equal size have the same root-mean-square speed, in [m].
 
-    In these axes a slender link is as round as a ball, so that one table fits all. ``inertia`` is J
-    of the mean-square speed w' J w, in [m²]; the result is U with |U w|² = w' J w, in [m].
+    With |U w|² = w' J w, a slender link is as round as a ball, so that one table fits all.
     """
     spread, axes = np.linalg.eigh(inertia)
     lengths = np.sqrt(np.maximum(spread, np.finfo(np.float64).eps * spread[2]))  # of a needle
