@@ -138,7 +138,8 @@ def test_pictures_and_pages_beside_a_reference_show_what_it_finds(project, tmp_p
     index = pytest.importorskip("inspector.report.html")
     drawn = {}
     monkeypatch.setattr(
-        "inspector.report.picture.picture",
+        index,
+        "picture",
         lambda analysis, beside: drawn.setdefault(analysis.status, (analysis, beside)) and b"",
     )
     call("classify", project / "chatter", "--report", tmp_path / "page")
