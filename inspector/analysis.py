@@ -51,24 +51,24 @@ if TYPE_CHECKING:
 class Analysis:
     """A run, or a scalar noise, with what was found in it; texts are empty where there is none."""
 
-    name: str  # of the run
-    status: Status  # `ok`, `findings` or `cannot-tell`
-    run: nm.Run  # as it was analysed; a scalar noise is a run of one joint
-    reason: str = ""  # why there is no verdict, in a sentence or two
-    labels: nc.Labels | None = None  # one per frame; None where no model fits
-    model: str = ""  # name of the model that labelled
-    model_sha256: str = ""  # of its file
-    # The events of the labels, from the start of the first frame of each to the end of its last.
+    name: str  #: of the run
+    status: Status  #: `ok`, `findings` or `cannot-tell`
+    run: nm.Run  #: as it was analysed; a scalar noise is a run of one joint
+    reason: str = ""  #: why there is no verdict, in a sentence or two
+    labels: nc.Labels | None = None  #: one per frame; None where no model fits
+    model: str = ""  #: name of the model that labelled
+    model_sha256: str = ""  #: of its file
+    #: The events of the labels, from the start of the first frame of each to the end of its last.
     spans: tuple[Event, ...] = ()
-    findings: tuple[Event, ...] = ()  # the same events, from their estimated onset to their end
-    audit: Audit | None = None  # what the run can show; None of a scalar noise
-    notes: tuple[str, ...] = ()  # what was done to the run before it was labelled, sentences
-    unknown: Unknown = Unknown.FINDING  # what becomes of `unknown` frames
-    sha256: str = ""  # of the file that the run came from
-    links: "LinkNoise | None" = None  # None unless it was asked for and the run has a robot
-    missing: tuple[str, ...] = ()  # what the run lacks to show the robot, and why, sentences
-    assumed: str = ""  # when its log was read, in a line
-    alarm: float | None = None  # threshold of the model, a probability; None without one
+    findings: tuple[Event, ...] = ()  #: the same events, from their estimated onset to their end
+    audit: Audit | None = None  #: what the run can show; None of a scalar noise
+    notes: tuple[str, ...] = ()  #: what was done to the run before it was labelled, sentences
+    unknown: Unknown = Unknown.FINDING  #: what becomes of `unknown` frames
+    sha256: str = ""  #: of the file that the run came from
+    links: "LinkNoise | None" = None  #: None unless it was asked for and the run has a robot
+    missing: tuple[str, ...] = ()  #: what the run lacks to show the robot, and why, sentences
+    assumed: str = ""  #: when its log was read, in a line
+    alarm: float | None = None  #: threshold of the model, a probability; None without one
 
     @cached_property
     def noise(self) -> Array:
@@ -369,8 +369,7 @@ def _missing(run: nm.Run) -> Iterator[str]:
         yield f"{lost} samples lie in gaps; frames that touch one are not labelled."
 
 
-NOTHING = r"^Nothing stands out[^.]*\.\s*"
-"""What is said of a run without findings."""
+NOTHING = r"^Nothing stands out[^.]*\.\s*"  # what is said of a run without findings
 MOST = 3
 LOUDEST = "loudest"
 
@@ -421,8 +420,7 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
     return tuple(moment for _, moment in found[:MOST])
 
 
-SHOWN = 8
-"""Joints and links that have a row in a picture."""
+SHOWN = 8  # joints and links that have a row in a picture
 
 
 def worst_joint(analysis: Analysis) -> int | None:

@@ -17,6 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 from inspector.errors import EXIT, OUTPUT_LOST, OptionError, Status
 from inspector.text import printable, program_version
 
+# The commands, each with what the help says of it.
 PANELS = {
     "Inspect": {
         "view": "Show a run, or several side by side.",
@@ -49,7 +50,6 @@ PANELS = {
         "help": "Print the help of a command or a topic: logs.",
     },
 }
-"""The commands, each with what the help says of it."""
 MODULES = {
     name: module
     for panel, module in {
@@ -84,10 +84,11 @@ EXAMPLES = {
     "config": "config",
     "help": "help logs",
 }
+# Commands that take the options on reading logs.
 READ_LOGS = frozenset(
     ("view", "noise", "listen", "classify", "accept", "audit", "smoothness", "import", "export")
 )
-"""Commands that take the options on reading logs."""
+# Commands of 0.6, and what does the same; to be dropped after one version.
 RENAMED = {
     "adapt": "accept",
     "baseline": "accept",
@@ -97,8 +98,6 @@ RENAMED = {
     "compare": "noise --compare",
     "labels": "export (--labels findings, --labels annotated, --annotate FILE)",
 }
-"""Commands of 0.6, and what does the same; to be dropped after one version."""
-
 ABOUT = "Detect impacts, jumps and oscillations in robot joint data."
 START = """\
 Finds impacts, velocity jumps and oscillations in robot joint data.
@@ -118,16 +117,15 @@ Options
 
 `inspector COMMAND -h` explains a command, `inspector help logs` reading logs."""
 LOGS = "How logs are read (--robot, --rate, --map, ...): `inspector help logs`."
+# Names of options that are written; all other paths are read.
 OUTPUTS = frozenset(
     ("output", "save", "csv", "picture", "report", "labels_to", "save_mapping", "resume", "train")
 )
-"""Names of options that are written; all other paths are read."""
+# Names of parameters that no file of settings sets.
 UNSET = OUTPUTS | {"overwrite", "write", "in_ci", "help"}
-"""Names of parameters that no file of settings sets."""
-
 INTERRUPTED = 130  # exit status after Ctrl-C, as of a shell
+# Errors of the system about a path that a user typed, or of a disk: no bugs.
 UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.EROFS, errno.EIO)
-"""Errors of the system about a path that a user typed, or of a disk: no bugs."""
 
 
 # --- commands
@@ -296,8 +294,8 @@ FILES = ("inspector.toml", "pyproject.toml")
 TABLE = "noise-inspector"
 MOST_BYTES = 2**20
 SHARED = frozenset(("model", "jobs"))  # settings of all commands, besides those on reading logs
+# Settings that are paths, which are meant from the folder of the file.
 PATHS = {"mapping", "desired", "model", "reference", "candidate", "runs", "package-root"}
-"""Settings that are paths, which are meant from the folder of the file."""
 
 
 def find_settings() -> tuple[Path, dict[str, Any]] | None:

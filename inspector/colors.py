@@ -16,9 +16,8 @@ from noiseclassifier import UNKNOWN
 
 Color: TypeAlias = tuple[int, int, int]
 
+# Of the viewer's plots, and of reports.
 BACKGROUNDS: tuple[Color, ...] = ((13, 13, 13), (255, 255, 255))
-"""Of the viewer's plots, and of reports."""
-
 CLASSES: dict[str, Color] = {
     "ok": (48, 114, 96),
     "impact": (180, 63, 25),
@@ -28,12 +27,12 @@ CLASSES: dict[str, Color] = {
     UNKNOWN: (144, 144, 150),
 }
 OTHERS: tuple[Color, ...] = ((162, 144, 114), (24, 84, 252), (198, 30, 90), (138, 138, 180))
+# Behind a verdict in white letters; the words say the same.
 VERDICTS: dict[str, Color] = {
     "findings": (178, 34, 34),
     "ok": CLASSES["ok"],
     "cannot-tell": (96, 96, 102),
 }
-"""Behind a verdict in white letters; the words say the same."""
 NOISE: Color = (160, 196, 255)
 LEVEL: Color = (240, 228, 140)
 BAND: Color = (150, 156, 168)
@@ -64,11 +63,11 @@ def of_series(count: int, *, dim: bool = False) -> list[Color]:
     return [(int(r * shade), int(g * shade), int(b * shade)) for r, g, b in colors]
 
 
+# Slate, which is quiet, through purple and orange to pale yellow, of rising lightness.
 HEAT = np.array(
     [[50, 54, 68], [92, 56, 118], [164, 60, 112], [224, 92, 70], [250, 165, 40], [252, 250, 180]],
     dtype=np.float64,
 )
-"""Slate, which is quiet, through purple and orange to pale yellow, of rising lightness."""
 
 
 def heat(level: NDArray[np.floating]) -> NDArray[np.uint8]:

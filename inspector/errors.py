@@ -24,6 +24,7 @@ class Unknown(StrEnum):
     IGNORE = "ignore"
 
 
+# Exit status of each, the worst first.
 EXIT = {
     Status.INTERNAL_ERROR: 70,
     Status.BAD_INPUT: 3,
@@ -31,7 +32,6 @@ EXIT = {
     Status.CANNOT_TELL: 4,
     Status.OK: 0,
 }
-"""Exit status of each, the worst first."""
 OUTPUT_LOST = 5  # exit status if an output could not be written
 WORST = (70, OUTPUT_LOST, 3, 1, 4, 0)  # exit statuses, the worst first
 IGNORED = "unknown frames are ignored"  # what outputs say where they are

@@ -16,12 +16,10 @@ from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating_piec
 from noisemodel.runfile import rows_at_once
 from noisemodel.types import Array, Mask, Real
 
-STEP = 0.05
-"""Time over which a level is taken, in [s]."""
-SPAN_DB = 60.0
-"""Range of a scale that follows a run, in [dB]."""
+STEP = 0.05  # time over which a level is taken, in [s]
+SPAN_DB = 60.0  # range of a scale that follows a run, in [dB]
+# Least level of a velocity, below any encoder's, in [dB re 1 rad/s]; lower levels are raised.
 FLOOR_DB = -100.0
-"""Least level of a velocity, below any encoder's, in [dB re 1 rad/s]; lower levels are raised."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +64,12 @@ class Scale:
         return tuple(np.arange(self.low, self.high + self.step / 2, self.step).tolist())
 
 
+# Velocity of a joint above 10 Hz; of joints that slide re 1 m/s.
 JOINTS = Scale(-60.0, 0.0, "dB re 1 rad/s")
-"""Velocity of a joint above 10 Hz; of joints that slide re 1 m/s."""
+# Sound power of a link's vibration above 10 Hz. A link of 0.1 m² is at 136 dB at 1 m/s.
 LINKS = Scale(60.0, 120.0, "dB re 1 pW")
-"""Sound power of a link's vibration above 10 Hz. A link of 0.1 m² is at 136 dB at 1 m/s."""
+# Amplitude of a joint's velocity in a spectrogram; its low end can be chosen.
 SPECTRUM = Scale(-60.0, 0.0, "dB re 1 rad/s")
-"""Amplitude of a joint's velocity in a spectrogram; its low end can be chosen."""
 
 
 def velocity_levels(
@@ -116,12 +114,9 @@ def link_levels(noise: LinkNoise) -> tuple[Array, Array]:
     return noise.time[firsts] - width / 2, decibel(mean / REFERENCE_POWER)
 
 
-WINDOW = 0.1024
-"""Length of the window in [s]: the paper's 1024 samples at 10 kHz."""
-COLUMNS = 400
-"""Most windows of a spectrogram."""
-RANGE_DB = 70.0
-"""Range of its level, in [dB]."""
+WINDOW = 0.1024  # length of the window in [s]: the paper's 1024 samples at 10 kHz
+COLUMNS = 400  # most windows of a spectrogram
+RANGE_DB = 70.0  # range of its level, in [dB]
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,12 +15,11 @@ from noisemodel.files import also_reading
 from noisemodel.run import pieces_of
 from noisemodel.types import Array, Mask, Real
 
-Library = Mapping[str, nc.Model]
-"""Models by name."""
+Library = Mapping[str, nc.Model]  # models by name
 Events = tuple[nc.Event, ...]
 HERE = Path(__file__).parent
+# In an installed wheel, and in a checkout.
 FOLDERS = (HERE / "assets", HERE.parent / "assets", HERE.parent)
-"""In an installed wheel, and in a checkout."""
 
 
 class CannotTellError(InspectorError):

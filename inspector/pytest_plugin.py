@@ -24,16 +24,14 @@ if TYPE_CHECKING:
     from noiseclassifier import Event
     from noisemodel import Run
 
+# A class of findings; or a class, and from when to when, in [s].
 Allowed: TypeAlias = "str | tuple[str, float, float]"
-"""A class of findings; or a class, and from when to when, in [s]."""
-ARTEFACTS = "noise-artefacts"
-"""Folder below rootdir with recordings and pictures of failures."""
-LONGEST = 120
-"""Most characters of a file name that a test's name may take."""
+ARTEFACTS = "noise-artefacts"  # folder below rootdir with recordings and pictures of failures
+LONGEST = 120  # most characters of a file name that a test's name may take
+# Node ids that a file name tells apart: what are folders, classes, test and parameters is seen.
 PLAIN = re.compile(
     r"(\w+/)*\w+\.py(::[A-Z]\w*)*::[a-z_]\w*(\[[A-Za-z_]\w*(-[A-Za-z_]\w*)*\])?", re.ASCII
 )
-"""Node ids that a file name tells apart: what are folders, classes, test and parameters is seen."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -35,15 +35,13 @@ from noisemodel.run import stretches
 from noisemodel.types import Array, Real
 
 FORMAT = "noise-smoothness/1"
-FAST, TRACKED = 10.0, 4.0
-"""Lowest frequencies of the level and of the tracking error, in [Hz]."""
-STANDING = 0.01
-"""Highest speed of an episode without motion: half a degree a second, in [rad/s]."""
+FAST, TRACKED = 10.0, 4.0  # lowest frequencies of the level and of the tracking error, in [Hz]
+STANDING = 0.01  # highest speed of an episode without motion: half a degree a second, in [rad/s]
+# Of SPARC: highest frequency in [Hz], least amplitude, powers of two of zero padding (2015).
 CUTOFF, THRESHOLD, PADDING = 10.0, 0.05, 4
-"""Of SPARC: highest frequency in [Hz], least amplitude, powers of two of zero padding (2015)."""
+# Of the high-pass, applied forward and backward: its order, the least duration of a signal in
+# periods of its frequency, the least ratio of the Nyquist frequency to its frequency.
 ORDER, PERIODS, BAND = 4, 3, 1.2
-"""Of the high-pass, applied forward and backward: its order, the least duration of a signal in
-periods of its frequency, the least ratio of the Nyquist frequency to its frequency."""
 
 
 # --- measures
@@ -154,10 +152,10 @@ _SCORES = (
     Score("flagged", "flagged", "", "share of time with a finding of the classifier"),
     Score("tracking", f"error >{TRACKED:g} Hz", "rad", f"tracking error above {TRACKED:g} Hz"),
 )
+# All scores by name, in the order of the columns.
 SCORES: Mapping[str, Score] = {score.name: score for score in _SCORES}
-"""All scores by name, in the order of the columns."""
+# Scores by how well they separate chattering from clean rollouts (docs/smoothness.md).
 ORDERS = ("action_curvature", "level", "ldlj", "tracking", "action_rate", "sparc")
-"""Scores by how well they separate chattering from clean rollouts (docs/smoothness.md)."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
+# Control characters, ends of lines, and what turns the direction of writing.
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-"""Control characters, ends of lines, and what turns the direction of writing."""
 FORMULA = ("=", "+", "-", "@")  # what a cell begins with that a spreadsheet computes
 EVERY = 10.0  # time between two lines of progress, in [s]
 

@@ -38,25 +38,23 @@ from noisemodel import OutputError
 from noisemodel.files import also_reading
 from noisemodel.parallel import DIED, Jobs, as_done, in_order
 
+# The errors that are printed in one line; all others are bugs.
 EXPECTED = (InspectorError, nc.ModelsError, nm.NoiseModelError)
-"""The errors that are printed in one line; all others are bugs."""
 UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
 KIND = "noise-classify-state/"
 FORMAT = f"{KIND}2"
+# Most bytes of a file that is resumed: enough for some hundred thousand runs.
 MAX_BYTES = 256 * 2**20
-"""Most bytes of a file that is resumed: enough for some hundred thousand runs."""
-DRAWING = 0.4
-"""About how long a picture takes, in [s]."""
-LONGEST_LINE = 2**16
-"""Characters of a line that are looked at."""
+DRAWING = 0.4  # about how long a picture takes, in [s]
+LONGEST_LINE = 2**16  # characters of a line that are looked at
 
 
 Kept = TypeVar("Kept")
+# Draws a picture of an analysis with its verdict and comparison, which is None without a reference,
+# and gives its path.
 Drawing = Callable[[Analysis, "Verdict", Any], Path]
-"""Draws a picture of an analysis with its verdict and comparison, which is None without a
-reference, and gives its path."""
+# Adds the evidence of a reference and gives the comparison with it, see `References`.
 Referring = Callable[[Analysis, "Verdict"], tuple["Verdict", Any]]
-"""Adds the evidence of a reference and gives the comparison with it, see `References`."""
 
 
 class StateError(FileError):
@@ -80,10 +78,9 @@ class Ruling(StrEnum):
     AS_REFERENCE = "as-reference"
 
 
+# Those that fail a run.
 FAILING = (Ruling.FOUND, Ruling.FORBIDDEN, Ruling.EXPIRED, Ruling.OVER_BUDGET)
-"""Those that fail a run."""
-LOG, END = "log of ", "end of the run"
-"""What a scenario without logs, and a run that is cut, lack."""
+LOG, END = "log of ", "end of the run"  # what a scenario without logs, and a run that is cut, lack
 
 
 @dataclass(frozen=True)
@@ -278,8 +275,8 @@ class Beside:
 
 
 TEXTS = ("model", "model_sha256", "message", "assumed", "scenario", "expectations")
+# What of a verdict JSON holds as it is, and rounded.
 NUMBERS = ("begin", "duration", "rate", "seconds")
-"""What of a verdict JSON holds as it is, and rounded."""
 
 
 @dataclass(frozen=True)
@@ -561,8 +558,7 @@ def counts(verdicts: Iterable[Verdict]) -> dict[str, dict[str, int]]:
     }
 
 
-RESULTS = "noise-verdict/3"
-"""Format of what `classify --write json=FILE` writes."""
+RESULTS = "noise-verdict/3"  # format of what `classify --write json=FILE` writes
 
 
 def read_results(path: Path) -> list[Verdict]:

@@ -74,32 +74,32 @@ Progress: TypeAlias = Callable[..., "Iterable[Comparison | LeftOut]"]
 class Comparison:
     """How kinds of noise estimates differ on one robot and its motion."""
 
-    name: str  # the robot, or the run file
+    name: str  #: the robot, or the run file
     floating_base: bool
-    joints: int  # how many joints the motion has
-    time: Array  # of the samples, shape (samples,), in [s]
-    rate: float  # samples per second, in [Hz]
-    events: tuple[Block, ...]  # what should stand out: the run's blocks that are not "ok"
+    joints: int  #: how many joints the motion has
+    time: Array  #: of the samples, shape (samples,), in [s]
+    rate: float  #: samples per second, in [Hz]
+    events: tuple[Block, ...]  #: what should stand out: the run's blocks that are not "ok"
     kinds: tuple[str, ...]
-    links: tuple[str, ...]  # names
+    links: tuple[str, ...]  #: names
     links_with_surface: int
-    # Estimated by each kind, scaled to a root mean square of 1, shape (kinds, samples).
+    #: Estimated by each kind, scaled to a root mean square of 1, shape (kinds, samples).
     pressure: Array
-    # Of the envelopes of each two kinds, (kinds, kinds); nan where an envelope does not change.
+    #: Of the envelopes of each two kinds, (kinds, kinds); nan where an envelope does not change.
     correlation: Array
-    # Log-spectral distance of each two kinds: root mean square of the difference of their spectra
-    # over time and frequency, shape (kinds, kinds), in [dB].
+    #: Log-spectral distance of each two kinds: root mean square of the difference of their spectra
+    #: over time and frequency, shape (kinds, kinds), in [dB].
     distance: Array
-    frequency: Array  # shape (frequency,), in [Hz]
-    distance_by_frequency: Array  # over time alone, shape (kinds, kinds, frequency)
-    # Mean square of the pressure above 10 Hz in each event, over that outside of all events,
-    # shape (kinds, events), in [dB].
+    frequency: Array  #: shape (frequency,), in [Hz]
+    distance_by_frequency: Array  #: over time alone, shape (kinds, kinds, frequency)
+    #: Mean square of the pressure above 10 Hz in each event, over that outside of all events,
+    #: shape (kinds, events), in [dB].
     contrast: Array
-    shares: Array  # of each link in the energy, shape (kinds, links)
-    # Share of A, B and C of each link in the energy that "paper" gives the whole robot,
-    # (A + B + C)² being (A + B + C) A + (A + B + C) B + (A + B + C) C, shape (links, 3).
+    shares: Array  #: of each link in the energy, shape (kinds, links)
+    #: Share of A, B and C of each link in the energy that "paper" gives the whole robot,
+    #: (A + B + C)² being (A + B + C) A + (A + B + C) B + (A + B + C) C, shape (links, 3).
     terms: Array
-    remarks: tuple[str, ...]  # what the comparison leaves out, a sentence each
+    remarks: tuple[str, ...]  #: what the comparison leaves out, a sentence each
 
     @property
     def reference(self) -> int:
@@ -162,8 +162,8 @@ class Comparison:
 class LeftOut:
     """A robot or a run that could not be compared."""
 
-    name: str  # the robot, or the run file
-    reason: str  # why not, in one line
+    name: str  #: the robot, or the run file
+    reason: str  #: why not, in one line
 
     def __str__(self) -> str:
         return f"{self.name}: left out: {self.reason}"
@@ -173,8 +173,8 @@ class LeftOut:
 class Comparisons:
     """Kinds of noise estimates compared on many robots; it prints as a table."""
 
-    robots: tuple[Comparison, ...]  # what could be compared, in the order of the robots
-    left_out: tuple[LeftOut, ...] = ()  # what could not, and why
+    robots: tuple[Comparison, ...]  #: what could be compared, in the order of the robots
+    left_out: tuple[LeftOut, ...] = ()  #: what could not, and why
 
     def __len__(self) -> int:
         return len(self.robots)

@@ -126,8 +126,8 @@ def _rows(signal: Real, columns: list[int]) -> Array:
 class Noise:
     """The sound that a robot's links radiate."""
 
-    power: Array  # sound power of each link, shape (samples, links), in [W]
-    names: tuple[str, ...]  # of the links
+    power: Array  #: sound power of each link, shape (samples, links), in [W]
+    names: tuple[str, ...]  #: of the links
 
     @property
     def total(self) -> Array:

@@ -163,16 +163,16 @@ def _joint(model: Any, index: int) -> Joint:
 class Robot:
     """A robot with its kinematics."""
 
-    name: str  # its name in the list, or its file's
-    path: Path  # the URDF or MJCF that it was read from
-    package_roots: tuple[Path, ...]  # folders that ``package://`` addresses are searched in
-    model: Any  # Pinocchio's; mimic joints are joints of their own in it
-    joints: tuple[Joint, ...]  # all after the universe, in Pinocchio's order
-    nq: int  # length of a configuration
-    nv: int  # length of a velocity
-    floating_base: bool  # whether the base moves freely
-    mimics: Mapping[str, Mimic]  # joints that follow another one; empty if they are independent
-    mjcf: Mjcf | None = None  # what an MJCF describes; None if the robot is from a URDF
+    name: str  #: its name in the list, or its file's
+    path: Path  #: the URDF or MJCF that it was read from
+    package_roots: tuple[Path, ...]  #: folders that ``package://`` addresses are searched in
+    model: Any  #: Pinocchio's; mimic joints are joints of their own in it
+    joints: tuple[Joint, ...]  #: all after the universe, in Pinocchio's order
+    nq: int  #: length of a configuration
+    nv: int  #: length of a velocity
+    floating_base: bool  #: whether the base moves freely
+    mimics: Mapping[str, Mimic]  #: joints that follow another one; empty if they are independent
+    mjcf: Mjcf | None = None  #: what an MJCF describes; None if the robot is from a URDF
 
     @classmethod
     def load(

@@ -52,9 +52,9 @@ class NotUniformError(RunError):
 class Block:
     """A stretch of time with a label, which is opaque to the noise model."""
 
-    start: float  # time of its first sample, in [s]
-    stop: float  # time of its end, in [s]
-    label: str  # the class that an annotator or a simulator gave it
+    start: float  #: time of its first sample, in [s]
+    stop: float  #: time of its end, in [s]
+    label: str  #: the class that an annotator or a simulator gave it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -66,27 +66,27 @@ class Run:
             names repeat, or blocks overlap.
     """
 
-    time: Array  # uniform to 1e-3 of its step, shape (samples,), in [s]
-    velocity: Real  # of the joints, shape (samples, joints), in [rad/s] or [m/s]
-    joint_names: tuple[str, ...]  # in any order
-    position: Real | None = None  # of the joints, shape (samples, joints), in [rad] or [m]
-    velocity_desired: Real | None = None  # shape (samples, desired)
-    position_desired: Real | None = None  # shape (samples, desired)
-    desired_joint_names: tuple[str, ...] = ()  # `joint_names` unless given
-    # Velocities at named stages of the control flow, each (samples, joints).
+    time: Array  #: uniform to 1e-3 of its step, shape (samples,), in [s]
+    velocity: Real  #: of the joints, shape (samples, joints), in [rad/s] or [m/s]
+    joint_names: tuple[str, ...]  #: in any order
+    position: Real | None = None  #: of the joints, shape (samples, joints), in [rad] or [m]
+    velocity_desired: Real | None = None  #: shape (samples, desired)
+    position_desired: Real | None = None  #: shape (samples, desired)
+    desired_joint_names: tuple[str, ...] = ()  #: `joint_names` unless given
+    #: Velocities at named stages of the control flow, each (samples, joints).
     stages: Mapping[str, Real] = field(default_factory=dict)
-    # Torques or forces, shape (samples, joints), in [N m] or [N]; of some logs currents, in [A].
+    #: Torques or forces, shape (samples, joints), in [N m] or [N]; of some logs currents, in [A].
     effort: Real | None = None
-    # False in gaps, where all values are 0, shape (samples,); all true unless given.
+    #: False in gaps, where all values are 0, shape (samples,); all true unless given.
     valid: Mask | None = None
-    # x, y, z and quaternion x, y, z, w of a floating base, shape (samples, 7).
+    #: x, y, z and quaternion x, y, z, w of a floating base, shape (samples, 7).
     base_pose: Real | None = None
-    # Linear, then angular velocity of the base in its own axes, shape (samples, 6).
+    #: Linear, then angular velocity of the base in its own axes, shape (samples, 6).
     base_velocity: Real | None = None
-    # Name of a listed robot or of one of MuJoCo Menagerie, or path of a URDF or an MJCF.
+    #: Name of a listed robot or of one of MuJoCo Menagerie, or path of a URDF or an MJCF.
     robot: str | None = None
-    blocks: tuple[Block, ...] = ()  # annotated stretches, sorted, not overlapping
-    meta: Mapping[str, Any] = field(default_factory=dict)  # scenario, seed, software version…
+    blocks: tuple[Block, ...] = ()  #: annotated stretches, sorted, not overlapping
+    meta: Mapping[str, Any] = field(default_factory=dict)  #: scenario, seed, software version…
 
     def __post_init__(self) -> None:
         """Fill in defaults and check everything once."""

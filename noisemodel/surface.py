@@ -382,7 +382,7 @@ class Surface:
     """
 
     names: tuple[str, ...]
-    joint: NDArray[np.intp]  # index of each link's joint in Pinocchio, shape (links,)
+    joint: NDArray[np.intp]  #: index of each link's joint in Pinocchio, shape (links,)
     links: tuple[LinkSurface, ...]
 
     @classmethod

@@ -195,8 +195,8 @@ def _end(verdicts: Sequence[Verdict], lost: Sequence[str]) -> NoReturn:
 
 # --- diff
 
+# The files of --report.
 RECORDING, PICTURE, NUMBERS = FILES = ("worst.rrd", "worst.png", "diff.json")
-"""The files of --report."""
 
 
 def diff(
@@ -377,8 +377,8 @@ def audit(
 
 # --- smoothness
 
+# Those of ``inspector.smoothness``, which would take too long to import here.
 Scores = Literal["level", "sparc", "ldlj", "action_rate", "action_curvature", "flagged", "tracking"]
-"""Those of ``inspector.smoothness``, which would take too long to import here."""
 
 
 def smoothness(

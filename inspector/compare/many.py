@@ -91,23 +91,18 @@ def _from_start(run: Run) -> Run:
     return replace(run, time=run.time - start, blocks=blocks)
 
 
-CURVES = 8
-"""Runs whose level is drawn as a curve, the worst; more lines cannot be told apart."""
-COLUMNS = 1500
-"""Columns of the levels; of long runs, the highest level in each is shown."""
+CURVES = 8  # runs whose level is drawn as a curve, the worst; more lines cannot be told apart
+COLUMNS = 1500  # columns of the levels; of long runs, the highest level in each is shown
+# Height of all parts, of the table with the verdict at least, of the curves, and of a row of tabs,
+# in points, at 1440 x 900.
 WHOLE, TABLE, CURVE, TITLES = 832.0, 200.0, 190.0, 28.0
-"""Height of all parts, of the table with the verdict at least, of the curves, and of a row of tabs,
-in points, at 1440 x 900."""
+# Height of a run's row; below it, classes and levels lie behind each other in tabs.
 LOWEST, HIGHEST = 20.0, 36.0
-"""Height of a run's row; below it, classes and levels lie behind each other in tabs."""
-NAMED = 16.0
-"""Least distance of two names."""
+NAMED = 16.0  # least distance of two names
+# Most height of a line, in points: thick ones have round ends, so a row is several of them.
 LINE = 8.0
-"""Most height of a line, in points: thick ones have round ends, so a row is several of them."""
-LETTERS = 16
-"""Most letters of a name beside a row."""
-SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"
-"""The markers of `panels.MARKERS` as text."""
+LETTERS = 16  # most letters of a name beside a row
+SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"  # the markers of `panels.MARKERS` as text
 
 
 def write(several: Several, path: Path, *, overwrite: bool = False) -> None:

@@ -41,17 +41,16 @@ def _cell(name: str, value: str | bool | int | float) -> str | int:
     return int(value) if isinstance(value, bool) else value
 
 
+# Of A, B and C: dark, middle and light, so that they differ in grey too.
 TERM_COLORS = ("#3b3b6d", "#d98c4a", "#f2e3c4")
-"""Of A, B and C: dark, middle and light, so that they differ in grey too."""
 CURVES = ("#d55e00", "#0072b2", "#000000", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = "ovs^DPX"
 LINES = ("-", "--", "-", ":", "-.", (0, (1, 1)), (0, (5, 1)))
-ROBOT = 0.17
-"""Height of a robot, in [inch]."""
+ROBOT = 0.17  # height of a robot, in [inch]
+# Distance of two independent noises with the same mean spectrum, in [dB].
 INDEPENDENT_DB = 10.0 / np.log(10.0) * np.pi / np.sqrt(3.0)
-"""Distance of two independent noises with the same mean spectrum, in [dB]."""
+# Centres of thirds of octaves, from 20 to 5120 Hz, in [Hz].
 THIRDS = 20.0 * 2.0 ** (np.arange(25) / 3.0)
-"""Centres of thirds of octaves, from 20 to 5120 Hz, in [Hz]."""
 ACROSS, MARGIN, BELOW = 10.0, 1.3, 3.0
 DPI = 100
 

@@ -31,16 +31,12 @@ from noisemodel.run import part
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
 
-CORRELATION = 0.6
-"""Correlation of the envelopes below which an alignment is refused."""
+CORRELATION = 0.6  # correlation of the envelopes below which an alignment is refused
+# Correlation of envelopes from which two runs are of one motion: less is a motion like it.
 ALIKE = 0.9
-"""Correlation of envelopes from which two runs are of one motion: less is a motion like it."""
-RIVAL = 0.95
-"""Share of it that the next best lag may reach: steps and strokes resemble each other."""
-STILL = 1e-9
-"""Share of its size by which a motion has to change, to be more than rounding."""
-SHARE = 0.5
-"""Share of the shorter run that has to lie within the longer one."""
+RIVAL = 0.95  # share of it that the next best lag may reach: steps and strokes resemble each other
+STILL = 1e-9  # share of its size by which a motion has to change, to be more than rounding
+SHARE = 0.5  # share of the shorter run that has to lie within the longer one
 
 
 class Align(StrEnum):
@@ -154,10 +150,8 @@ def _powers(run: Run, length: int) -> list[NDArray[np.complex128]]:
     return [fft.rfft(signal, length) for signal in (mask.astype(np.float64), level, level**2)]
 
 
-SAME_RATE = 1e-3
-"""Rates that differ by less are one."""
-REMARKED = 0.005
-"""Time from which on a stretch that is left out is remarked on, in [s]."""
+SAME_RATE = 1e-3  # rates that differ by less are one
+REMARKED = 0.005  # time from which on a stretch that is left out is remarked on, in [s]
 
 
 def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
@@ -341,10 +335,9 @@ def _no_links(before: nm.Run, after: nm.Run) -> str:
     return ""
 
 
+# Links that are quieter than the loudest peak by more than this have no difference.
 LINK_RANGE_DB = 40.0
-"""Links that are quieter than the loudest peak by more than this have no difference."""
-LOWEST_BAND = 16.0
-"""Centre of the lowest octave, in [Hz]."""
+LOWEST_BAND = 16.0  # centre of the lowest octave, in [Hz]
 
 
 @dataclass(frozen=True)
@@ -459,10 +452,8 @@ def _noise_level(power: float) -> float:
 
 
 NEW, LOUDER, UNCHANGED, QUIETER, RESOLVED = "new", "louder", "unchanged", "quieter", "resolved"
-KINDS = (NEW, LOUDER, RESOLVED, QUIETER, UNCHANGED)
-"""In the order in which they matter."""
-LOUDER_DB = 3.0
-"""A failure in both runs whose level changed by as much is louder or quieter."""
+KINDS = (NEW, LOUDER, RESOLVED, QUIETER, UNCHANGED)  # in the order in which they matter
+LOUDER_DB = 3.0  # a failure in both runs whose level changed by as much is louder or quieter
 
 
 @dataclass(frozen=True)

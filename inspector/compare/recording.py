@@ -39,6 +39,7 @@ from inspector.recording.unstable import Part
 from inspector.report.findings import classes_of, spoken
 
 SIDE_COLORS = {"before": panels.BEFORE, "after": panels.AFTER}
+# Of changes: the colour of the run that has them.
 SHADES = {
     NEW: panels.AFTER,
     LOUDER: panels.AFTER,
@@ -46,15 +47,11 @@ SHADES = {
     QUIETER: panels.BEFORE,
     UNCHANGED: axes.INK,
 }
-"""Of changes: the colour of the run that has them."""
-
-NOISE_POINTS = 60_000
-"""Of each run's noise."""
-DETAILS = 184.0
-"""Height of the panels that lie behind each other."""
+NOISE_POINTS = 60_000  # of each run's noise
+DETAILS = 184.0  # height of the panels that lie behind each other
 LEVEL, CHANGED, NOISE_PANEL = Panel("level", 118.0), Panel("change", 84.0), Panel("noise", DETAILS)
+# Change of level at the upper end of its axis, in [dB], or a multiple where it is larger.
 SPAN_DB = 24.0
-"""Change of level at the upper end of its axis, in [dB], or a multiple where it is larger."""
 
 
 def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> list[Timed]:
@@ -125,10 +122,9 @@ def _sides(*places: float) -> list[Label]:
     ]
 
 
-ROW, LEAST = 26.0, 50.0
-"""Height of a class, and of all of them at least, in points."""
+ROW, LEAST = 26.0, 50.0  # height of a class, and of all of them at least, in points
+# From where to where in its row what was found and annotated is drawn, from above.
 BETWEEN = {"before": ((0.06, 0.34), (0.37, 0.45)), "after": ((0.52, 0.80), (0.83, 0.91))}
-"""From where to where in its row what was found and annotated is drawn, from above."""
 
 
 def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Timed:
@@ -167,8 +163,7 @@ def _occurs(side: Analysis, name: str) -> bool:
     )
 
 
-JOINT_POINTS = 2000
-"""Points of a line: there are three for each signal of a joint."""
+JOINT_POINTS = 2000  # points of a line: there are three for each signal of a joint
 
 
 def log_joints(
@@ -207,10 +202,8 @@ def _difference(before: Signal | None, after: Signal | None) -> Signal | None:
     return replace(after, values=now - was, joints=joints)
 
 
-SHOWN_LINKS = 8
-"""Links that have a row, those that changed most."""
-KEY = Panel("key", 260.0)
-"""The scale beside the robots."""
+SHOWN_LINKS = 8  # links that have a row, those that changed most
+KEY = Panel("key", 260.0)  # the scale beside the robots
 
 
 def log_links(recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair: Pair) -> Part:
@@ -231,14 +224,11 @@ def log_links(recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair
     )[0]
 
 
-ABOVE = 240.0
-"""Least height of the report and the robots."""
-TITLES = 28.0
-"""Height of a row of tabs."""
+ABOVE = 240.0  # least height of the report and the robots
+TITLES = 28.0  # height of a row of tabs
 
 
-ASPECT = 1.35
-"""Least width of a robot's view by its height."""
+ASPECT = 1.35  # least width of a robot's view by its height
 
 
 def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:

@@ -29,8 +29,8 @@ from noisemodel.files import refuse_existing, replacing
 
 COLUMNS = ("start", "stop", "label")
 Span = Block | Event
+# A label of a file, to infinity if it lasts to the end of the run, and its place: "line 3".
 Entry = tuple[Block, str]
-"""A label of a file, to infinity if it lasts to the end of the run, and its place: "line 3"."""
 
 
 def write_labels(
@@ -199,12 +199,12 @@ class Format(NamedTuple):
     parse: Callable[[str], Iterator[Entry]]
 
 
+# All formats by name.
 FORMATS = {
     "noisytest": Format(".toml", _render_noisytest, _parse_noisytest),
     "csv": Format(".csv", _render_csv, _parse_csv),
     "audacity": Format(".txt", _render_audacity, _parse_audacity),
 }
-"""All formats by name."""
 
 
 def format_of(path: Path, name: str = "") -> Format:

@@ -35,31 +35,23 @@ from noisemodel.noise import DENSITY, SOUND_SPEED
 from noisemodel.run import part, stretches
 from noisemodel.types import Array, Mask
 
-PLAYABLE = ("simplified", "normal", "rms")
-"""Kinds of noise that have signed signals."""
+PLAYABLE = ("simplified", "normal", "rms")  # kinds of noise that have signed signals
+# Sampling rates of a sound file and of an embedded sound, enough for a log of 10 kHz, in [Hz].
 RATE, SMALL_RATE = 48_000, 16_000
-"""Sampling rates of a sound file and of an embedded sound, enough for a log of 10 kHz, in [Hz]."""
+# Peak below which a sound is silent, in [rad/s] or [√W]: quantisation noise is larger.
 SILENCE = 1e-6
-"""Peak below which a sound is silent, in [rad/s] or [√W]: quantisation noise is larger."""
-FULL_SCALE = 32767
-"""Full scale of 16 bits."""
+FULL_SCALE = 32767  # full scale of 16 bits
 HEADROOM_DB = 1.0
-OSCILLATIONS = 1000.0
-"""Highest frequency of the paper's oscillations, in [Hz]."""
-LOWEST_AUDIBLE = 20.0
-"""Lowest audible frequency, in [Hz]."""
-WINDOW = 0.0256
-"""Length of a window, in [s]: short enough to keep the time of an impact."""
-FADE = 0.05
-"""Fade at both ends of a stretch without gaps, in [s]: the motion beyond is unknown."""
-ORDER = 4
-"""Order of the high-pass filter."""
-CHUNK = 65_536
-"""Number of samples whose twists are computed at once."""
+OSCILLATIONS = 1000.0  # highest frequency of the paper's oscillations, in [Hz]
+LOWEST_AUDIBLE = 20.0  # lowest audible frequency, in [Hz]
+WINDOW = 0.0256  # length of a window, in [s]: short enough to keep the time of an impact
+FADE = 0.05  # fade at both ends of a stretch without gaps, in [s]: the motion beyond is unknown
+ORDER = 4  # order of the high-pass filter
+CHUNK = 65_536  # number of samples whose twists are computed at once
+# Number of links whose signals are in memory at once: all of 60 links would not fit.
 LINKS_AT_ONCE = 4
-"""Number of links whose signals are in memory at once: all of 60 links would not fit."""
+# Largest number of velocities in a clip: 6 s of 32 joints at 10 kHz, within 0.25 s.
 MOST_VELOCITIES = 4_000_000
-"""Largest number of velocities in a clip: 6 s of 32 joints at 10 kHz, within 0.25 s."""
 
 
 @dataclass(frozen=True)

@@ -81,8 +81,8 @@ def collect(run: nm.Run, library: Library, *, kind: str = "normal") -> Content:
     return Content(analysis, run.time[run.mask], simplified, extended, kind, tuple(missing))
 
 
+# Units of the columns that have one.
 UNITS = {"time": "s", "simplified": "rad/s", "extended": "W", "frame_start": "s", "frame_stop": "s"}
-"""Units of the columns that have one."""
 
 
 def arrow_table(content: Content) -> Any:
@@ -165,20 +165,14 @@ def _framed(time: Array, labels: nc.Labels) -> Iterator[tuple[str, Any]]:
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 MEASURED, DESIRED = "/joint_states", "/joint_states/desired"
-LOG_WARNING = 3
-"""Level of a ``foxglove.Log``."""
-
+LOG_WARNING = 3  # level of a ``foxglove.Log``
 NUMBER, INTEGER, TEXT = {"type": "number"}, {"type": "integer"}, {"type": "string"}
 STAMP = {"type": "object", "properties": {"sec": INTEGER, "nsec": INTEGER}}
 SPAN = {"label": TEXT, "start": NUMBER, "stop": NUMBER}
 NANOSECONDS = 10**9
-LATEST = 2**63
-"""Stamps from here on are not valid, in [ns]."""
-
-Row = tuple[float, dict[str, Any]]
-"""Time in [s], and a message."""
-Message = tuple[int, str, bytes]
-"""Stamp in [ns], topic and serialised content."""
+LATEST = 2**63  # stamps from here on are not valid, in [ns]
+Row = tuple[float, dict[str, Any]]  # time in [s], and a message
+Message = tuple[int, str, bytes]  # stamp in [ns], topic and serialised content
 
 
 def write_mcap(content: Content, path: Path) -> None:
@@ -350,8 +344,7 @@ def _states(
 # --- layouts
 
 LEVEL_TITLE = "level above 10 Hz [dB re 1 rad/s]"
-LISTED = 12
-"""A legend with more lines would cover the plot."""
+LISTED = 12  # a legend with more lines would cover the plot
 
 
 class Line(NamedTuple):
@@ -480,18 +473,17 @@ def _hex(color: colors.Color) -> str:
     return "#{:02x}{:02x}{:02x}".format(*color)
 
 
+# Writers by suffix.
 WRITERS: dict[str, Callable[[Content, Path], None]] = {
     ".mcap": write_mcap,
     ".csv": write_csv,
     ".parquet": write_parquet,
 }
-"""Writers by suffix."""
-
+# Layouts by the suffix that takes the place of ``.mcap``.
 LAYOUTS: dict[str, Callable[[Content], str]] = {
     ".foxglove.json": foxglove,
     ".plotjuggler.xml": plotjuggler,
 }
-"""Layouts by the suffix that takes the place of ``.mcap``."""
 
 
 def export(

@@ -37,18 +37,14 @@ from noisemodel.noise import FAST, REFERENCE_POWER, by_moments, decibel, second_
 from noisemodel.robot import Limits, joint_limits
 from noisemodel.types import Array, Mask
 
+# Another than recordings of whole runs have: the viewer keeps a layout for each application.
 APPLICATION = "inspector-live"
-"""Another than recordings of whole runs have: the viewer keeps a layout for each application."""
 PORT = int(viewer.PORT)
 ADDRESS = re.compile(r"(?:rerun\+http://)?(?:(?P<host>[^:/]+):)?(?P<port>\d{1,5})(?:/proxy)?")
-CHECK_INTERVAL = 1.0
-"""Time between checks that the viewer is still there, in [s]."""
-LATE = 10.0
-"""How far behind the stream a viewer may be before it is sent no more, in [s]."""
-FLUSH_TIMEOUT = 5.0
-"""How long the last messages may take, in [s]."""
-MEMORY = "2GB"
-"""What a viewer that is opened here may keep; then it drops the oldest."""
+CHECK_INTERVAL = 1.0  # time between checks that the viewer is still there, in [s]
+LATE = 10.0  # how far behind the stream a viewer may be before it is sent no more, in [s]
+FLUSH_TIMEOUT = 5.0  # how long the last messages may take, in [s]
+MEMORY = "2GB"  # what a viewer that is opened here may keep; then it drops the oldest
 
 
 class Sink:
@@ -181,12 +177,12 @@ def _parsed(address: str) -> tuple[str, int]:
     return match["host"] or HOST, int(match["port"])
 
 
+# Lines are drawn at once for this time, in [s]: a message costs more than the points in it.
 SEND_INTERVAL = 0.1
-"""Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
+# The same for a file without a viewer: a twentieth of the time so far, within these ends, in [s].
+# For each message, rerun keeps some hundred bytes until the file is closed; longer messages take
+# more memory while they are written.
 FILE_INTERVAL, FILE_LONGEST, FILE_SHARE = 2.0, 20.0, 0.05
-"""The same for a file without a viewer: a twentieth of the time so far, within these ends, in [s].
-For each message, rerun keeps some hundred bytes until the file is closed; longer messages take more
-memory while they are written."""
 
 
 class Messages:
@@ -273,8 +269,7 @@ class SpectrogramStream:
         self._windows.clear(self._hop)
 
 
-STEP = 0.2
-"""Time over which a level of a link is taken, in [s]."""
+STEP = 0.2  # time over which a level of a link is taken, in [s]
 
 
 class LinkLevels:
@@ -326,14 +321,11 @@ class LinkLevels:
 
 
 SHADES = 16
-KEY = Panel("key", 360.0)
-"""The scale beside the robot."""
-ROOM = 1.3
-"""What the camera sees of a robot that moves its base, by its size as it stands at first."""
-POSES = 200
-"""Random poses within the limits of the joints, of which the camera sees all."""
+KEY = Panel("key", 360.0)  # the scale beside the robot
+ROOM = 1.3  # what the camera sees of a robot that moves its base, by its size as it stands at first
+POSES = 200  # random poses within the limits of the joints, of which the camera sees all
+# How far the floor reaches from the first pose, in [m].
 AROUND = np.array([[-20.0, -20.0], [20.0, 20.0]])
-"""How far the floor reaches from the first pose, in [m]."""
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 
@@ -443,16 +435,13 @@ def _range(limits: Limits) -> tuple[float, float]:
     return (limits.lower, limits.upper) if limits.upper - limits.lower < np.inf else (0.0, 0.0)
 
 
-JOINT_POINTS = 400.0
-"""Points of a joint's line in a second, as a recording of ten seconds has."""
+JOINT_POINTS = 400.0  # points of a joint's line in a second, as a recording of ten seconds has
 NOISE_POINTS = 4000.0
-SHOWN = 10.0
-"""Time that plots reach back, in [s]."""
+SHOWN = 10.0  # time that plots reach back, in [s]
 NOISE, BANDS_PATH, SCORES = "/noise/simplified", "/spectrogram/bands", "/score"
 NOISE_PANEL = Panel("noise", 130.0)
 SPECTROGRAM_PANEL, SIGNALS_PANEL = Panel("spectrogram", 150.0), Panel("signals", 390.0)
-NEWEST = 8
-"""Findings that are shown in words; the others are counted."""
+NEWEST = 8  # findings that are shown in words; the others are counted
 
 
 class Drawing:

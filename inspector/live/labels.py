@@ -17,8 +17,7 @@ from noiseclassifier.signals import JOINTS, NOISE
 from noisemodel.run import EDGE
 from noisemodel.types import Array, Mask
 
-BETA = 5.0
-"""Shape of the Kaiser window, as in SciPy's polyphase resampling."""
+BETA = 5.0  # shape of the Kaiser window, as in SciPy's polyphase resampling
 
 
 class Windows:
@@ -70,8 +69,8 @@ class Decimator:
         return windows @ self._taps, whole
 
 
+# What makes noise, in the order of the columns of a motion: where one is unknown, no label is.
 NOISY = ("base_velocity", "velocity", "velocity_desired")
-"""What makes noise, in the order of the columns of a motion: where one is unknown, no label is."""
 
 
 def noise_signal(name: str, motion: Array, base: int, joints: int) -> Array:
@@ -187,8 +186,7 @@ class Labeller:
             self._take(np.zeros((rest, self._columns)), np.zeros(rest, dtype=bool))
 
 
-SETTLED = 3
-"""Hops after the start of an event until its class is known apart from its edge's."""
+SETTLED = 3  # hops after the start of an event until its class is known apart from its edge's
 
 
 class Findings:

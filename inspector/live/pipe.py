@@ -43,22 +43,18 @@ from noiseclassifier.labels import interval
 from noisemodel.types import Array
 
 Item = TypeVar("Item")
+# What `LiveSession.push` takes: ``time``, shape (samples,), in [s], if rows have one; signals by
+# name, each of shape (samples, columns).
 Rows: TypeAlias = dict[str, Array]
-"""What `LiveSession.push` takes: ``time``, shape (samples,), in [s], if rows have one; signals by
-name, each of shape (samples, columns)."""
+# Called with the kind of a row that cannot be read, and a line about it.
 Note: TypeAlias = Callable[[str, str], None]
-"""Called with the kind of a row that cannot be read, and a line about it."""
-
-CHUNK_BYTES = 1 << 18
-"""Bytes that are read at once, if there are so many."""
+CHUNK_BYTES = 1 << 18  # bytes that are read at once, if there are so many
 MAX_LINE_BYTES = 1 << 24
+# Below this, reading waits for more: half of what a pipe holds by default.
 SMALL_CHUNK_BYTES = 1 << 15
-"""Below this, reading waits for more: half of what a pipe holds by default."""
-GATHER = 0.02
-"""How long rows wait for more, in [s]: less than half of a session's batch."""
+GATHER = 0.02  # how long rows wait for more, in [s]: less than half of a session's batch
 EXPECTED = "expected a CSV header and rows, or a JSON object per line"
-UNKNOWN = ("", "nan", "null")
-"""Cells of what is not known, in lower case."""
+UNKNOWN = ("", "nan", "null")  # cells of what is not known, in lower case
 
 
 def follow(
@@ -258,8 +254,7 @@ def _sample(line: bytes) -> dict[str, list[float]]:
 
 
 FORMAT = "noise-live/1"
-NAME = Path("live")
-"""What stands for the file of the stream."""
+NAME = Path("live")  # what stands for the file of the stream
 
 
 class Gate:

@@ -35,8 +35,8 @@ class Warnings:
             self.counts[kind] += count
 
 
+# What a session takes, besides the time; as the run file names it.
 SIGNALS = ("velocity", "velocity_desired", "position", "base_velocity", "base_pose")
-"""What a session takes, besides the time; as the run file names it."""
 
 
 class SampleBuffer:
@@ -126,24 +126,18 @@ def widths_of(rows: Mapping[str, Array], joint_names: Sequence[str]) -> dict[str
     return {name: array.shape[1] for name, array in rows.items()}
 
 
-GAP_STEPS = 1.5
-"""Steps after which a sample is taken to be missing; timestamps may jitter by less."""
-JUMP_STEPS = 20.0
-"""Steps beyond which a timestamp is believed only once others agree with it."""
-AGREE = 5
-"""Timestamps in a row that make a jump a new segment, and no outlier."""
-LONGEST = 3600.0
-"""Jump ahead up to which samples are missing, in [s]; beyond, the clock was set."""
-RATE_TOLERANCE = 0.05
-"""Share by which the rate of the timestamps may differ from the nominal one."""
-RATE_STEPS = 20
-"""Steps from which a rate is estimated."""
+GAP_STEPS = 1.5  # steps after which a sample is taken to be missing; timestamps may jitter by less
+JUMP_STEPS = 20.0  # steps beyond which a timestamp is believed only once others agree with it
+AGREE = 5  # timestamps in a row that make a jump a new segment, and no outlier
+LONGEST = 3600.0  # jump ahead up to which samples are missing, in [s]; beyond, the clock was set
+RATE_TOLERANCE = 0.05  # share by which the rate of the timestamps may differ from the nominal one
+RATE_STEPS = 20  # steps from which a rate is estimated
+# Units of timestamps, by the power of ten by which their steps exceed the rate's.
 UNITS = {3: "milliseconds", 6: "microseconds", 9: "nanoseconds"}
-"""Units of timestamps, by the power of ten by which their steps exceed the rate's."""
 BACKWARDS, TIMELESS = "samples out of order", "samples without time"
 OUTLYING = "outlying timestamps"
+# Kinds of warnings of samples that are left out.
 DROPPED = (BACKWARDS, TIMELESS, OUTLYING, "malformed rows")
-"""Kinds of warnings of samples that are left out."""
 
 
 class Clock:

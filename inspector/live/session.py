@@ -36,12 +36,9 @@ from noisemodel.types import Array, Mask
 
 UNSEEN = "samples that the viewer may not have shown"
 LATE_SAMPLES = "samples that were not sent to a late viewer"
-BATCH = 0.05
-"""Samples are worked on in batches of this duration, in [s]."""
-FASTEST = 1e6
-"""Highest rate, in [Hz]."""
-MOST_DROPPED = 0.05
-"""Share of the samples that may be left out for a verdict of `ok`."""
+BATCH = 0.05  # samples are worked on in batches of this duration, in [s]
+FASTEST = 1e6  # highest rate, in [Hz]
+MOST_DROPPED = 0.05  # share of the samples that may be left out for a verdict of `ok`
 
 
 @dataclass(frozen=True)

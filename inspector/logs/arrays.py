@@ -43,6 +43,7 @@ from noisemodel.types import Real
 COMMAND, COPY = "command", "copy"
 QPOS, QVEL, FORCE = "qpos", "qvel", "qfrc_actuator"
 
+# What arrays hold, by their names (in any case); the first row that fits counts.
 TABLE: tuple[tuple[str, str], ...] = (
     # The state before the first step, and the observations once more, a step later:
     # Isaac Lab, robomimic, D4RL, ManiSkill.
@@ -70,42 +71,33 @@ TABLE: tuple[tuple[str, str], ...] = (
     (r"processed_actions", COMMAND),
     (r"(.*/)?(ctrl|actions?|(joint_)?targets?|commands?)", COMMAND),
 )
-"""What arrays hold, by their names (in any case); the first row that fits counts."""
-
+# Isaac Lab's scene: several things may have joints.
 STATES = re.compile(r"states/articulation/(?P<robot>[^/]+)/(?P<what>.+)")
-"""Isaac Lab's scene: several things may have joints."""
-
+# robosuite's robots, of which there may be two.
 ARMS = re.compile(r"(?:.*/)?(?P<arm>robot\d+)_joint_(?:pos|vel)")
-"""robosuite's robots, of which there may be two."""
-
+# Flags of D4RL and Gymnasium: the last step of an episode has one.
 EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
-"""Flags of D4RL and Gymnasium: the last step of an episode has one."""
-
+# Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``.
 CELLS = re.compile(
     r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?", re.IGNORECASE
 )
-"""Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``."""
-
 RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate", "fs")
+# Names of the number that is the rate in [Hz], or the step in [s].
 STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
-"""Names of the number that is the rate in [Hz], or the step in [s]."""
-
 MOTION = {*SIGNALS, QPOS, QVEL} - {"effort"}
 
 JOINT_STATES = ("joint_states", "joint_state", "jointstates", "states")
+# Names of what PyBullet's getJointStates returns, stacked to (samples, joints, numbers): with or
+# without the motor's torque; nine numbers have the six reaction forces between.
 PARTS: Mapping[int, Mapping[str, int]] = {
     2: {"position": 0, "velocity": 1},
     3: {"position": 0, "velocity": 1, "effort": 2},
     9: {"position": 0, "velocity": 1, "effort": 8},
 }
-"""Names of what PyBullet's getJointStates returns, stacked to (samples, joints, numbers): with or
-without the motor's torque; nine numbers have the six reaction forces between."""
-
+# Least correlation of a position with its target, and the range of its slope.
 FOLLOWS, SLOPES = 0.9, (0.5, 2.0)
-"""Least correlation of a position with its target, and the range of its slope."""
+# What moves less does not move; largest mean distance of its target, both in [rad] or [m].
 STILL, NEARBY = 1e-3, 0.1
-"""What moves less does not move; largest mean distance of its target, both in [rad] or [m]."""
-
 Arrays = Mapping[str, NDArray[Any]]
 
 
@@ -585,17 +577,17 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
 
 MATLAB = b"MATLAB 5.0 MAT-f"  # the first bytes of such a file
 HEADER = 128  # bytes before the first variable
+# Types of elements: a variable, one that is packed, and what a variable begins with.
 MATRIX, COMPRESSED, FLAGS, DIMENSIONS = 14, 15, 6, 5
-"""Types of elements: a variable, one that is packed, and what a variable begins with."""
+# Numbers by the type of their element, whatever the class of the variable is.
 STORED = ("", "i1", "u1", "i2", "u2", "i4", "u4", "f4", "", "f8", "", "", "i8", "u8")
-"""Numbers by the type of their element, whatever the class of the variable is."""
 STRUCT, TEXT, NESTED = 2, 4, (1, 2)  # classes of variables; cells and structs hold others
 NO_NUMBERS = (3, 5, 16, 17, 18)  # classes of objects, sparse matrices and functions
 COMPLEX = 0x800  # the flag of a variable with imaginary parts
 DEPTH = 20  # structs and cells within each other
 
+# Fields of a timeseries, or of what Simulink logs as a struct, that hold the signal itself.
 DATA = ("signals/values", "Data", "data", "Values", "values")
-"""Fields of a timeseries, or of what Simulink logs as a struct, that hold the signal itself."""
 STAMPS = ("Time", "time", "t")
 
 MATLAB_OBJECTS = (

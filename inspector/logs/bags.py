@@ -37,35 +37,33 @@ from inspector.logs.names import listed
 from inspector.text import counted
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 
+# Errors that rosbags lets through on messages that are damaged.
 DAMAGE = (
     *(ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, RecursionError),
     *(struct.error, SyntaxError, TypeError, ValueError, SerdeError),
 )
-"""Errors that rosbags lets through on messages that are damaged."""
-
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 DESCRIPTION = "robot_description"  # the last part of the name of the topic with a robot's URDF
 
+# A JointState topic with one of these in its name holds desired motion.
 COMMANDED = ("command", "desired", "target", "reference", "setpoint")
-"""A JointState topic with one of these in its name holds desired motion."""
 ARRAYS = ("position", "velocity", "effort")
 POINT = {"positions": "position", "velocities": "velocity", "effort": "effort"}
+# Signal and rank of the arrays in the stages of a controller's state.
 CONTROLLED = {
     f"{stage}/{name}": (f"{signal}{'_desired' * desired}", 1 - desired)
     for stage, desired in (("reference", 1), ("desired", 1), ("feedback", 0), ("actual", 0))
     for name, signal in POINT.items()
     if not (desired and signal == "effort")
 }
-"""Signal and rank of the arrays in the stages of a controller's state."""
-
+# Frames that do not move with the robot, the smoothest first, and frames of a robot's base.
 FRAMES = [
     f"{world}/{base}"
     for world in ("odom", "world", "map", "earth")
     for base in ("base_link", "base_footprint", "base", "pelvis", "torso", "trunk", "root")
 ]
-"""Frames that do not move with the robot, the smoothest first, and frames of a robot's base."""
 BASE_WIDTHS = {"pose": 7, "twist": 6, **dict.fromkeys(FRAMES, 7)}
 RECORDER = "the messages have no stamps, those of the recorder are used"
 
@@ -95,6 +93,7 @@ def _state(joints: tuple[str, ...], others: tuple[str, ...] = (), last: str = ""
 
 OLD = ("desired", "actual", "error")
 NEW = ("reference", "feedback", "error", "output")
+# Versions of a controller's state; bags from before 2023 do not contain the definition.
 STATES = (
     _state(NEW, NEW, "float64 speed_scaling_factor"),
     _state((*NEW, *OLD[:2]), (*NEW, *OLD[:2])),
@@ -104,7 +103,6 @@ STATES = (
     _state((*NEW, *OLD[:2])),
     _state(NEW, (), "float64 speed_scaling_factor"),
 )
-"""Versions of a controller's state; bags from before 2023 do not contain the definition."""
 
 
 def _fields_in(definition: str) -> list[str]:
@@ -232,8 +230,8 @@ def stamp(data: bytes) -> int:
 
 # Rows of messages
 
+# What a message tells at one time: joints, stamp in [ns], and numbers by the array's name.
 Row: TypeAlias = tuple[tuple[str, ...], int, Mapping[str, Any]]
-"""What a message tells at one time: joints, stamp in [ns], and numbers by the array's name."""
 
 
 def _of_state(message: Any) -> Iterator[Row]:
@@ -275,6 +273,7 @@ def _pose(position: Any, turn: Any) -> list[float]:
     return [position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w]
 
 
+# By the type of messages, the rows of a message, and signal and rank of each of its arrays.
 MOTION: Mapping[str, tuple[Callable[[Any], Iterator[Row]], Mapping[str, tuple[str, int]]]] = {
     JOINT_STATE: (_of_state, {name: (name, 0) for name in ARRAYS}),
     STATE: (_of_controller, CONTROLLED),
@@ -284,7 +283,6 @@ MOTION: Mapping[str, tuple[Callable[[Any], Iterator[Row]], Mapping[str, tuple[st
     ),
     **dict.fromkeys(TRANSFORMS, (_of_transforms, dict.fromkeys(FRAMES, ("base_pose", 1)))),
 }
-"""By the type of messages, the rows of a message, and signal and rank of each of its arrays."""
 
 
 # Topics
@@ -431,13 +429,13 @@ class Descriptions:
 
 
 TopicReader: TypeAlias = MotionReader | Trajectories | Descriptions
+# Readers by the type of messages.
 TOPIC_READERS: Mapping[str, type[MotionReader] | type[Trajectories]] = {
     JOINT_STATE: MotionReader,
     STATE: MotionReader,
     "trajectory_msgs/msg/JointTrajectory": Trajectories,
     **dict.fromkeys(("nav_msgs/msg/Odometry", *TRANSFORMS), MotionReader),
 }
-"""Readers by the type of messages."""
 
 
 def topic_reader(path: Path, topic: Topic, *, ros1: bool) -> TopicReader | None:
@@ -454,8 +452,8 @@ MCAP_MAGIC = b"\x89MCAP0\r\n"  # the bytes with which an MCAP file begins and en
 MESSAGE, CHUNK, CONNECTION = b"\x02", b"\x05", b"\x07"  # kinds of records of ROS 1
 
 Bytes = bytes | bytearray | memoryview
+# Topic, time of reception in [ns], and the serialised message.
 Message: TypeAlias = tuple[str, int, bytes]
-"""Topic, time of reception in [ns], and the serialised message."""
 
 
 class DamagedError(Exception):
@@ -650,8 +648,8 @@ def _bound_rosbags() -> None:
 
 # Chunks, unpacked piece by piece
 
+# Bytes of the bag, and bytes that were unpacked of it.
 _budget: ContextVar[list[int]] = ContextVar("budget")
-"""Bytes of the bag, and bytes that were unpacked of it."""
 
 
 def begin(path: Path) -> None:
@@ -701,8 +699,8 @@ def _zstd(stream: BinaryIO) -> Any:
     return zstandard.ZstdDecompressor().stream_reader(stream, read_across_frames=True)
 
 
+# What opens a compressed stream, by the name that bags have for it.
 METHODS: dict[str, Callable[[BinaryIO], Any]] = {"bz2": bz2.open, "lz4": _lz4, "zstd": _zstd}
-"""What opens a compressed stream, by the name that bags have for it."""
 
 
 # Record by record
@@ -900,11 +898,11 @@ def _fields(header: bytes) -> dict[str, bytes]:
     return fields
 
 
+# Reads topics and messages, or topics alone; appends what was lost, a sentence each.
 Records: TypeAlias = Callable[[Path, list[str], bool], Iterator[Topic | Message]]
-"""Reads topics and messages, or topics alone; appends what was lost, a sentence each."""
+# What reads the records of a file, by its first bytes.
 RECORDS: dict[bytes, Records] = {
     MCAP_MAGIC: mcap_records,
     b"SQLite format 3\x00": _sqlite,
     b"#ROSBAG V2.0": _ros1,
 }
-"""What reads the records of a file, by its first bytes."""

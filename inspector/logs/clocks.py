@@ -27,28 +27,26 @@ from noisemodel.run import SAMPLED, continuous_quaternions, resample
 from noisemodel.runfile import OnDemand, pieces
 from noisemodel.types import Array, Indices, Mask, Real
 
+# The units that stamps may have, in [s].
 UNITS = {"seconds": "1", "milliseconds": "1e-3", "microseconds": "1e-6", "nanoseconds": "1e-9"}
-"""The units that stamps may have, in [s]."""
 SLOWEST_SECONDS = 0.5  # median step up to which stamps are in seconds, in [s]
 RATES = (20.0, 20e3)  # rates of logs, from which the unit of larger steps follows, in [Hz]
 NEARLY = 4.0  # two units are ambiguous if a rate is within this factor of the ends of ``RATES``
+# Time since 1970, from 1998 to 2128, by which absolute stamps tell their unit, in [s].
 EPOCH = (9e8, 5e9)
-"""Time since 1970, from 1998 to 2128, by which absolute stamps tell their unit, in [s]."""
-
 COMMON_RATES = (
     *(10, 15, 20, 24, 25, 30, 40, 50, 60, 80, 90, 100, 120, 125, 150, 200, 240, 250, 300, 333),
     *(400, 480, 500, 600, 800, 1000, 1200, 1500, 2000, 2400, 4000, 5000, 10_000),
 )
+# A rate found from the values is one of these, in [Hz], if it differs by no more than that.
 NEAR_RATE = 0.02
-"""A rate found from the values is one of these, in [Hz], if it differs by no more than that."""
 LARGEST_STEP = 1.0  # larger steps of a position are a turn or a reset, in [rad] or [m]
+# Least correlation of velocities with the steps of positions from which the rate is found.
 FITS = 0.98
-"""Least correlation of velocities with the steps of positions from which the rate is found."""
+# Relative difference from which a rate found from the values contradicts a stated one.
 DISAGREE = 0.25
-"""Relative difference from which a rate found from the values contradicts a stated one."""
-
+# Share of samples out of order above which a log is refused: it is several, or has no stamps.
 MOST_UNORDERED = 0.1
-"""Share of samples out of order above which a log is refused: it is several, or has no stamps."""
 BLOCK = 500_000  # values that are interpolated at once, which takes about ten times their memory
 
 
@@ -327,12 +325,12 @@ def _between(instants: Array, stamps: Stamps, values: Real, slack: float) -> Arr
 CORRELATION = 0.6  # least normalised correlation of an accepted offset
 NEXT_BEST = 0.95  # largest correlation of the next best offset, as a share of the best
 SHARE = 0.5  # least share of the shorter log that overlaps the longer one
+# Largest delay of measured behind desired motion that is attributed to a controller, in [s].
 LAG = 0.1
-"""Largest delay of measured behind desired motion that is attributed to a controller, in [s]."""
 HIGHEST_RATE = 1000.0  # highest rate at which motions are compared, in [Hz]
 COARSE_RATE = 50.0  # rate of the first search, in [Hz]
+# Largest number of segments that the drift is fitted to, and their least length, in [s].
 SEGMENTS, SHORTEST = 12, 2.0
-"""Largest number of segments that the drift is fitted to, and their least length, in [s]."""
 SIGNIFICANT = 5.0  # least ratio of a drift to its standard error
 LEAST_DRIFT = 20e-6  # least drift that is distinguished from none, as of quartz clocks, in [s/s]
 

@@ -39,10 +39,10 @@ from noisemodel.files import beyond, limit
 from noisemodel.types import Array
 
 DELIMITERS = (";", "\t", ",", " ")  # marks between cells
+# Beginnings of lines that are comments, or of a header that NumPy or rostopic wrote.
 COMMENTS = ("#", "%", "//")
-"""Beginnings of lines that are comments, or of a header that NumPy or rostopic wrote."""
+# Cells without a number, in any case.
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
-"""Cells without a number, in any case."""
 HEAD = 200  # lines among which the first row of numbers is looked for
 EXAMINED = 20_000  # lines of a log without a header from which its columns are recognised
 CLEAR = 0.8  # least correlation of columns with the slopes of others that they are named after
@@ -52,10 +52,10 @@ DIGITS = 30  # stamps have at most so many digits before or after the point
 PIECE = 2**20  # characters that are read at once
 
 SECONDS = re.compile(r"(?P<record>.*?)secs?(?:onds)?", re.IGNORECASE)
+# Endings of the two columns of a stamp in whole seconds, and nanoseconds since.
 NANOSECONDS = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
-"""Endings of the two columns of a stamp in whole seconds, and nanoseconds since."""
+# Beginning of rostopic's columns with the joints' names, which end with a number.
 NAME = "field.name"
-"""Beginning of rostopic's columns with the joints' names, which end with a number."""
 YEARS = range(1900, 2100)  # of dates; stamps that are larger are in another unit than seconds
 DAY = datetime(1970, 1, 1, tzinfo=UTC)
 

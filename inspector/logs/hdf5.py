@@ -41,13 +41,12 @@ from noiseclassifier.jsontext import from_json
 from noisemodel.runfile import ArchiveError, check_unpacked, one_line
 
 EPISODES = "data"  # the group that holds the episodes of robomimic and Isaac Lab
+# The attribute of that group which tells how robomimic and Isaac Lab set up their simulator.
 ARGUMENTS = "env_args"
-"""The attribute of that group which tells how robomimic and Isaac Lab set up their simulator."""
+# Names of episodes in a file without that group: Minari's, ManiSkill's and others.
 NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
-"""Names of episodes in a file without that group: Minari's, ManiSkill's and others."""
-
+# Errors that h5py raises for damaged files.
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
-"""Errors that h5py raises for damaged files."""
 SMALL = 8 * 2**20  # bytes up to which a dataset is read whatever its name is
 NAMES = {*TIMES, *EPISODE_ENDS}
 
@@ -59,12 +58,11 @@ text = file.get(sys.argv[2], file).attrs[sys.argv[3]]
 text = text.encode("utf-8", "surrogateescape") if isinstance(text, str) else text
 sys.stdout.buffer.write(text)
 """
+# Time in [s] to read a text of any length: in a damaged heap libhdf5 searches it for ever.
 TIMEOUT = 10.0
-"""Time in [s] to read a text of any length: in a damaged heap libhdf5 searches it for ever."""
-
 MATLAB = b"MATLAB 7.3"  # the first bytes of a file that MATLAB wrote
+# An attribute of MATLAB's objects, of which a file holds numbers and references alone.
 OBJECT = "MATLAB_object_decode"
-"""An attribute of MATLAB's objects, of which a file holds numbers and references alone."""
 REFERENCES = "#refs#"  # the group in which MATLAB keeps the cells and objects of a file
 
 

@@ -19,8 +19,8 @@ from noisemodel.types import Array, Mask, Real
 
 SAMPLES = "samples"  # the unit of stamps that count samples, of a log whose rate is not known yet
 
+# Round rates are these, times a power of ten, in [Hz].
 ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-"""Round rates are these, times a power of ten, in [Hz]."""
 NEAR = 0.05  # largest relative difference of a nominal rate to the round one that replaces it
 UNIFORM = 1e-3  # largest relative deviation of a uniform clock's steps from their median
 GAP = 5.0  # length of a step, in nominal ones, above which it is a gap
@@ -198,8 +198,8 @@ class Log:
     in_degrees: tuple[str, ...] = ()  # "position" and "velocity" if found to be in degrees
 
 
+# Wraps what is read, to show how much is done; of so many items, 0 if that is not known.
 Progress: TypeAlias = Callable[[Iterable[Any], int], Iterable[Any]]
-"""Wraps what is read, to show how much is done; of so many items, 0 if that is not known."""
 
 
 def without_progress(items: Iterable[Any], total: int) -> Iterable[Any]:

@@ -34,13 +34,13 @@ from noisemodel.files import replacing
 from noisemodel.types import Array, Mask, Real
 
 FORMAT = "noise-mapping/1"
+# Units of angles; normalised is -100 to 100 of each joint's range, 0 to 100 of a gripper's.
 UNITS = ("radians", "degrees", "normalised")
-"""Units of angles; normalised is -100 to 100 of each joint's range, 0 to 100 of a gripper's."""
 RATES = (1e-3, 1e9)  # rates that a log may be said to have, in [Hz]
 
+# Conventions of a base: the order of its quaternion; the axes of its velocity, which for MuJoCo are
+# the world's for the linear part and the body's for the angular one. The first is the run's.
 CONVENTIONS = {"base_pose": ("xyzw", "wxyz"), "base_velocity": ("body", "world", "mujoco")}
-"""Conventions of a base: the order of its quaternion; the axes of its velocity, which for MuJoCo
-are the world's for the linear part and the body's for the angular one. The first is the run's."""
 WIDTHS: Mapping[str, int] = {"base_pose": 7, "base_velocity": 6}
 
 NO_MOTION = (

@@ -42,9 +42,9 @@ class Imported:
     """A run that was read from a log."""
 
     run: Run
-    remarks: tuple[str, ...]  # what was decided during the import, a sentence each
-    name: str = ""  # of the log and of the episode
-    urdf: str = ""  # text of the URDF in the log, if no robot was specified
+    remarks: tuple[str, ...]  #: what was decided during the import, a sentence each
+    name: str = ""  #: of the log and of the episode
+    urdf: str = ""  #: text of the URDF in the log, if no robot was specified
 
 
 def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
@@ -246,14 +246,14 @@ def _repeats(time: Array, same: Mask, tracks: Sequence[Track]) -> Iterator[tuple
 
 # Angles
 
+# Values above which an angle is taken for degrees, in [rad] and [rad/s].
 LARGEST = {"position": 4 * np.pi, "velocity": 100.0}
-"""Values above which an angle is taken for degrees, in [rad] and [rad/s]."""
 TURN = 2 * np.pi  # positions beyond, of half of the joints that move, are in degrees, in [rad]
 FARTHEST = 720.0  # largest position of an arm's joint, in [deg]; wheels turn farther
 NORMALISED = 100.0  # largest position that may be normalised as well
 STRAIGHT = 0.9  # share of its way that a joint is away from its start: wheels go on and on
+# What is in degrees, by the ratio of logged velocities to the slope of positions.
 MATCHES = {1.0: ("position", "velocity"), np.pi / 180: ("position",), 180 / np.pi: ("velocity",)}
-"""What is in degrees, by the ratio of logged velocities to the slope of positions."""
 CLOSE = 0.1  # largest relative deviation from such a ratio
 STRETCHES = 50  # of a log, whose ways are compared
 TURNING = ("revolute", "continuous")

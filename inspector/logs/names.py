@@ -10,31 +10,27 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import TypeAlias
 
-Meaning: TypeAlias = tuple[str, str | int]
-"""A signal, and the name or the number of its joint."""
-
+Meaning: TypeAlias = tuple[str, str | int]  # a signal, and the name or the number of its joint
 JOINT_SIGNALS = ("position", "velocity", "effort", "position_desired", "velocity_desired")
 BASE_SIGNALS = ("base_pose", "base_velocity")
 SIGNALS = (*JOINT_SIGNALS, *BASE_SIGNALS)
 
+# Names of a time column, in any case; the first of these that a log has is used.
 TIMES = ("time", "timestamp", "t", "__time", "stamp", "ts", "elapsed", "sec", "secs", "seconds")
-"""Names of a time column, in any case; the first of these that a log has is used."""
-
+# ``field.header.stamp``, ``ros_time``, ``elapsed_time``.
 TIME = re.compile(
     r"(?:.*[./])?(?:(?:elapsed|ros|rosbag|system|sys|robot|host|pc|unix|wall|sim|log)[_ ]?)?"
     r"(?P<name>__time|time[_ ]?stamp|time|stamp|t|ts|elapsed|secs?|seconds)",
     re.IGNORECASE,
 )
-"""``field.header.stamp``, ``ros_time``, ``elapsed_time``."""
-
+# Units of stamps, as names of columns have them.
 TIME_UNITS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), "seconds"),
     **dict.fromkeys(("ms", "msec", "millis", "milliseconds"), "milliseconds"),
     **dict.fromkeys(("us", "µs", "μs", "usec", "micros", "microseconds"), "microseconds"),
     **dict.fromkeys(("ns", "nsec", "nanos", "nanoseconds"), "nanoseconds"),
 }
-"""Units of stamps, as names of columns have them."""
-
+# Quantity and size, in [rad], [rad/s], [m] or [m/s], of units, as names of columns have them.
 UNITS = {
     **dict.fromkeys(("rad", "radians"), ("position", 1.0)),
     **dict.fromkeys(("deg", "degree", "degrees", "°"), ("position", pi / 180)),
@@ -53,23 +49,19 @@ UNITS = {
     "mm/s": ("velocity", 1e-3),
     **dict.fromkeys(("nm", "n m", "n*m", "n.m", "n·m", "n", "a"), ("effort", 1.0)),
 }
-"""Quantity and size, in [rad], [rad/s], [m] or [m/s], of units, as names of columns have them."""
-
+# ``Time [sec]``, ``timestamp_ms``, ``Joint1 Velocity (deg/s)``, ``q1_deg``.
 UNIT = re.compile(
     r"(?P<name>.*?)(?:\s*+[\[(]\s*+(?P<bracketed>(?=[^\])]*[^\d\s\])])[^\])]*+)[\])]"
     r"|[_ ](?P<suffix>m?s|sec|secs|seconds|msec|us|usec|ns|nsec"
     r"|rad|rads|radps|rad_s|deg|degs|degps|deg_s|dps|rpm|nm))",
     re.IGNORECASE,
 )
-"""``Time [sec]``, ``timestamp_ms``, ``Joint1 Velocity (deg/s)``, ``q1_deg``."""
-
+# Words of a quantity. ``qd`` is a velocity, ``q_d`` a desired position.
 QUANTITIES = {
     "position": r"positions?|pos|angles?|q_?pos|q|theta",
     "velocity": r"velocity|velocities|vel|speeds?|q_?vel|q_?dot|theta_?dot|dtheta|qd|dq|omega",
     "effort": r"efforts?|eff|torques?|tau(?:_?j)?",
 }
-"""Words of a quantity. ``qd`` is a velocity, ``q_d`` a desired position."""
-
 DESIRED = (
     r"desired|des|reference|ref|targets?|commanded|commands?|cmd|cmptd|set_?points?|sp|goal"
     r"|demanded|planned|soll"
@@ -103,6 +95,7 @@ FIRST = re.compile(
 WHOLE = re.compile(RECORD + BEFORE + WHOSE + ALONE + AFTER, re.IGNORECASE)
 
 NUMBERED = QUANTITY + AFTER + GAP + "?" + NUMBER + LAST
+# Names of columns and arrays; the first that matches counts.
 PATTERNS = (
     FIRST,
     re.compile(RECORD + WORD + BEFORE + WORD + NUMBERED, re.IGNORECASE),  # q_d[0], joint_pos_1
@@ -112,55 +105,47 @@ PATTERNS = (
         RECORD + BEFORE + r"(?P<joint>[^/]+?)" + GAP + WITHIN + QUANTITY + AFTER, re.IGNORECASE
     ),
 )
-"""Names of columns and arrays; the first that matches counts."""
-
+# Things before a quantity that are no joints.
 NOT_JOINTS = re.compile(
     rf"(?:.*{GAP})?(?:tcp|eef?|end_?effector|cartesian|cart|linear|angular|lin|ang|com|imu|odom|gps"
     rf"|gravity|friction|external|ext|contact|inertia|bias|residual|disturbance)"
     rf"(?:{GAP}.*)?|base|root|body|tool|object|robot|max|min|mean|x|y|z|roll|pitch|yaw|wind",
     re.IGNORECASE,
 )
-"""Things before a quantity that are no joints."""
-
+# Names of what a controller computes: ``/state/error/positions[0]``, ``PositionError1``.
 NOT_MOTION = re.compile(
     r"(?:.*[/._ ])?(?:errors?|err)(?:[/._ \[(].*)?|(?:.*/)?output/.*"
     r"|.*(?-i:(?<=[a-z0-9])E(?:rr|rror)s?)[_\[(]?\d*[\])]?",
     re.IGNORECASE,
 )
-"""Names of what a controller computes: ``/state/error/positions[0]``, ``PositionError1``."""
-
+# ``joint1``, ``J1``, ``axis 1``: names that number the joints.
 GENERIC = re.compile(rf"(?:{JOINT_WORD}|servo|j|a)[ _]?(?P<number>\d+)", re.IGNORECASE)
-"""``joint1``, ``J1``, ``axis 1``: names that number the joints."""
-
 LIMBS = r"left|right|front|rear|hind|back|l|r|fl|fr|rl|rr|lf|rf|lh|rh|hl|hr|bl|br|arm|leg|hand"
 PARTS = (
     r"shoulder|elbow|wrist|hip|knee|ankle|thigh|calf|shank|waist|torso|neck|upper_?arm|fore_?arm"
     r"|haa|hfe|kfe|abad|gripper|finger|thumb"
 )
+# Names of joints without a quantity: ``Joint1``, ``FL_0``, ``shoulder_lift``, ``wrist_1``. What
+# repeats has one reading or a bound: ``rrrr`` is `r` four times or `rr` twice.
 BARE = re.compile(
     rf"(?:(?:{LIMBS}){GAP}?){{0,4}}(?:(?:{JOINT_WORD}|servo|j|(?-i:A))[ _]?\d+|(?<=[a-z][ _.-])\d+)"
     rf"|(?=.*(?:{PARTS}))(?:(?:{LIMBS}|{PARTS}|{JOINT_WORD}|lift|pan|tilt|flex|rotate|rotation"
     rf"|roll|pitch|yaw|[xyz]|\d+(?!\d))(?:{GAP}|(?=\d)|$))+",
     re.IGNORECASE,
 )
-"""Names of joints without a quantity: ``Joint1``, ``FL_0``, ``shoulder_lift``, ``wrist_1``.
-
-What repeats has one reading or a bound: ``rrrr`` is `r` four times or `rr` twice.
-"""
 SIDED = re.compile(
     rf"(?:(?P<before>{DESIRED}|{MEASURED}){GAP})?(?P<joint>.+?)"
     rf"(?:{GAP}(?P<after>{DESIRED}|{MEASURED}))?",
     re.IGNORECASE,
 )
 
+# Names that an example of what to type leaves out.
 UNLIKELY = re.compile(
     rf"(?:.*{GAP})?(?:errors?|err|torques?|tau|effort|currents?|cur|amps?|volt(?:age|s)?|temp\w*"
     rf"|force|acc\w*|imu|gyro\w*|tcp|pose|end|fsm|state|status|mode|flags?|is|contact|id|index|seq"
     rf"|u|{DESIRED})(?:{GAP}.*|[\[(]?\d*[\])]?)|[xyz]|q[wxyz]|time.*|.*time|t",
     re.IGNORECASE,
 )
-"""Names that an example of what to type leaves out."""
-
 LONGEST = 300  # characters of a name from which on it names no signal: patterns take their square
 
 SIDES = ("before", "within", "after", "last")  # parts of a name that tell whether it is desired

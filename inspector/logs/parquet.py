@@ -34,22 +34,22 @@ from noisemodel.files import beyond, limit
 from noisemodel.runfile import ArchiveError, check_regular, check_unpacked, one_line
 from noisemodel.types import Real
 
+# Errors that pyarrow raises for damaged files.
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
-"""Errors that pyarrow raises for damaged files."""
 EPISODE = "episode_index"  # the column with the number of the episode, if there is one
 
 INFO = Path("meta", "info.json")  # the file that describes a LeRobot data set
 STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
+# Features that some data sets have besides (ALOHA's), and their signals.
 FURTHER = {"observation.velocity": "velocity", "observation.effort": "effort"}
-"""Features that some data sets have besides (ALOHA's), and their signals."""
+# Signals by the last part of a name: ``shoulder_pan.pos``.
 PARTS = {"pos": "position", "vel": "velocity", "effort": "effort", "torque": "effort"}
-"""Signals by the last part of a name: ``shoulder_pan.pos``."""
+# Column names of an end effector's pose.
 CARTESIAN = {"x", "y", "z", "roll", "pitch", "yaw", "rx", "ry", "rz", "qx", "qy", "qz", "qw"}
-"""Column names of an end effector's pose."""
 SLOWEST, FASTEST = 1e-3, 1e6  # rates that a data set may have, in [Hz]
 LATEST = 9e9  # stamps and frame numbers lie before: in nanoseconds, these fit into 64 bits
+# Largest difference of a stamp from its frame number over the rate, in [s], as in LeRobot.
 TOLERANCE = 1e-4
-"""Largest difference of a stamp from its frame number over the rate, in [s], as in LeRobot."""
 UNKNOWN = (
     "LeRobot does not log the unit of its '.pos' features: specify --units degrees, normalised"
     " (-100 to 100 of each joint's range, needs --robot) or radians"
@@ -167,12 +167,12 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
 # What columns unpack to
 
 TRUE, FALSE, BYTE, DOUBLE, BINARY, LIST, SET, STRUCT = 1, 2, 3, 7, 8, 9, 10, 12
+# Types of Thrift's compact protocol; the last are integers of 16, 32 and 64 bits.
 NUMBERS = (4, 5, 6)
-"""Types of Thrift's compact protocol; the last are integers of 16, 32 and 64 bits."""
 DEPTH = 13  # structs and lists within each other; the end of a file has eight
 MAGIC = b"PAR1"
+# Most bytes of the end of a file, which has some hundred for each column of a row group.
 LARGEST_END = 32 * 2**20
-"""Most bytes of the end of a file, which has some hundred for each column of a row group."""
 
 # Fields of structs, by the names of parquet.thrift
 ROW_GROUPS, COLUMNS, ROWS, META_DATA = 4, 1, 3, 3

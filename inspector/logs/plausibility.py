@@ -71,8 +71,8 @@ def _named(joints: Sequence[str], known: Mapping[str, Limits]) -> tuple[str, ...
 
 FAR_POSITION = 0.25  # share of a joint's range by which positions may be beyond its ends
 FAR_VELOCITY = 1.5  # multiple of a joint's velocity limit that velocities may reach
+# Time for which limits have to be exceeded, in [s]; of short runs, a tenth of their duration.
 LONG = 1.0
-"""Time for which limits have to be exceeded, in [s]; of short runs, a tenth of their duration."""
 
 
 def limit_warnings(run: Run) -> Iterator[str]:
@@ -144,6 +144,7 @@ class LimitWatch:
 
 # Velocities beside positions
 
+# Warnings by the ratio of velocities to the slope of positions.
 FACTORS: Mapping[float, str] = {
     180 / np.pi: "velocities look like degrees per second beside positions in radians",
     np.pi / 180: "positions look like degrees beside velocities in radians per second",
@@ -151,16 +152,15 @@ FACTORS: Mapping[float, str] = {
     1 / 6: "velocities look like turns per minute beside positions in degrees",
     1 / (2 * np.pi): "velocities look like turns per second beside positions in radians",
 }
-"""Warnings by the ratio of velocities to the slope of positions."""
+# Largest relative deviation from a factor, less than half the distance of two of them.
 NEAR_FACTOR = 0.02
-"""Largest relative deviation from a factor, less than half the distance of two of them."""
 STRETCH = 0.2  # time over which velocities are integrated and compared with positions, in [s]
+# Largest relative deviation of a velocity from the slope of its position: filters attenuate.
 AGREE = 0.2
-"""Largest relative deviation of a velocity from the slope of its position: filters attenuate."""
+# Correlation of the two from which a factor is one, and below which they have no relation.
 RELATED, UNRELATED = 0.9, 0.3
-"""Correlation of the two from which a factor is one, and below which they have no relation."""
+# Root mean square of the way in a stretch from which a joint is compared, in [rad] or [m].
 WAY = 0.02
-"""Root mean square of the way in a stretch from which a joint is compared, in [rad] or [m]."""
 ENOUGH = 5  # fewest stretches
 
 

@@ -28,6 +28,7 @@ from noisemodel.files import also_reading, refuse_existing, replacing
 from noisemodel.robot import joint_limits
 from noisemodel.run import NotUniformError
 
+# The first bytes of a file, and the module here that reads it; other files are CSV.
 MAGIC = {
     b"\x89MCAP0\r\n": "bags",
     b"SQLite format 3\x00": "bags",
@@ -40,18 +41,14 @@ MAGIC = {
     b"MATLAB 7.3 MAT-f": "hdf5",
     b"MATLAB 5.0 MAT-f": "arrays",
 }
-"""The first bytes of a file, and the module here that reads it; other files are CSV."""
-
+# The libraries that a reader needs, and the extra that installs them.
 NEEDS = {"bags": (("rosbags", "mcap"), "ros"), "hdf5": (("h5py",), "hdf5")}
-"""The libraries that a reader needs, and the extra that installs them."""
-
+# By these files, a folder is a LeRobot data set, or a bag of ROS 2.
 INFO, BAG = Path("meta") / "info.json", "metadata.yaml"
-"""By these files, a folder is a LeRobot data set, or a bag of ROS 2."""
-
+# The files of a folder that are taken for logs; others are read if they are named.
 SUFFIXES = frozenset(
     (".npz", ".csv", ".tsv", ".log", ".parquet", ".h5", ".hdf5", ".mat", ".mcap", ".bag", ".db3")
 )
-"""The files of a folder that are taken for logs; others are read if they are named."""
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:

@@ -24,10 +24,8 @@ from inspector.recording import unstable
 from inspector.recording.unstable import TIMELINE, Part
 from noisemodel.types import Array, Real
 
-SPAN = "/span"
-"""Lies in every plot over time, so that it reaches from the start to the end."""
-FARTHEST = 9e9
-"""Rerun counts nanoseconds in 64 bits: 292 years, in [s]."""
+SPAN = "/span"  # lies in every plot over time, so that it reaches from the start to the end
+FARTHEST = 9e9  # rerun counts nanoseconds in 64 bits: 292 years, in [s]
 
 
 def at(time: Array) -> rr.TimeColumn:
@@ -115,28 +113,19 @@ def log_events(
     )
 
 
-TOP = 9.99
-"""Upper end of the axis of rows."""
+TOP = 9.99  # upper end of the axis of rows
 INK, WHITE = (205, 208, 214), (255, 255, 255)
-VERDICT = 38.0
-"""Height of a verdict, in points."""
-AXIS = 18.0
-"""Height of a panel's time axis, in points."""
-TEXT = 13.0
-"""Rerun writes a label below its point: from there to the label's middle, in points."""
-HALF = 10.0
-"""Half of the height of a label, in points: none is cut by the upper edge."""
-LINE = 16.0
-"""Height of a further line of a label, in points."""
-LEFT, MIDDLE, RIGHT = 14.0, 78.0, 8.0
-"""Shares of the width: names and ticks, the panel, its scale."""
-STEPS = 24
-"""Colours of a scale."""
+VERDICT = 38.0  # height of a verdict, in points
+AXIS = 18.0  # height of a panel's time axis, in points
+TEXT = 13.0  # rerun writes a label below its point: from there to the label's middle, in points
+HALF = 10.0  # half of the height of a label, in points: none is cut by the upper edge
+LINE = 16.0  # height of a further line of a label, in points
+LEFT, MIDDLE, RIGHT = 14.0, 78.0, 8.0  # shares of the width: names and ticks, the panel, its scale
+STEPS = 24  # colours of a scale
+# Factor from the height of a panel in a window of 1440 x 900 to its height between that and one of
+# 1920 x 1080: labels stand as well in either.
 GROWN = 1.15
-"""Factor from the height of a panel in a window of 1440 x 900 to its height between that and one
-of 1920 x 1080: labels stand as well in either."""
-APART = 17.0
-"""Least distance of two ticks, in points."""
+APART = 17.0  # least distance of two ticks, in points
 
 
 @dataclass(frozen=True)
@@ -144,8 +133,8 @@ class Panel:
     """A panel over time; what is beside it lies at its name below ``/axis``."""
 
     name: str
+    # With its time axis, in points, in a window of 1440 x 900; it grows with the window.
     height: float
-    """With its time axis, in points, in a window of 1440 x 900; it grows with the window."""
 
     def y(self, place: float) -> float:
         """Where a label is put in the view beside the panel, so that it stands at a place in it."""
@@ -158,11 +147,9 @@ class Panel:
 class Label:
     """A text beside a panel."""
 
-    place: float
-    """Its height in the panel, from 0 at the bottom to 1 at the top."""
+    place: float  # its height in the panel, from 0 at the bottom to 1 at the top
     text: str
-    shift: float = 0.0
-    """From the middle of the view beside the panel to the right, in points."""
+    shift: float = 0.0  # from the middle of the view beside the panel to the right, in points
     color: Color = INK
 
 
@@ -217,12 +204,11 @@ def texts(
     )
 
 
+# What a plot shows: all that lies below its path, from the start to the end.
 ALL = ("$origin/**", SPAN)
-"""What a plot shows: all that lies below its path, from the start to the end."""
 
 
-Timed: TypeAlias = tuple[Part, float]
-"""A panel over time with its height, in points."""
+Timed: TypeAlias = tuple[Part, float]  # a panel over time with its height, in points
 
 
 def timed(
@@ -315,10 +301,9 @@ def log_verdict(
     recording.reset_time()
 
 
+# Colour of a row where nothing is known: the viewer's background.
 EMPTY = (*colors.BACKGROUNDS[0], 255)
-"""Colour of a row where nothing is known: the viewer's background."""
-SHADES = 32
-"""Colours of a row: few change rarely."""
+SHADES = 32  # colours of a row: few change rarely
 
 
 def log_rows(

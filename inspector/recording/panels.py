@@ -29,8 +29,7 @@ from noisemodel import Block, Run
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
 from noisemodel.types import Array, Mask, Real
 
-HATCHES = 6
-"""Strokes of a gap."""
+HATCHES = 6  # strokes of a gap
 
 
 def log_gaps(
@@ -46,10 +45,8 @@ def log_gaps(
         axes.log_line(recording, f"{path}/gap", np.concatenate(times), line, shade, name=name)
 
 
-MAX_JOINTS = 10
-"""Joints that one plot can hold."""
-JOINTS_PER_PLOT = 8
-"""Joints in each plot if there are more than that."""
+MAX_JOINTS = 10  # joints that one plot can hold
+JOINTS_PER_PLOT = 8  # joints in each plot if there are more than that
 
 
 def limbs(names: Sequence[str], tree: UrdfTree | None) -> dict[str, tuple[str, ...]]:
@@ -101,10 +98,10 @@ def _limb_title(joints: Sequence[str]) -> str:
     return shared if len(shared) > 1 else f"{joints[0]} … {joints[-1]}"
 
 
-ROW = 20.0
-"""Height of a class, in points."""
+ROW = 20.0  # height of a class, in points
+# From where to where in its row each is drawn, from above.
 FOUND, ANNOTATED = (0.10, 0.62), (0.68, 0.88)
-"""From where to where in its row each is drawn, from above."""
+# Of the classes, so that a finding shorter than a pixel is seen.
 MARKERS: tuple[MarkerShapeLike, ...] = (
     "Diamond",
     "Square",
@@ -115,7 +112,6 @@ MARKERS: tuple[MarkerShapeLike, ...] = (
     "Down",
     "Asterisk",
 )
-"""Of the classes, so that a finding shorter than a pixel is seen."""
 
 
 def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed]:
@@ -250,8 +246,7 @@ def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
 NOISE_POINTS = 100_000
 NOISE, LEVEL = Panel("noise", 128.0), Panel("level", 120.0)
 PROBABILITY = Panel("probability", 92.0)
-LOW_DB, HIGH_DB = -80.0, 30.0
-"""Ends of the level's axis, in [dB re 1 rad/s]."""
+LOW_DB, HIGH_DB = -80.0, 30.0  # ends of the level's axis, in [dB re 1 rad/s]
 
 
 def log_curves(
@@ -354,8 +349,7 @@ def _log_probability(
     return _curve(recording, analysis, PROBABILITY, (0.0, 1.05))
 
 
-JOINT_POINTS = 4000
-"""Points of a line, so that a long run has no more than a short one."""
+JOINT_POINTS = 4000  # points of a line, so that a long run has no more than a short one
 UNITS = {"velocity": "rad/s", "position": "rad", "effort": "N m"}
 
 
@@ -365,8 +359,7 @@ class Signal:
 
     kind: str
     desired: bool
-    values: Real
-    """Shape (samples, joints), in the unit of its kind."""
+    values: Real  # shape (samples, joints), in the unit of its kind
     joints: tuple[str, ...]
 
     @property
@@ -393,8 +386,8 @@ def signals(run: Run) -> list[Signal]:
     ]
 
 
+# Entity of a signal, the signal, the samples shown, what is added to names, whether it is dim.
 Drawn: TypeAlias = tuple[str, Signal, Mask, str, bool]
-"""Entity of a signal, the signal, the samples shown, what is added to names, whether it is dim."""
 
 
 def log_joints(
@@ -448,16 +441,11 @@ def log_plots(
     return [unstable.tabs(*own, name=limb) for limb, own in parts.items()]
 
 
-STRIP_ROW = 18.0
-"""Height of a row, in points; what is drawn is lower, so that rows stand apart."""
-STRIP_WIDTH, STROKES = 7.0, 3
-"""Of the lines of a row, in points, and how many there are."""
-ROBOT_SHADES = 16
-"""Colours of the robot."""
-POWER_FLOOR_DB = -20.0
-"""Sound power below this is drawn at it, in [dB re 1 pW]."""
-KEY = Panel("key", 285.0)
-"""The scale beside the robot."""
+STRIP_ROW = 18.0  # height of a row, in points; what is drawn is lower, so that rows stand apart
+STRIP_WIDTH, STROKES = 7.0, 3  # of the lines of a row, in points, and how many there are
+ROBOT_SHADES = 16  # colours of the robot
+POWER_FLOOR_DB = -20.0  # sound power below this is drawn at it, in [dB re 1 pW]
+KEY = Panel("key", 285.0)  # the scale beside the robot
 
 
 def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed]:
@@ -472,10 +460,9 @@ def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> list[
     return [log_strip(recording, _strip("joints", which), title, edges, level, names, which, scale)]
 
 
+# Blue is before and quieter, orange is after and louder; what did not change is grey.
 BEFORE, AFTER, SAME = (86, 180, 233), (240, 160, 30), (62, 68, 80)
-"""Blue is before and quieter, orange is after and louder; what did not change is grey."""
-SHADES = 25
-"""An odd number, so that no change has a shade of its own."""
+SHADES = 25  # an odd number, so that no change has a shade of its own
 
 
 def diverging(place: Array) -> NDArray[np.uint8]:
@@ -485,8 +472,8 @@ def diverging(place: Array) -> NDArray[np.uint8]:
     return np.stack([*channels, np.full(np.shape(place), 255.0)], axis=-1).astype(np.uint8)
 
 
+# Of levels; what is beyond is as blue or as orange as can be.
 CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
-"""Of levels; what is beyond is as blue or as orange as can be."""
 
 
 def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
@@ -582,8 +569,7 @@ def log_power(
 
 BANDS = 48
 LINE_WIDTH = 5.0
-HEIGHT = 160.0
-"""Height of a spectrogram, in points."""
+HEIGHT = 160.0  # height of a spectrogram, in points
 
 
 def log_panel(
@@ -671,11 +657,9 @@ def band_axis(
     return [Label(0.5, title, -22.0), *marks]
 
 
-DETAIL = 0.5
-"""Duration of a detail, in [s]."""
+DETAIL = 0.5  # duration of a detail, in [s]
 DETAIL_JOINTS = 5
-DETAIL_POINTS = 10_000
-"""Samples of a line; a run at 20 kHz or less is shown whole."""
+DETAIL_POINTS = 10_000  # samples of a line; a run at 20 kHz or less is shown whole
 
 
 def log_details(

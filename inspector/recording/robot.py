@@ -33,6 +33,7 @@ from noisemodel.urdf import find_mesh, shapes_in
 FRAMES_PER_SECOND = 50.0
 MAX_FRAMES = 2000
 WORLD = "world"
+# The shapes that a URDF becomes, and what colours each.
 COLOURED = {
     "Asset3D": "albedo_factor",
     "Boxes3D": "colors",
@@ -40,7 +41,6 @@ COLOURED = {
     "Cylinders3D": "colors",
     "Ellipsoids3D": "colors",
 }
-"""The shapes that a URDF becomes, and what colours each."""
 
 
 def load(name: str, folder: Path, joint_names: Sequence[str] = (), *, side: str = "") -> UrdfTree:
@@ -382,24 +382,20 @@ def _write_stl(triangles: Array, file: Path) -> Path:
     return file
 
 
+# Of the viewer's camera, from the lower to the upper edge, in [rad].
 FIELD_OF_VIEW = np.deg2rad(55.0)
-"""Of the viewer's camera, from the lower to the upper edge, in [rad]."""
+# From where a robot that looks along x is seen: from its front, right and above, in [rad].
 AZIMUTH, ELEVATION = np.deg2rad(-55.0), np.deg2rad(18.0)
-"""From where a robot that looks along x is seen: from its front, right and above, in [rad]."""
-MARGIN = 0.08
-"""Share of the picture that stays free at each edge."""
+MARGIN = 0.08  # share of the picture that stays free at each edge
+# A robot that is smaller, such as one without any shape, is framed as if it were so large, [m].
 SMALLEST = 0.05
-"""A robot that is smaller, such as one without any shape, is framed as if it were so large, [m]."""
-ON_FLOOR = np.array([1.0, 1.0, 0.0])
-"""The camera follows a base along the floor, not up and down."""
-VIEW = "_view"
-"""Frame of transforms that the camera moves with."""
+ON_FLOOR = np.array([1.0, 1.0, 0.0])  # the camera follows a base along the floor, not up and down
+VIEW = "_view"  # frame of transforms that the camera moves with
+# Colour of the lines of a floor, and half of their width by their distance.
 FLOOR, THICKNESS = (58, 62, 70), 0.006
-"""Colour of the lines of a floor, and half of their width by their distance."""
-MOST_LINES = 200
-"""Lines of a floor in one direction."""
+MOST_LINES = 200  # lines of a floor in one direction
+# Along each of these, a mesh is taken by its outermost point; it reaches beyond by a tenth.
 DIRECTIONS = np.array([each for each in product((-1.0, 0.0, 1.0), repeat=3) if any(each)])
-"""Along each of these, a mesh is taken by its outermost point; it reaches beyond by a tenth."""
 
 
 def fitted(parts: Iterable[Array], *, aspect: float = 1.0, room: float = 1.0) -> Camera:

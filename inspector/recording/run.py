@@ -21,8 +21,7 @@ from inspector.report.findings import report, spoken
 from noisemodel.files import replacing
 
 APPLICATION = "inspector"
-PATIENCE = 3.0
-"""How long a file may stay as it is while it is written, in [s]."""
+PATIENCE = 3.0  # how long a file may stay as it is while it is written, in [s]
 
 
 @contextmanager
@@ -70,18 +69,15 @@ def log_report(
     recording.send_property("inspector", rr.AnyValues(**properties))
 
 
-ASPECT = 1.3
-"""Least width of the robot's view by its height."""
+ASPECT = 1.3  # least width of the robot's view by its height
+# Heights in a text, in points: from the top to the middle of its title, to the first line of the
+# next paragraph, to the next line, and from the last one to the end.
 HEAD, PARAGRAPH, LINE, FOOT = 36.0, 31.0, 15.5, 28.0
-"""Heights in a text, in points: from the top to the middle of its title, to the first line of the
-next paragraph, to the next line, and from the last one to the end."""
-COLUMNS = 72
-"""Characters of a line at the left of a window of 1440 x 900, at least."""
-TALLEST = 264.0
-"""Most height of the text at the left, in points."""
+COLUMNS = 72  # characters of a line at the left of a window of 1440 x 900, at least
+TALLEST = 264.0  # most height of the text at the left, in points
+# Heights of the whole window's parts, of the list of events without and for each, of the samples of
+# a moment, and of a row of tabs, in points.
 WHOLE, EVENTS, EVENT, DETAILS, TITLES = 836.0, 84.0, 23.0, 190.0, 28.0
-"""Heights of the whole window's parts, of the list of events without and for each, of the samples
-of a moment, and of a row of tabs, in points."""
 
 
 def write(

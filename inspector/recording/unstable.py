@@ -24,13 +24,11 @@ if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
 
 
-Part: TypeAlias = rrb.View | rrb.Container
-"""A view, or views that are arranged."""
-
+Part: TypeAlias = rrb.View | rrb.Container  # a view, or views that are arranged
 TIMELINE = "time"
 PLOTS = colors.BACKGROUNDS[0]
+# Behind a robot, lighter than a quiet one, and the lines of its floor.
 ROBOT, GRID = (80, 84, 94), (112, 116, 126, 130)
-"""Behind a robot, lighter than a quiet one, and the lines of its floor."""
 
 
 def has_end(recording: Path) -> bool:
@@ -96,14 +94,11 @@ class Camera:
 
     eye: Array
     target: Array
-    floor: float
-    """Height of the floor, in [m]."""
-    spacing: float
-    """Distance of the lines on the floor, in [m]."""
-    frame: str = ""
-    """Frame of transforms that the view is drawn in, and all this."""
+    floor: float  # height of the floor, in [m]
+    spacing: float  # distance of the lines on the floor, in [m]
+    frame: str = ""  # frame of transforms that the view is drawn in, and all this
+    # Whether that frame moves with a base, over a floor that is drawn by itself.
     moves: bool = False
-    """Whether that frame moves with a base, over a floor that is drawn by itself."""
 
 
 def robot(name: str, origin: str, camera: Camera) -> Part:
@@ -194,8 +189,7 @@ def log_audio(recording: rr.RecordingStream, path: str, sound: bytes, start: flo
     )
 
 
-COPIES = 12
-"""Bands upon each other that are all but opaque."""
+COPIES = 12  # bands upon each other that are all but opaque
 
 
 def log_stretches(

@@ -35,24 +35,16 @@ if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
 
 
-SETTLE = 2.0
-"""Time within which a viewer that listens and cannot open its window ends, in [s]."""
-START_TIMEOUT = 20.0
-"""Time within which a viewer listens, in [s]."""
-CONNECT_TIMEOUT = 2.0
-"""Time within which a program that listens has to respond, in [s]."""
-PORT = "9876"
-"""Where rerun's viewer listens; one that does already takes the recording over."""
+SETTLE = 2.0  # time within which a viewer that listens and cannot open its window ends, in [s]
+START_TIMEOUT = 20.0  # time within which a viewer listens, in [s]
+CONNECT_TIMEOUT = 2.0  # time within which a program that listens has to respond, in [s]
+PORT = "9876"  # where rerun's viewer listens; one that does already takes the recording over
 HOST = "127.0.0.1"
+# Rerun's viewer sends no usage data if ``CI`` is set, unless ``FORCE_RERUN_ANALYTICS=1`` is. It has
+# no option for it; ``rerun analytics disable`` would change the user's own settings.
 NO_ANALYTICS = {"CI": "true"}
-"""Rerun's viewer sends no usage data if ``CI`` is set, unless ``FORCE_RERUN_ANALYTICS=1`` is.
-
-It has no option for it; ``rerun analytics disable`` would change the user's own settings.
-"""
-MAX_SCRATCH_FILES = 20
-"""Recordings without a name that are kept, the newest."""
-MAX_SCRATCH_BYTES = 1_000_000_000
-"""What they may take together."""
+MAX_SCRATCH_FILES = 20  # recordings without a name that are kept, the newest
+MAX_SCRATCH_BYTES = 1_000_000_000  # what they may take together
 
 
 class ViewerError(InspectorError):
@@ -227,8 +219,7 @@ def how_to_open(recording: Path) -> str:
     )
 
 
-SERVE_TIMEOUT = 30.0
-"""Time within which a server has to respond, in [s]."""
+SERVE_TIMEOUT = 30.0  # time within which a server has to respond, in [s]
 
 
 @dataclass(frozen=True)
@@ -354,14 +345,11 @@ def free_port(wanted: int = 0, *, other: int = 0) -> int:
 
 
 DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
-WINDOW = (1440, 900)
-"""Of the picture, in points; beyond, a software driver takes minutes."""
-MAGIC = b"RRF2"
-"""What rerun's recordings begin with."""
-TIMEOUT = 120.0
-"""How long the viewer may take to draw everything, in [s]."""
+WINDOW = (1440, 900)  # of the picture, in points; beyond, a software driver takes minutes
+MAGIC = b"RRF2"  # what rerun's recordings begin with
+TIMEOUT = 120.0  # how long the viewer may take to draw everything, in [s]
+# Time after which a view's report is not due to data that is still arriving, in [s].
 REPORTS_TIMEOUT = 20.0
-"""Time after which a view's report is not due to data that is still arriving, in [s]."""
 
 
 def missing_packages() -> tuple[str, ...]:
@@ -493,8 +481,10 @@ def _drivers(pattern: str) -> list[Path]:
     return sorted(path for folder in DRIVER_FOLDERS for path in folder.glob(pattern))
 
 
+# Width and height of a notebook's viewer, in pixels; it is as wide as its cell.
 CELL = ("auto", 760)
-"""Width and height of a notebook's viewer, in pixels; it is as wide as its cell."""
+# Begins the viewer's code, which is 23 MB long. If that were the widget's own code, and took more
+# than two seconds to begin, anywidget (0.11) would forget what is sent to the widget: size, data.
 LOADER = """
 export default {
   async render({ model, el }) {
@@ -505,9 +495,6 @@ export default {
     return viewer.render({ model, el });
   },
 };
-"""
-"""Begins the viewer's code, which is 23 MB long. If that were the widget's own code, and took more
-than two seconds to begin, anywidget (0.11) would forget what is sent to the widget: size, data.
 """
 
 

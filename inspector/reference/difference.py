@@ -28,8 +28,7 @@ from noiseclassifier import Event, Labels
 from noiseclassifier.matching import match
 from noisemodel.parallel import Jobs, in_order
 
-RARE = 3.0
-"""By how many decibels over its margin a single run of several makes its scenario worse."""
+RARE = 3.0  # by how many decibels over its margin a single run of several makes its scenario worse
 NEW, LOUDER, RESOLVED = "new", "louder", "resolved"
 
 
@@ -48,8 +47,8 @@ class Outcome(StrEnum):
 
 
 ORDER = list(Outcome)
+# What fails whatever the levels are.
 BROKEN = (Outcome.MISSING, Outcome.RENAMED, Outcome.FROZEN, Outcome.CUT)
-"""What fails whatever the levels are."""
 
 
 @dataclass(frozen=True)

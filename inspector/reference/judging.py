@@ -31,60 +31,46 @@ from inspector.reference.levels import HOP, SIGNALS, Levels, Octaves
 from inspector.verdict import Evidence
 from noisemodel.types import Array
 
-PAD = 20
-"""Frames for which a repetition is held before its start and after its end: delays."""
+PAD = 20  # frames for which a repetition is held before its start and after its end: delays
+# Cost of a frame that is skipped or held, in squared standard deviations of the motion.
 STEP_COST = 1e-3
-"""Cost of a frame that is skipped or held, in squared standard deviations of the motion."""
+# Largest cost of a frame before the start or after the end, in squared standard deviations.
 OUTSIDE = 0.36
-"""Largest cost of a frame before the start or after the end, in squared standard deviations."""
+# Frames by which a path advances, by the code in `came`: odd codes come from a frame that was held;
+# the last one waits at an end.
 STEPS = np.array([1, 1, 2, 2, 0])
-"""Frames by which a path advances, by the code in `came`: odd codes come from a frame that was
-held; the last one waits at an end."""
+# Cells of a matrix of costs; of longer runs every second frame is aligned, and so on.
 LARGEST = 4_000_000
-"""Cells of a matrix of costs; of longer runs every second frame is aligned, and so on."""
+# Added to the standard deviation of each joint's positions, in [rad]: what is no motion.
 STILL = 0.05
-"""Added to the standard deviation of each joint's positions, in [rad]: what is no motion."""
-SLOPE = (0.85, 1.18)
-"""Speeds of a repetition within which levels are comparable."""
-REACH = 10
-"""Frames to each side over which that speed is taken."""
+SLOPE = (0.85, 1.18)  # speeds of a repetition within which levels are comparable
+REACH = 10  # frames to each side over which that speed is taken
+# Difference of positions up to which two moments are of one motion, in standard deviations.
 RESIDUAL = 0.6
-"""Difference of positions up to which two moments are of one motion, in standard deviations."""
-
-NEIGHBOURS = 3
-"""Frames to each side among which a reference may be loudest."""
+NEIGHBOURS = 3  # frames to each side among which a reference may be loudest
+# Root mean square below which nothing is compared, in [rad/s]: less is hardly ever detectable.
 FLOOR = 3e-3
-"""Root mean square below which nothing is compared, in [rad/s]: less is hardly ever detectable."""
+# The same as a share of the loudest level of the joint's octave in the references, and beside other
+# motions, whose contacts are at other speeds.
 FLOOR_SHARE, OTHERS_FLOOR = 0.1, 0.3
-"""The same as a share of the loudest level of the joint's octave in the references, and beside
-other motions, whose contacts are at other speeds."""
-CELLS = 2
-"""Largest cells whose mean is the score of a frame."""
+CELLS = 2  # largest cells whose mean is the score of a frame
+# Difference of speeds up to which moments of other motions count, in standard deviations; how many
+# of them are the reference.
 NEAR, NEAREST = 1.0, 60
-"""Difference of speeds up to which moments of other motions count, in standard deviations; how
-many of them are the reference."""
-APART = 1.0
-"""Time from which moments of one motion stand for moments of another, in [s]."""
-ROWS = 256
-"""Frames that are compared at once."""
-POOL = 12_000
-"""Most frames of other motions that are looked at."""
-ASSUMED_DB = 6.0
-"""Margin where repeatability is not known: one repetition alone."""
-LEAST_DB = 4.0
-"""Least margin: levels of half a step and alignments of half a frame are not exact."""
-RATE = 0.01
-"""Share of good runs that the extrapolated margin lets exceed it."""
+APART = 1.0  # time from which moments of one motion stand for moments of another, in [s]
+ROWS = 256  # frames that are compared at once
+POOL = 12_000  # most frames of other motions that are looked at
+ASSUMED_DB = 6.0  # margin where repeatability is not known: one repetition alone
+LEAST_DB = 4.0  # least margin: levels of half a step and alignments of half a frame are not exact
+RATE = 0.01  # share of good runs that the extrapolated margin lets exceed it
+# Exceedances this close together are one finding, in [s]: after an impact the motion differs.
 GAP = 1.0
-"""Exceedances this close together are one finding, in [s]: after an impact the motion differs."""
+# Share of a run that has to lie on a scenario's motion to be of it, and the same if it has its
+# name: a fault may end the motion early.
 SAME_MOTION, SAME_NAME = 0.8, 0.2
-"""Share of a run that has to lie on a scenario's motion to be of it, and the same if it has its
-name: a fault may end the motion early."""
+# Time and share of its scenario by which a run may be longer or shorter without a word.
 LONGER, SHARE_LONGER = 0.5, 0.1
-"""Time and share of its scenario by which a run may be longer or shorter without a word."""
-ALIKE = 0.9
-"""Share of the best one's from which another scenario is of the same motion, too."""
-
+ALIKE = 0.9  # share of the best one's from which another scenario is of the same motion, too
 Real32 = NDArray[np.float32]
 
 

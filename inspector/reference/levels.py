@@ -17,29 +17,24 @@ from noisemodel import Run
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
-HOP = 0.05
-"""From one frame to the next, in [s]."""
-BINS = 4
-"""Hops in a frame."""
+HOP = 0.05  # from one frame to the next, in [s]
+BINS = 4  # hops in a frame
+# Lower edge of the first octave, in [Hz], and upper edge of the last as a share of the rate.
 LOWEST, HIGHEST = 8.0, 0.45
-"""Lower edge of the first octave, in [Hz], and upper edge of the last as a share of the rate."""
-SETTLING = 1.0
-"""Time after which filters have rung out, in [s]."""
+SETTLING = 1.0  # time after which filters have rung out, in [s]
+# Stretch of a stream that is measured at once, and longest stream that is kept, in [s].
 PIECE, LONGEST = 3.0, 3600.0
-"""Stretch of a stream that is measured at once, and longest stream that is kept, in [s]."""
-LATEST = 2
-"""Pieces of a stream that are compared while it runs."""
+LATEST = 2  # pieces of a stream that are compared while it runs
 SIGNALS = ("velocity", "tracking error")
+# What the slow motion is taken from, the best first.
 GUIDES = {
     "position_desired": "desired positions",
     "velocity_desired": "desired velocities",
     "position": "measured positions",
     "velocity": "measured velocities",
 }
-"""What the slow motion is taken from, the best first."""
+# What code 0 of a stored level stands for, the step between codes, and the code of no level.
 LEAST_DB, STEP_DB, ABSENT = -100.0, 0.5, 255
-"""What code 0 of a stored level stands for, the step between codes, and the code of no level."""
-
 Codes = NDArray[np.uint8]
 Octaves = tuple[tuple[float, float], ...]
 

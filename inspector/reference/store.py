@@ -45,17 +45,14 @@ from noisemodel.files import replacing
 
 FOLDER, NAME = "reference", "reference.toml"
 FORMAT = "noise-reference/1"
-NEWEST = 10
-"""Repetitions that are kept of a scenario."""
+NEWEST = 10  # repetitions that are kept of a scenario
 MOST_SCENARIOS = 5000
-TOLERANCE = 0.2
-"""By how much earlier or later an accepted finding may come, in [s]."""
-CALIBRATED = 3
-"""Repetitions from which the margin beside other motions is taken."""
+TOLERANCE = 0.2  # by how much earlier or later an accepted finding may come, in [s]
+CALIBRATED = 3  # repetitions from which the margin beside other motions is taken
+# Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``.
 REPETITION = re.compile(r"(?P<name>.+?)[-_./](?:run|rep|take|seed)?[-_.]?\d+")
-"""Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
+# Kinds of values by key; a kind in brackets stands for lists of such values.
 Keys = Mapping[str, type | tuple[type]]
-"""Kinds of values by key; a kind in brackets stands for lists of such values."""
 TEXTS, NUMBERS, TABLES = (str,), (float,), (dict,)
 SCENARIO: Keys = {
     **dict.fromkeys(("name", "robot", "by", "reason", "levels", "sha256"), str),
@@ -72,6 +69,7 @@ REPETITION_KEYS: Keys = {
     **dict.fromkeys(("rate_hz", "start_s", "duration_s"), float),
     "joints": TEXTS,
 }
+# What a scenario of the store may hold, its repetitions, and what it wants and waives.
 EXPECTED: Keys = {
     "class": str,
     "time_s": NUMBERS,
@@ -81,7 +79,6 @@ EXPECTED: Keys = {
     "until": date,
     "reason": str,
 }
-"""What a scenario of the store may hold, its repetitions, and what it wants and waives."""
 KINDS = {
     str: "a text",
     float: "a number",
@@ -100,9 +97,9 @@ class StoreError(FileError):
 class Reference:
     """Accepted runs: what is normal for a robot's scenarios."""
 
-    path: Path  # the store, or the folder of good runs
-    scenarios: tuple[Scenario, ...] = ()  # in order of their names
-    stored: bool = False  # whether it is a store
+    path: Path  #: the store, or the folder of good runs
+    scenarios: tuple[Scenario, ...] = ()  #: in order of their names
+    stored: bool = False  #: whether it is a store
 
     @classmethod
     def load(cls, path: str | Path, reading: Reading | None = None) -> "Reference":

@@ -41,11 +41,10 @@ from inspector.verdict import (
 )
 from noiseclassifier import UNKNOWN, Event, Labels
 
-LOUDER = "louder"
-"""Class of a finding that only the reference shows."""
+LOUDER = "louder"  # class of a finding that only the reference shows
+# A run is frozen where it moves at less than a tenth of its references' speed, for half a second,
+# while these make three tenths of their usual speed.
 STOPPED, MOVES, STILL_FOR = 0.1, 0.3, 0.5
-"""A run is frozen where it moves at less than a tenth of its references' speed, for half a second,
-while these make three tenths of their usual speed."""
 
 
 @dataclass(frozen=True)

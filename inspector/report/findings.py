@@ -21,8 +21,9 @@ from noiseclassifier import UNKNOWN, Event
 from noiseclassifier.labels import interval
 from noisemodel import Block
 
+# Onsets this close in repetitions are one row, in [s]: the hop of frames is 0.1 s or 0.2 s.
 TOGETHER = 0.25
-"""Onsets this close in repetitions are one row, in [s]: the hop of frames is 0.1 s or 0.2 s."""
+# How people read a status.
 WORDS = {
     Status.INTERNAL_ERROR: "internal error",
     Status.BAD_INPUT: "bad input",
@@ -30,13 +31,12 @@ WORDS = {
     Status.CANNOT_TELL: "cannot tell",
     Status.OK: "ok",
 }
-"""How people read a status."""
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}  # how people count them
 LEAST = 0.05  # joints with a smaller share are left out
+# Names of the columns of a localisation.
 LOCALISATION = ("shows first in", "by joints", "band", "links, shares of the excess")
-"""Names of the columns of a localisation."""
+# Classes of NoisyTest whose names people read as two words.
 SPOKEN = {"highaccelerations": "high accelerations"}
-"""Classes of NoisyTest whose names people read as two words."""
 Item = TypeVar("Item")
 
 

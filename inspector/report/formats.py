@@ -41,20 +41,20 @@ from inspector.verdict import UNREAD, Verdict, counts, exit_status
 
 ANNOTATIONS = 10  # GitHub silently drops what goes beyond ten of a kind per step
 COMMENT = 60_000  # most characters of the Markdown: GitHub refuses comments of more than 65,536
+# First line of the Markdown, by which a script finds its own comment to replace it: a job may have
+# one of verdicts and one of a difference.
 MARKER, DIFF_MARKER = "<!-- noise-inspector -->", "<!-- noise-inspector diff -->"
-"""First line of the Markdown, by which a script finds its own comment to replace it: a job may have
-one of verdicts and one of a difference."""
 RESULTS = 5000  # GitHub shows no more results of one SARIF file
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 RULES = {
     "missing-log": "A scenario that was accepted has no log.",
     "louder": "A joint is louder than in accepted runs.",
 }
+# Findings of a scenario that are listed, and of a difference those of each kind.
 MOST, MOST_OF_KIND = 20, 5
-"""Findings of a scenario that are listed, and of a difference those of each kind."""
 REPEATED = r"\d+% by \d+ repetitions? of "  # what the line on the reference says for all runs
+# By what else remarks of runs differ that say the same.
 AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
-"""By what else remarks of runs differ that say the same."""
 
 
 class Outcome(StrEnum):

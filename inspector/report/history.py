@@ -22,8 +22,8 @@ from inspector.verdict import Verdict, read_results
 from noisemodel.types import Array
 
 SHORTEST = 4  # commits from which a stretch has a level of its own
+# Smallest change that the page names: of a level in [dB], and of findings per run.
 LEAST_DB, LEAST_FINDINGS = 2.0, 0.5
-"""Smallest change that the page names: of a level in [dB], and of findings per run."""
 WIDTH, HEIGHT = 900, 120
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 LOOK = """

@@ -41,8 +41,8 @@ from noisemodel.noise import REFERENCE_POWER, decibel, vibrating_pieces
 from noisemodel.types import Array
 
 AUDIBLE = "Audible are the joints' velocities above 20 Hz; their powers are added."
+# Policy for browsers: nothing is fetched, whatever a run's names are.
 POLICY = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'"
-"""Policy for browsers: nothing is fetched, whatever a run's names are."""
 STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; max-width: 62rem;
@@ -300,8 +300,8 @@ def _ranked(
 PAGE = "index.html"
 PICTURES = "pictures"
 WIDTH = 1000  # width of a timeline, in units of its own
+# Policy for browsers: nothing but the pictures is fetched, also from a page on a disk.
 INDEX_POLICY = "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'"
-"""Policy for browsers: nothing but the pictures is fetched, also from a page on a disk."""
 ROWS = """
 :root { color-scheme: light dark; --ink: #1b1f24; --dim: #57606a; --line: #d0d7de; --back: #fff;
   --bad: #cf222e; --warn: #9a6700; --good: #1a7f37; }

@@ -26,10 +26,10 @@ INK, LINE = "#24292f", "#0072b2"
 POINTS = 4000
 ORDERS = 3  # most orders that are written
 ROW = 0.24  # height of a class, a joint or a link, in [inch]
+# Between panels, above one with a title, below and at the right of all, in [inch].
 GAP, TITLE, BELOW, RIGHT = 0.14, 0.22, 0.55, 0.95
-"""Between panels, above one with a title, below and at the right of all, in [inch]."""
+# Width of a letter and least width of labels, in [inch], and letters of a name that are shown.
 LETTER, LABELS, LONGEST = 0.085, 1.2, 32
-"""Width of a letter and least width of labels, in [inch], and letters of a name that are shown."""
 SHADE = 0.35  # opacity of a finding behind a curve
 MOST_OVER_DB = 12.0  # largest level over the reference that has a colour of its own
 

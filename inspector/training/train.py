@@ -20,17 +20,14 @@ from noiseclassifier import Assessment
 from noiseclassifier.profile import HIGHEST, LOWEST, NOMINAL
 from noisemodel.files import also_reading, refuse_existing
 
+# A recording, and the run file that it is of.
 Read = tuple[nc.Recording | nc.Unanswered, nm.Run | None]
-"""A recording, and the run file that it is of."""
+# Findings by their frames, and from onset to end.
 Located = tuple[tuple[nc.Event, ...], tuple[nc.Event, ...]]
-"""Findings by their frames, and from onset to end."""
-
-ANY_RATE = "general"
-"""The profile of a model for any rate."""
-RATE = 10_000.0
-"""Rate of a model of one rate unless another is given, in [Hz]."""
-THIN = 8
-"""A general model learns from every so many `ok` frames of a log."""
+ANY_RATE = "general"  # the profile of a model for any rate
+RATE = 10_000.0  # rate of a model of one rate unless another is given, in [Hz]
+THIN = 8  # a general model learns from every so many `ok` frames of a log
+# Profiles by name, at a rate in [Hz].
 PROFILES: dict[str, Callable[[float], nc.Profile]] = {
     "logbands": nc.LogBands().at,
     "noisytest-rbf": lambda _: nc.Profile.noisytest("rbf"),
@@ -38,7 +35,6 @@ PROFILES: dict[str, Callable[[float], nc.Profile]] = {
     "paper-rbf": lambda _: nc.Profile.paper("rbf"),
     "paper-linear": lambda _: nc.Profile.paper("linear"),
 }
-"""Profiles by name, at a rate in [Hz]."""
 
 
 def classified(

@@ -43,18 +43,17 @@ from noisemodel.files import refuse_existing, replacing
 from noisemodel.parallel import DIED, Jobs, in_order
 
 FORMAT = "noise-tuning/1"
+# Least number of batches per job, since a stopped job loses one and all should end at nearly the
+# same time; and for how many workers of a cluster there should be enough.
 BATCHES, WORKERS = 4, 16
-"""Least number of batches per job, since a stopped job loses one and all should end at nearly the
-same time; and for how many workers of a cluster there should be enough."""
+# Headings of the columns of measures, in two lines.
 HEADS = {
     "balanced_accuracy": ("balanced", "accuracy"),
     "failure_recall": ("failure", "recall"),
     "false_alarm_rate": ("false", "alarms"),
     "subset_accuracy": ("subset", "accuracy"),
 }
-"""Headings of the columns of measures, in two lines."""
-WIDTH = 10
-"""Least width of a column, in characters."""
+WIDTH = 10  # least width of a column, in characters
 
 
 @dataclass(frozen=True, kw_only=True)
