@@ -33,10 +33,8 @@ from inspector.verdict import classify_files
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "assets" / "pictures"
-COLORS = 192
-"""Of the pictures: few, so that they are small."""
-COMMITS, SINCE = 20, 12
-"""Of the history, and how many of them come before the chatter."""
+COLORS = 192  # of the pictures: few, so that they are small
+COMMITS, SINCE = 20, 12  # of the history, and how many of them come before the chatter
 COMMAND = re.compile(r"::(?P<kind>error|warning|notice)(?P<about>[^:]*)::(?P<text>.*)")
 STYLE = """
 body { font: 15px/1.45 system-ui, "DejaVu Sans", sans-serif; color: #1f2328; margin: 1.2rem;

@@ -9,10 +9,9 @@ import noisemodel as nm
 from noiseclassifier.features import compress, dct, spectrogram
 
 HERE = Path(__file__).parent
+# First sample and length of the frame, at 10 kHz; the impact is at 1.78 s.
 START, LENGTH = 16_000, 4000
-"""First sample and length of the frame, at 10 kHz; the impact is at 1.78 s."""
-WINDOW, STRIDE = 1024, 834
-"""Of the paper's Fourier transform, with its RBF kernel."""
+WINDOW, STRIDE = 1024, 834  # of the paper's Fourier transform, with its RBF kernel
 
 
 def main() -> None:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from benchmarks.table import HEAD
 
+# Modules with a function `rows`, which takes an older checkout, or None, and yields rows.
 SPEED = ("twists", "extended", "stream", "live", "logs", "commands")
-"""Modules with a function `rows`, which takes an older checkout, or None, and yields rows."""
 
 
 def main() -> None:

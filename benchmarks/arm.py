@@ -14,14 +14,14 @@ from noisemodel.types import Array
 
 RATE, MOTIONS = 1000, 4
 NAMES = ("base", "shoulder", "elbow", "forearm", "wrist", "flange")
+# Length in [m] and mass in [kg] of each link.
 LINKS = ((0.15, 5.0), (0.42, 7.0), (0.38, 4.0), (0.12, 1.6), (0.1, 1.2), (0.08, 0.4))
-"""Length in [m] and mass in [kg] of each link."""
 AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
 STIFFNESS = np.array([4000.0, 5000.0, 3000.0, 700.0, 600.0, 200.0])
 DAMPING = np.array([160.0, 190.0, 100.0, 16.0, 14.0, 4.0])
 FRICTION = np.array([4.0, 5.0, 3.0, 1.0, 1.0, 0.4])
+# Of the torque of a gear, as a share of its friction, and how often per radian.
 RIPPLE, TEETH = 0.15, 100.0
-"""Of the torque of a gear, as a share of its friction, and how often per radian."""
 FAULTS = ("tone", "whine", "blow", "step", "sticking")
 
 

@@ -40,9 +40,9 @@ STANDIN = ROOT.parent / "shared" / "tools" / "standin_lola.py"
 
 DEMO = ROOT / "assets" / "runs" / "demo.npz"
 
+# Robot, scenario, seed and duration in [s] of a simulated run.
 Case: TypeAlias = tuple[str, str, int, float]
-"""Robot, scenario, seed and duration in [s] of a simulated run."""
-
+# The simulated runs, by name.
 SIMULATED: dict[str, Case] = {
     "talos-straight": ("talos", "straight", 0, 3.0),
     "talos-obstacle-toe": ("talos", "obstacle-toe", 1, 4.0),
@@ -57,7 +57,6 @@ SIMULATED: dict[str, Case] = {
     "solo12-decalibrated": ("solo12", "decalibrated", 1, 4.0),
     "solo12-multisine": ("solo12", "multisine-30-40", 2, 3.0),
 }
-"""The simulated runs, by name."""
 SHIPPED = ("demo", "lola", *SIMULATED)  # what is compared unless runs are named
 TASKS = ("simulate", "runs", "logs", "train", "models")  # what a probe is given, each by name
 AGAIN = ("panda-early-height", "go2-force-jump")  # runs that both checkouts simulate

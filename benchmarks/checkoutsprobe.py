@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 KINDS = ("paper", "normal")  # kinds of the extended noise that are computed
+# Libraries whose versions may change results.
 PACKAGES = ("numpy", "scipy", "scikit-learn", "pin", "mujoco")
-"""Libraries whose versions may change results."""
 RATE = 10000.0  # sample rate of NoisyTest's data set, in [Hz]
 CHUNK = 64  # frames whose features are computed at once
 

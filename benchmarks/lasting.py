@@ -21,16 +21,14 @@ from noiseclassifier import Event
 from noiseclassifier.scenarios.faults import octave
 from noisemodel.types import Array
 
-TONES = (0.3, 1.0, 3.0)
-"""Root mean squares of tones over whole runs, in [rad/s]."""
+TONES = (0.3, 1.0, 3.0)  # root mean squares of tones over whole runs, in [rad/s]
+# Levels of short tones above the log's own level in their octave, in [dB].
 ABOVE = (0.0, 5.0, 10.0, 20.0, 40.0, 60.0)
-"""Levels of short tones above the log's own level in their octave, in [dB]."""
-LOUDEST, SHORT = 100.0, 0.5
-"""Loudest tone, in [rad/s], and how long short ones last, in [s]."""
+LOUDEST, SHORT = 100.0, 0.5  # loudest tone, in [rad/s], and how long short ones last, in [s]
+# Time left on either side of what is cut out, in [s]: of oscillations, and of others.
 MARGIN, BLOW = 0.1, 0.5
-"""Time left on either side of what is cut out, in [s]: of oscillations, and of others."""
+# Edges of how far oscillations stand out from the background, in [dB].
 BINS = (-20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 80.0)
-"""Edges of how far oscillations stand out from the background, in [dB]."""
 
 
 def is_good(run: nm.Run) -> bool:

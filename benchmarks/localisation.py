@@ -33,6 +33,7 @@ SCENARIOS = (
     "multisine-100-150",
     "reference-jump",
 )
+# The stage in which each cause acts; jumps of sensors act in the commanded one.
 ACTS = {
     "jump of the planned motion": "planned",
     "force control with too high a gain": "commanded",
@@ -42,7 +43,6 @@ ACTS = {
     "ground that is not there": "measured",
     "partial contact at an edge": "measured",
 }
-"""The stage in which each cause acts; jumps of sensors act in the commanded one."""
 LATE = 0.15  # largest delay of a label after its cause, in [s]
 
 

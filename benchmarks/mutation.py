@@ -53,17 +53,17 @@ MEASURED = ("noisemodel", "models/noiseclassifier", "inspector/analysis.py")
 ARITHMETIC = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}
 IDENTITY = {"Is", "IsNot"}
 MEMORY = 12 << 30  # address space of a child, in [byte]
+# Tests of simulators and of the wheel, which take a third of the time; and of viewers, which hang
+# in a process that was forked.
 LEFT_OUT = (
     *("scenarios", "domains", "humanoid", "quadruped", "wheel"),
     *("*viewer", "*screenshot", "*picture", "*notebook"),
 )
-"""Tests of simulators and of the wheel, which take a third of the time; and of viewers, which hang
-in a process that was forked."""
+# Tests that hang or fail without a change in a process that was forked: they have threads.
 ALONE = (
     "inspector_cli.py::test_the_viewer_is_started_on_loopback_and_not_waited_for",
     "noisemodel_compare.py::test_robots_are_compared_many_at_once_and_alike",
 )
-"""Tests that hang or fail without a change in a process that was forked: they have threads."""
 OPTIONS = (
     *("tests", "-q", "-m", "not slow", "-p", "no:cacheprovider", "--hypothesis-seed=0"),
     *(f"--ignore-glob=*/test_{name}*.py" for name in LEFT_OUT),

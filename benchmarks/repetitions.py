@@ -37,10 +37,10 @@ DEFECTS = (
     *("obstacle-full", "obstacle-toe", "multisine-20-30", "multisine-60-100"),
     *("multisine-150-250", "force-jump", "limit-cycle", "reference-jump"),
 )
+# Added faults: root mean square of a tone of 62 Hz and 1 s, and size of a blow, in [rad/s].
 TONE, BLOW = 0.05, 0.3
-"""Added faults: root mean square of a tone of 62 Hz and 1 s, and size of a blow, in [rad/s]."""
+# Runs of each motion of the pool, others, and root mean square of their chatter, in [rad/s].
 POOLED, JUDGED, CHATTER = 15, 10, 0.012
-"""Runs of each motion of the pool, others, and root mean square of their chatter, in [rad/s]."""
 
 
 def trial(robot: str, way: str, repetition: int, fault: str, seed: int):

@@ -34,6 +34,7 @@ class _Shown:
 
 numpy.typing.NDArray = _Shown  # type: ignore[misc, assignment]
 
+# Pages by part, in the order of the site's side bar; the text before <…> replaces their title.
 NAVIGATION = {
     "Start": ["tutorial", "Reading the picture <reading>", "troubleshooting"],
     "How to": [
@@ -73,17 +74,14 @@ NAVIGATION = {
         "api/noiseclassifier.scenarios",
     ],
 }
-"""Pages by part, in the order of the site's side bar; the text before <…> replaces their title."""
+# Pages that have the text of a file of the root.
 PAGES = {
     "changelog": "CHANGELOG.md",
     "contributing": "CONTRIBUTING.md",
     "security": "SECURITY.md",
 }
-"""Pages that have the text of a file of the root."""
-
+# The font by which browsers lay equations out where the reader's system has none for that.
 FONT = files("ziamath").joinpath("fonts/STIXTwoMath-Regular.ttf")
-"""The font by which browsers lay equations out where the reader's system has none for that."""
-
 project = "noise-inspector"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["dollarmath"]

@@ -63,8 +63,8 @@ def log_formats() -> str:
     return f"# Log formats\n\n{NOTE}{told}\n\n## CSV\n\n{head}\n{rows}\n\n{public}"
 
 
+# Files of this folder, and what makes each.
 PAGES = {"commands.md": commands, "log-formats.md": log_formats}
-"""Files of this folder, and what makes each."""
 
 
 if __name__ == "__main__":

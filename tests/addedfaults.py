@@ -5,8 +5,7 @@ import numpy as np
 from noiseclassifier.signals import NOISE
 
 KINDS = ("tone", "noise", "blow")
-LONG, SHORT = 1.0, 0.1
-"""How long tones and noise, and blows, last, in [s]."""
+LONG, SHORT = 1.0, 0.1  # how long tones and noise, and blows, last, in [s]
 
 
 def fault(time, kind, frequency, seed, *, start):

@@ -5,12 +5,8 @@ import json
 import numpy as np
 
 RATE = 100.0
-EPOCH = 1_700_000_000_000_000_000
-"""When the samples begin, in [ns]."""
-
-TIMES = EPOCH + 10_000_000 * np.arange(400)
-"""Stamps at 100 Hz, in [ns]."""
-
+EPOCH = 1_700_000_000_000_000_000  # when the samples begin, in [ns]
+TIMES = EPOCH + 10_000_000 * np.arange(400)  # stamps at 100 Hz, in [ns]
 JOINTS = ("shoulder", "elbow", "wrist")
 
 

@@ -15,12 +15,12 @@ from noisemodel import Block, Run
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "simulated-runs"
+# A logger that changes nothing.
 PLAIN = Logger(
     rate=1000.0, velocity="measured", bits=23, cutoff=700.0, noise=0.0, jitter=0.0, lost=0.0,
     repeated=0.0, hold=1, ripple=0.0, roughness=0.0, gear=100.0, resonances=(),
     desired="commanded", effort_bits=24,
 )  # fmt: skip
-"""A logger that changes nothing."""
 SOURCES = (ROOT / "models" / "noiseclassifier" / "scenarios", ROOT / "noisemodel")
 
 

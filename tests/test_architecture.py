@@ -7,29 +7,27 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+# Our packages, scenarios apart from the classifier that they are in.
 PLACES = {
     "noisemodel": ROOT / "noisemodel",
     "noiseclassifier": ROOT / "models" / "noiseclassifier",
     "noiseclassifier.scenarios": ROOT / "models" / "noiseclassifier" / "scenarios",
     "inspector": ROOT / "inspector",
 }
-"""Our packages, scenarios apart from the classifier that they are in."""
 OURS = set(PLACES)
+# Which of our packages each may import.
 ALLOWED = {
     "noisemodel": {"noisemodel"},
     "noiseclassifier": {"noiseclassifier"},
     "noiseclassifier.scenarios": {"noiseclassifier.scenarios", "noisemodel"},
     "inspector": OURS,
 }
-"""Which of our packages each may import."""
-
+# The only packages of ours that may import a library.
 HOMES = {
     "rerun": {"inspector"},
     "typer": {"inspector"},
     "mujoco": {"noisemodel", "noiseclassifier.scenarios"},
 }
-"""The only packages of ours that may import a library."""
-
 SLOW = ["typer", "rerun", "sklearn", "mujoco", "pinocchio", "scipy.signal"]
 
 

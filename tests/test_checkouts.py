@@ -18,11 +18,10 @@ from noisemodel import Run
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("noisemodel", "models", "inspector")
+# What is compared of the version before.
 OLD = ("noisemodel", "models", "scenarios", "inspector", "assets/models/general.npz")
-"""What is compared of the version before."""
-FIRST = "293fa6a"
-"""Its commit: the last of 0.6.0."""
-
+FIRST = "293fa6a"  # its commit: the last of 0.6.0
+# Prints the public names of a checkout: what packages export, and what their classes have.
 PUBLIC = """
 import importlib, inspect, json
 
@@ -37,7 +36,6 @@ for package in ("noisemodel", "models", "scenarios", "inspector"):
             found += [f"{package}.{name}.{one}" for one in own if not one.startswith("_")]
 print(json.dumps(found))
 """
-"""Prints the public names of a checkout: what packages export, and what their classes have."""
 RESOLVE = """
 import json, sys
 from checkoutsprobe import resolve

@@ -26,8 +26,7 @@ from noiseclassifier.scenarios.world import configuration, real_model, reduced_m
 from noisemodel import Run
 
 SECONDS = 1.5
-STANDS = 10_004
-"""A seed of which the Panda stands for so long, on elastic gears."""
+STANDS = 10_004  # a seed of which the Panda stands for so long, on elastic gears
 TORQUE = replace(PLAIN, effort="torque", noise=0.001)
 
 

@@ -37,12 +37,12 @@ simulate = partial(scenarios.simulate, wide=True)
 GO2 = WIDE["go2"]
 
 SECONDS = 3.0
+# Every second robot; the others move in the tests of their families.
 REST = [
     name
     for family in ("arm", "quadruped", "humanoid")
     for name in [name for name, robot in WIDE.items() if robot.family == family][1::2]
 ]
-"""Every second robot; the others move in the tests of their families."""
 
 
 def drawn(seed=1, **changes):

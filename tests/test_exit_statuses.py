@@ -19,6 +19,7 @@ from noisemodel import Block
 
 ROWS = "time,a.velocity\n" + "".join(f"{k / 100},{k % 70 / 70}\n" for k in range(400))
 TUNE = ("--profile", "noisytest-linear", "--grid", "C=1", "--folds", "2")
+# A call of each command that prints something.
 COMMANDS = {
     "view": ("run.npz", "-o", "out/run.rrd"),
     "live": ("--rate", "100", "--save", "out/live.rrd"),
@@ -39,8 +40,7 @@ COMMANDS = {
     "evaluate": ("general", "annotated"),
     "simulate": ("run", "panda", "--duration", "3", "-o", "out/simulated.npz"),
 }
-"""A call of each command that prints something."""
-
+# Where a bug is put into commands that make no run.
 BUGS = {
     "live": "inspector.live.pipe.reader_of",
     "robots": "noisemodel.robot.menagerie_names",
@@ -48,7 +48,6 @@ BUGS = {
     "history": "inspector.verdict.from_json",
     "tune": "noiseclassifier.noisytest.parse_annotations",
 }
-"""Where a bug is put into commands that make no run."""
 
 
 @pytest.fixture(scope="module")

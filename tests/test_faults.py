@@ -25,6 +25,7 @@ pytestmark = [
 ]
 
 ROOT = Path(__file__).parents[1]
+# Commands that write one file, by what it is.
 FILES = {
     "view": ("view", "run.npz", "-o", "out/run.rrd"),
     "report": ("view", "run.npz", "-o", "out/run.html"),
@@ -43,14 +44,12 @@ FILES = {
     "simulate": ("simulate", "run", "panda", "--duration", "3", "-o", "out/simulated.npz"),
     "live": ("live", "--rate", "1000", "--save", "out/live.rrd"),
 }
-"""Commands that write one file, by what it is."""
-
+# One of each way in which a file grows: by rerun, in pieces, by pyarrow, by lines, at once.
 WRITERS = {
     name: FILES[name]
     for name in ("view", "export mcap", "export parquet", "resume", "simulate", "live")
 }
-"""One of each way in which a file grows: by rerun, in pieces, by pyarrow, by lines, at once."""
-
+# Commands that write a folder.
 FOLDERS = {
     "import": ("import", "logs", "-o", "out"),
     "labels-to": ("classify", "good", "--labels-to", "out"),
@@ -58,8 +57,6 @@ FOLDERS = {
     "diff": ("diff", "good", "good", "--report", "out"),
     "accept": ("accept", "good", "--reason", "good", "-o", "out"),
 }
-"""Commands that write a folder."""
-
 ROWS = "time,elbow.velocity\n" + "".join(f"{k / 1000},{k % 70 / 70}\n" for k in range(4000))
 
 
@@ -154,8 +151,8 @@ def test_a_full_disk_leaves_no_file_and_ends_with_5(place, undisturbed, argument
     assert written(place) == {} or LINES in arguments
 
 
+# A command with this option writes its file line by line, and reads what was killed.
 LINES = "--resume"
-"""A command with this option writes its file line by line, and reads what was killed."""
 
 
 def without_override():

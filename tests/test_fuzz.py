@@ -24,8 +24,8 @@ LAWFUL = settings(
     database=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
+# Readers whose whole files take seconds to make.
 LATE = ("model, small", "resume state", "tune state")
-"""Readers whose whole files take seconds to make."""
 
 
 def read(name, path, data):

@@ -23,13 +23,13 @@ from inspector.analysis import analyse
 from inspector.errors import Status, Unknown
 from inspector.library import demo_run, load_library, signals_of
 
+# Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling
+# rule of the scenarios takes for felt.
 FLOOR = 0.3
-"""Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling
-rule of the scenarios takes for felt."""
 LOUDER = (1.0, 3.0, 10.0, 100.0, 1000.0)
+# Times the loudest tenth of a second, of robots with legs: a blow on one joint, as loud as the
+# touchdowns of all, is one more touchdown to the model (docs/accuracy.md).
 ABOVE = {"go2": 3.0, "talos": 2.0}
-"""Times the loudest tenth of a second, of robots with legs: a blow on one joint, as loud as the
-touchdowns of all, is one more touchdown to the model (docs/accuracy.md)."""
 SECONDS = 3.0
 
 LIBRARY = load_library()

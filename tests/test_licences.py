@@ -11,8 +11,8 @@ from noisemodel.robot import locate
 
 ROOT = Path(__file__).parents[1]
 NOTES = tomllib.loads((ROOT / "REUSE.toml").read_text(encoding="utf-8"))["annotations"]
+# Licences that allow anyone any use and derived works.
 FREE = ("Apache-2.0", "BSD", "BSD-2-Clause", "BSD-3-Clause", "MPL-2.0")
-"""Licences that allow anyone any use and derived works."""
 HEADERS = {
     "Attribution-NonCommercial-NoDerivs 3.0": "CC BY-NC-ND 3.0",
     "Apache License, Version 2.0": "Apache-2.0",

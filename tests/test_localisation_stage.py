@@ -15,8 +15,7 @@ from noisemodel import Block, Run
 
 RATE, SECONDS = 2000.0, 4.0
 NAMES = ("hip", "knee", "ankle")
-DELAY = 4
-"""Samples by which each stage follows the one before: 2 ms."""
+DELAY = 4  # samples by which each stage follows the one before: 2 ms
 JUMP = Block(2.0, 2.1, "highaccelerations")
 SHAKE = Block(2.0, 3.0, "oscillations")
 

@@ -16,9 +16,7 @@ from inspector.errors import LogError
 from noisemodel import Run
 
 TIME = np.arange(21) / 100
-EPOCH = 1_700_000_000
-"""Where absolute stamps start, in [s] since 1970."""
-
+EPOCH = 1_700_000_000  # where absolute stamps start, in [s] since 1970
 METHOD = "differentiated from positions (Savitzky-Golay, window 7, order 3)"
 FOUND = "look like degrees: converted to radians (if they are not, --units radians)"
 

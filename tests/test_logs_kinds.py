@@ -211,6 +211,7 @@ FITS = "at which positions and velocities fit"
 ALL = "position, velocity, effort, position_desired, velocity_desired"
 HZ = "--rate HZ"
 
+# The table; rows without joints are refused for good.
 KINDS = (
     Kind(
         "Kinova Gen3, a counter as Time",
@@ -361,7 +362,6 @@ KINDS = (
          lambda folder: csv(folder / "tau.csv", f"time,{names('tau#', 6)}", T6, Q6), 125.0,
          hint="no position or velocity of a joint"),
 )  # fmt: skip
-"""The table; rows without joints are refused for good."""
 
 
 def followed(message, rate):

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from numpy.lib import format as npy
 
+# Durations in [s] of runs of 60 joints at 1 kHz: signals of 77 MB and of 230 MB each.
 SHORT, LONG = 160.0, 480.0
-"""Durations in [s] of runs of 60 joints at 1 kHz: signals of 77 MB and of 230 MB each."""
-GROWTH = 80e6
-"""Most growth of the peak in [B]; the three signals grow by 460 MB."""
+GROWTH = 80e6  # most growth of the peak in [B]; the three signals grow by 460 MB
 
 
 JOINTS, PIECE = 60, 20_000  # samples that are made at once

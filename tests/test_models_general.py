@@ -13,6 +13,7 @@ from noiseclassifier.features import frame_features
 from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, columns
 from noiseclassifier.signals import JOINTS, MOTION, NOISE
 
+# Signals of logs, by what they have.
 GIVEN = {
     "motion and joints": (*MOTION, *JOINTS),
     "motion": MOTION,
@@ -20,7 +21,6 @@ GIVEN = {
     "measured": ("measured",),
     "noise": (NOISE,),
 }
-"""Signals of logs, by what they have."""
 
 
 @pytest.fixture

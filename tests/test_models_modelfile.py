@@ -323,6 +323,7 @@ def test_trees_with_children_or_features_out_of_range_are_refused(path, name, va
 
 # --- files of earlier versions
 
+# Some of the settings that profiles had up to version 6.
 EARLIER = {
     "single_precision": False,
     "drop_first_sample": False,
@@ -331,7 +332,6 @@ EARLIER = {
     "networks": 5,
     "widen_extra": 0,
 }
-"""Some of the settings that profiles had up to version 6."""
 
 
 def earlier(path, version=6, **profile):

@@ -181,8 +181,7 @@ def test_a_loaded_robot_is_named_as_it_was_loaded(tmp_path):
     assert nm.Run.load(tmp_path / "run.npz").robot == str(own)
 
 
-STEP = 1 / 128
-"""A step whose multiples are exact, in [s]."""
+STEP = 1 / 128  # a step whose multiples are exact, in [s]
 
 
 def stamped(stamps, rate=128, **signals):

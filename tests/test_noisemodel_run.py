@@ -237,8 +237,7 @@ def test_the_pieces_of_a_run_are_its_motion(monkeypatch, samples):
     assert (alone.effort, alone.base_velocity, alone.robot) == (None, None, None)
 
 
-FINEST = 2.0**-33
-"""Spacing of numbers just below 2**20."""
+FINEST = 2.0**-33  # spacing of numbers just below 2**20
 
 
 def refused(message, error=RunError):

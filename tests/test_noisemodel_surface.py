@@ -236,6 +236,7 @@ def test_links_are_named_after_the_child_of_their_joint():
             assert child.get(joint_name, "root") == link or joint_name == "root_joint"
 
 
+# Area of the visuals, their hulls and the collision shapes, base included, by another reader.
 AREAS = {
     "talos": (8.115, 4.594, 4.620),
     "anymal": (4.571, 2.115, 2.733),
@@ -256,7 +257,6 @@ AREAS = {
     "simple_humanoid": (0.0, 0.0, 18.554),
     "human": (2.299, 2.238, 0.0),
 }
-"""Area of the visuals, their hulls and the collision shapes, base included, by another reader."""
 
 
 @pytest.mark.slow

@@ -15,8 +15,8 @@ from inspector.library import demo_run
 
 ROOT = Path(__file__).parents[1]
 TOO_LARGE = "cannot be written (File too large)"
+# Short, and with work; all others are tried within this process, in test_exit_statuses.
 COMMANDS = (["--help"], ["classify", demo_run()])
-"""Short, and with work; all others are tried within this process, in test_exit_statuses."""
 ROWS = "time,elbow.velocity\n" + "".join(f"{k / 1000},{k % 70 / 70}\n" for k in range(4000))
 
 

@@ -93,6 +93,7 @@ def scalars(path, entity):
 
 
 SIGNALS = "velocity|desired_velocity|position|effort|stage_planned"
+# The components of each entity.
 COLUMNS = {
     r"/class/(before|after)/(found|annotated)/(impact|oscillations)": BAND,
     r"/(level/change|change/finding)/new": BAND,
@@ -110,7 +111,6 @@ COLUMNS = {
     r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
     r"/report": {"TextDocument:text", "TextDocument:media_type"},
 }
-"""The components of each entity."""
 
 
 def test_every_entity_has_its_columns_and_there_is_no_other(whole):

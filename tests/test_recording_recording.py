@@ -98,6 +98,7 @@ def whole(tmp_path_factory):
     return folder / "out.rrd", run
 
 
+# The components of each entity.
 COLUMNS = {
     r"/class/(found|annotated)/(ok|impact|oscillations)": BAND,
     r"/class/mark/impact": POINTS,
@@ -122,7 +123,6 @@ COLUMNS = {
     r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
     r"/report": {"TextDocument:text", "TextDocument:media_type"},
 }
-"""The components of each entity."""
 
 
 def test_every_entity_has_its_columns_and_there_is_no_other(whole):

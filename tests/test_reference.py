@@ -21,13 +21,13 @@ from inspector.reference.store import Reference
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / "accept"
+# Runs that are made after each change.
 CHANGED = {
     "harmless": ("pick-1", "place-1", "wave-1"),
     "chatter": ("pick-1", "pick-2", "pick-3", "place-1", "wave-1"),
     "impact": ("place-1", "place-2"),
     "improvement": ("pick-1", "wave-1"),
 }
-"""Runs that are made after each change."""
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ LOG = ("log.csv", "--mapping", "map.toml", "--desired", "desired.csv")
 OF_RUN, OF_LOG = ("run.npz", "model.npz", "arm.urdf"), ("log.csv", "map.toml", "desired.csv")
 FOLDERS = ("good", "worse", "--model", "model.npz")
 OF_FOLDERS = ("good/0.npz", "worse/0.npz", "model.npz")
+# Commands, what they read, an output, and the files that it must not replace.
 TABLE = [
     ("view", RUN, "-o {}.rrd", OF_RUN),
     ("view", RUN, "-o {}.html", OF_RUN),
@@ -45,11 +46,9 @@ TABLE = [
     ("tune", ("good", "--validation", "run.npz", "-o", "new"), "--train {}.npz", ("run.npz",)),
     ("evaluate", ("model.npz", "run.npz"), "-o {}.json", ("run.npz", "model.npz")),
 ]
-"""Commands, what they read, an output, and the files that it must not replace."""
+# Commands that write nothing, or read nothing, or are tested elsewhere.
 WITHOUT = {"robots", "audit", "simulate", "smoothness", "help", "accept"}
-"""Commands that write nothing, or read nothing, or are tested elsewhere."""
-STATES = ("--resume {}", "-o {}")
-"""Outputs that a command goes on with, where they are its own."""
+STATES = ("--resume {}", "-o {}")  # outputs that a command goes on with, where they are its own
 CASES = [(command, read, output, each) for command, read, output, files in TABLE for each in files]
 
 

@@ -25,8 +25,8 @@ from benchmarks.elsewhere.faults import KINDS
 from benchmarks.elsewhere.recorded import DroppedError
 from noisemodel import Run
 
+# Added to seeds in names: no run is taken for one of the same robot and seed that is ours.
 FIRST = 90_000
-"""Added to seeds in names: no run is taken for one of the same robot and seed that is ours."""
 
 
 @dataclass(frozen=True)

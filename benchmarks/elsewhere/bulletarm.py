@@ -9,8 +9,8 @@ from benchmarks.elsewhere.faults import Control
 from benchmarks.elsewhere.recorded import Recorded
 from noisemodel.types import Array
 
+# Of the loop of a joint that chatters, in [1/s] and [s]: unstable from a product of 1.6 on.
 CHATTER_GAIN, CHATTER_LAG = 20.0, 0.003
-"""Of the loop of a joint that chatters, in [1/s] and [s]: unstable from a product of 1.6 on."""
 
 
 @dataclass(frozen=True)

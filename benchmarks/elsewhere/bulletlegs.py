@@ -19,20 +19,17 @@ CHATTER_LAG = 0.004  # age of the measurements of a joint that chatters, in [s]
 
 @dataclass(frozen=True)
 class BulletLegs:
-    """A quadruped of ``pybullet_data``.
-
-    Attributes:
-        zeros: Joint angles of hip, thigh and calf at the zero of the URDF, in [rad].
-        gains: Ranges of stiffness in [N m/rad] and damping in [N m s/rad].
-    """
+    """A quadruped of ``pybullet_data``."""
 
     urdf: str
     joints: tuple[str, str, str]
     names: tuple[str, str, str]
     signs: tuple[float, float, float, float]
+    # Joint angles of hip, thigh and calf at the zero of the URDF, in [rad].
     zeros: tuple[float, float, float]
     lengths: tuple[float, float, float]  # lateral offset of a leg, thigh and calf, in [m]
     stance: float  # height of the hips over the feet, in [m]
+    # Ranges of stiffness in [N m/rad] and damping in [N m s/rad].
     gains: tuple[tuple[float, float], tuple[float, float]]
     torque: float  # greatest torque of a joint, in [N m]
     links: tuple[int, ...]

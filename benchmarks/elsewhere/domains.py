@@ -24,8 +24,8 @@ from noiseclassifier.scenarios.labels import RULE, Trace, annotate
 from noisemodel import Block, Run
 from noisemodel.types import Array
 
+# Least ratio of a fault's power to the sensor's in one octave, for it to have a label (3 dB).
 VISIBLE = 2.0
-"""Least ratio of a fault's power to the sensor's in one octave, for it to have a label (3 dB)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,18 +48,14 @@ class Scene:
 
 @dataclass(frozen=True)
 class Domain:
-    """A robot, a simulator and a controller.
-
-    Attributes:
-        scene: Draws a scene, from a random generator, a number, a duration in [s] and a rate in
-            [Hz].
-    """
+    """A robot, a simulator and a controller."""
 
     name: str
     package: str
     robot: str | None
     joints: tuple[str, ...]
     native: float  # the rate of the simulator's own default or examples, in [Hz]
+    # Draws a scene, from a random generator, a number, a duration in [s] and a rate in [Hz].
     scene: Callable[[np.random.Generator, int, float, float], Scene]
 
     @property

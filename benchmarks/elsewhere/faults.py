@@ -16,13 +16,10 @@ KINDS = ("push", "throw", "latency", "chatter", "jump", "hold", "decalibration")
 
 @dataclass(frozen=True)
 class Sizes:
-    """Ranges from which a domain draws its faults.
-
-    Attributes:
-        ball: Mass of a thrown ball, in [kg]; None where nothing can be thrown.
-    """
+    """Ranges from which a domain draws its faults."""
 
     force: Range = (30.0, 150.0)  # peak of a push, in [N]
+    # Mass of a thrown ball, in [kg]; None where nothing can be thrown.
     ball: Range | None = (0.3, 1.5)
     delay: Range = (0.03, 0.08)  # additional age of measurements or commands, in [s]
     gain: Range = (15.0, 30.0)
@@ -204,8 +201,8 @@ def _decalibration(control: Control, at: _Place) -> Control:
 
 
 _ADDING = (_push, _throw, _latency, _chatter, _jump, _hold, _decalibration)
+# Function that adds a fault to a control, by kind.
 ADD: Mapping[str, Callable[[Control, _Place], Control]] = dict(zip(KINDS, _ADDING, strict=True))
-"""Function that adds a fault to a control, by kind."""
 
 
 def _event(label: str, cause: str, start: int, stop: int, rate: float, **facts: float) -> Event:

@@ -11,16 +11,11 @@ KINDS = ("minimum jerk", "spline", "trapezoid", "sine")
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A motion in joint space.
-
-    Attributes:
-        position: Shape (samples, joints), in [rad].
-        velocity: Its derivative, shape (samples, joints), in [rad/s].
-    """
+    """A motion in joint space."""
 
     kind: str
-    position: Array
-    velocity: Array
+    position: Array  # shape (samples, joints), in [rad]
+    velocity: Array  # its derivative, shape (samples, joints), in [rad/s]
 
 
 def draw(

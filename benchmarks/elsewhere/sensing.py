@@ -7,12 +7,12 @@ import numpy as np
 
 from noisemodel.types import Array
 
+# Standard deviation of the white noise of a measured velocity, in [rad/s].
 NOISE: Mapping[str, float] = MappingProxyType(
     {"exact": 0.0, "1 mrad/s": 1e-3, "5 mrad/s": 5e-3, "20 mrad/s": 2e-2}
 )
-"""Standard deviation of the white noise of a measured velocity, in [rad/s]."""
+# Encoders whose positions are differentiated and filtered.
 BITS: Mapping[str, int] = MappingProxyType({"20 bit": 20, "17 bit": 17, "14 bit": 14})
-"""Encoders whose positions are differentiated and filtered."""
 SENSORS = (*NOISE, *BITS)
 
 

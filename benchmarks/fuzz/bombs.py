@@ -776,6 +776,7 @@ def _dae(data: bytes) -> Iterator[Bomb]:
     yield Bomb("100,000 instances", text.replace('<instance_geometry url="#g"/>', copies))
 
 
+# By how the names of readers begin.
 BY_NAME: dict[str, Callable[[bytes], Iterator[Bomb]]] = {
     "run": _runs,
     "CSV": _tables,
@@ -801,4 +802,3 @@ BY_NAME: dict[str, Callable[[bytes], Iterator[Bomb]]] = {
     "OBJ": _obj,
     "DAE": _dae,
 }
-"""By how the names of readers begin."""

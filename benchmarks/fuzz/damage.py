@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+# What a number, a word or a value is replaced by.
 WORDS = (
     *(b"1" * 400, b"-" + b"9" * 5000, b"9223372036854775808", b"-9223372036854775809", b"1e19"),
     *(b"1e400", b"-1e308", b"1e154", b"5e-324", b"1e-99999999999999999999", b"1e99999999999999"),
@@ -18,8 +19,6 @@ WORDS = (
     *(b"\x1b[31m", b"\n::error::x\n", b"=HYPERLINK(1)", b"../../../etc/passwd", b"/dev/zero"),
     *(b"'''", b'"', b"\\", b"#", b"<!--", b"&a;", b"]]>", b"%s", b"{0}", b"*", b"[a-"),
 )
-"""What a number, a word or a value is replaced by."""
-
 TOKEN = re.compile(rb"""[-+]?\d[\d.]*(?:e[-+]?\d+)?|"[^"\n]*"|'[^'\n]*'|[A-Za-z_][\w.-]*""", re.I)
 
 NUMBERS = (np.nan, np.inf, -np.inf, 1e308, -1e154, 1e15, 5e-324, 2.0**63, -1.0, 0.0, 1e-30)

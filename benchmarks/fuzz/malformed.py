@@ -33,14 +33,13 @@ from benchmarks.fuzz.bombs import Bomb, bombs
 from benchmarks.fuzz.damage import damaged
 from benchmarks.fuzz.readers import READERS, Reader
 
+# Processor time in [s] and resident memory in [byte] that a command may take.
 SECONDS, BYTES = 20, 2 * 10**9
-"""Processor time in [s] and resident memory in [byte] that a command may take."""
 WALL = 150.0  # time that it may take in all, in [s]: one that waits takes no processor time
 
+# Result or one line; a bug; above ``SECONDS``; above ``BYTES``; a result of what cannot have one;
+# control characters or commands of a CI system in the output.
 OUTCOMES = ("handled", "traceback", "hang", "memory", "nonsense", "raw text")
-"""Result or one line; a bug; above ``SECONDS``; above ``BYTES``; a result of what cannot have one;
-control characters or commands of a CI system in the output."""
-
 RAW = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\x9b]|^::", re.M)
 NOT_FINITE = re.compile(r"\b(nan|inf) (√W|W|rad|m|s|Hz|dB|ms)\b")
 

@@ -58,9 +58,8 @@ from noisemodel.types import Array
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
+# Errors that end a command in one line.
 EXPECTED = (InspectorError, nm.NoiseModelError, nc.ModelsError, ScenarioError)
-"""Errors that end a command in one line."""
-
 JOINTS = ("a", "b")
 TIME = np.arange(200) / 100
 POSITION = np.stack((np.sin(6.0 * TIME), np.cos(5.0 * TIME)), axis=1)
@@ -78,6 +77,7 @@ URDF = f"""<robot name="r"><link name="l0"/>
 <axis xyz="0 1 0"/>{LIMIT}</joint></robot>
 """
 CYLINDER = '<cylinder radius="0.05" length="1.0"/>'
+# An MJCF with attributes that multiply: counts, grids, replicas, keys and meshes of numbers.
 ATTRIBUTES = """<mujoco model="r"><compiler angle="radian" boundmass="0.1"/>
 <option timestep="0.001"/><size nkey="2" nuser_body="1" nuser_geom="1"/>
 <default><geom rgba="1 0 0 1"/></default><asset><hfield name="h"
@@ -98,7 +98,6 @@ ATTRIBUTES = """<mujoco model="r"><compiler angle="radian" boundmass="0.1"/>
 <actuator><motor joint="a" lengthrange="0 1" gear="1"/></actuator>
 <keyframe><key time="0"/></keyframe></mujoco>
 """
-"""An MJCF with attributes that multiply: counts, grids, replicas, keys and meshes of numbers."""
 MJCF = """<mujoco model="r"><compiler angle="radian"/><default><geom rgba="1 0 0 1"/></default>
 <worldbody><body name="l1"><joint name="a" axis="0 1 0" range="-9 9"/>
 <geom type="box" size="0.05 0.05 0.5" pos="0 0 0.5"/>
@@ -173,6 +172,7 @@ def _jumping(step: float = 100.0) -> Array:
     return TIME + np.repeat([0.0, step, -1.0, 1e9, -1.0], 40)
 
 
+# Names of columns as logs have them.
 NAMES = (
     *(
         "timestamp",
@@ -199,7 +199,6 @@ NAMES = (
         "l_arm_joint_1",
     ),
 )
-"""Names of columns as logs have them."""
 
 
 def _rows(separator: str = ",", names: str = COLUMNS, *, jump: float = 0.0) -> str:
@@ -564,6 +563,7 @@ def _accepted(folder: Path) -> Path:
     return folder / "reference.toml"
 
 
+# By name.
 READERS: Mapping[str, Reader] = MappingProxyType(
     {
         "run": Reader("arrays", _run_file, _read_run, CLASSIFY),
@@ -695,4 +695,3 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         ),
     }
 )
-"""By name."""

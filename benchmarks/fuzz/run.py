@@ -29,6 +29,7 @@ with atheris.instrument_imports(include=["inspector", "noiseclassifier", "noisem
     from benchmarks.fuzz.damage import damaged
     from benchmarks.fuzz.readers import EXPECTED, READERS, compile_in_fork
 
+# Readers that are fuzzed together; each input goes to one of them.
 GROUPS = {
     "labels": tuple(name for name in READERS if name.startswith(("labels", "NoisyTest", "simul"))),
     "settings": ("mapping", "reference.toml", "resume state", "tune state", "dataset.json"),
@@ -42,12 +43,10 @@ GROUPS = {
     "parts": ("timestamps", "names", "ROS definition"),
     "robots": ("URDF", "MJCF", "MJCF, attributes", "STL", "STL, text", "OBJ", "DAE"),
 }
-"""Readers that are fuzzed together; each input goes to one of them."""
-
 SEEDS = 30  # damaged files of each reader to begin with
 
+# Bytes that a long text is cut to, and that an input has at most: short ones are read faster.
 SHORT, LONGEST = 1000, 20_000
-"""Bytes that a long text is cut to, and that an input has at most: short ones are read faster."""
 
 
 def main() -> None:
