@@ -4,9 +4,10 @@
 
 The model learns from logs of wide domains at many rates and from a few seeds of the scenarios at
 home: the training part of the sources, none of the targets (robots, control and sensing that are
-never trained on). It is measured on the held-out part of the sources, on the targets, and at home,
-each with a section of its card. Every step is kept in the folder: killed and started again, this
-goes on where it was; only at the end are the files that ship replaced.
+never trained on). It learns what happens; what lasts for a whole run is measured too, but found by
+`noiseclassifier.Lasting`. It is measured on the held-out part of the sources, on the targets, and
+at home, each with a section of its card. Every step is kept in the folder: killed and started
+again, this goes on where it was; only at the end are the files that ship replaced.
 """
 
 import argparse
@@ -29,7 +30,7 @@ from noiseclassifier.scenarios import dataset
 from noiseclassifier.scenarios.dataset import Folder, Side, Task, scenario_tasks, wide_tasks
 from noiseclassifier.scenarios.faults import octave
 from noiseclassifier.scenarios.labels import visible
-from noiseclassifier.scenarios.logs import kept, overlap
+from noiseclassifier.scenarios.logs import overlap
 from noiseclassifier.scenarios.robots import TARGETS, WIDE
 from noiseclassifier.scenarios.simulation import GOOD, RECIPE, WIDE_RECIPE
 from noisemodel import Block, Run
@@ -40,7 +41,7 @@ THROUGHOUT = 1  # and one with a fault of the whole run
 FAST = 10_018  # a further one, the first whose runs are kept at 10 kHz
 HOME = ("panda", "go2", "solo12", "anymal", "g1")
 """Robots whose scenarios are in the training data, too."""
-SEEDS = 2  # their seeds in every scenario, from 0
+SEEDS = 4  # their seeds in every scenario, from 0
 TEST, FIRST = ("panda", "go2", "talos"), 55
 """Robots whose scenarios at home are measured on, and their seed."""
 RATES = (10_000.0, 2000.0, 1000.0, 500.0, 250.0, 125.0, 80.0)
@@ -49,9 +50,8 @@ SHOWN = (1000.0, 500.0, 250.0, 125.0)
 """Rates of the logs of targets, in [Hz]."""
 COPIES = 2
 """Logs of each run at 1 kHz and above, each of another logger; below, one."""
-EVERY = 3
-"""One log in so many is also trained on as a piece that begins anywhere, and one good log with a
-fault throughout: every frame of these is a failure, and all of them would outnumber the rest."""
+EVERY = 3  # one log in so many is also trained on as a piece that begins anywhere
+WHOLE = "throughout"  # in the names of runs with a fault of the whole run
 ADDED = {"tone": "oscillations", "noise": "oscillations", "blow": "impact"}
 """Faults that are added to good logs, and the class of each kind."""
 LOWEST = 15.0  # lowest frequency, in [Hz]; the highest is 0.45 of the sample rate
@@ -71,11 +71,11 @@ and measured velocities, joint by joint or as norms, efforts; the noise alone): 
 unknown.
 
 Made by `make models`: profile `general`, trained on {runs} logs of {robots} robots: logs of wide
-domains (recipe {wide}, {domains} seeds of every source robot) at {rates} Hz, with faults of a while
-and of the whole run; copies of the good ones with faults added (models/build.py), of a while and
-throughout (one in {every}); pieces of one log in {every} that begin anywhere; and {seeds} seeds of
-every scenario at home (recipe {recipe}) of {home}, each without the part that is held out by hash.
-The model file has the hashes of all of them. Their licences are permissive (docs/robots.md).
+domains (recipe {wide}, {domains} seeds of every source robot) at {rates} Hz, with faults of a
+while; copies of the good ones with faults added (models/build.py); pieces of one log in {every}
+that begin anywhere; and {seeds} seeds of every scenario at home (recipe {recipe}) of {home}, each
+without the part that is held out by hash. The model file has the hashes of all of them. Their
+licences are permissive (docs/robots.md).
 
 Not in the training data: {targets}; impedance control, encoders of 13 bit or fewer, samples held
 four times or more; any real robot; any other simulator. Measures are defined in docs/metrics.md.
@@ -101,13 +101,14 @@ def main() -> None:
     fresh = scenario_tasks(TEST, first=FIRST, seeds=1)
     test = timed("simulate the test", simulate, build / "home-test", fresh, given.jobs)
     sources = [timed(f"logs at {rate:g} Hz", logs, wide, build, rate, "source") for rate in RATES]
-    inputs = [*sources, home.path]
+    folders = [*sources, home.path]
     for source in sources:
-        inputs += [
+        folders += [
             copies(source, "added", with_faults, GOOD),
-            copies(source, "throughout", with_fault_throughout, GOOD, every=EVERY),
             copies(source, "pieces", beginning_anywhere, "", every=EVERY),
         ]
+    files = [file for folder in folders for file in sorted(folder.rglob("*.npz"))]
+    inputs = [file for file in files if WHOLE not in file.name]
     model = build / f"{NAME}.npz"
     if not model.exists():
         timed("train", train, inputs, ANY_RATE, None, model, part="training")
@@ -223,23 +224,6 @@ def fault(kind: str, samples: int, frequency: float, rate: float, rng: np.random
         if kind == "blow":
             signal *= np.exp(-time * frequency / 3.0)
     return signal / max(np.sqrt(np.mean(signal**2)), 1e-9)
-
-
-def with_fault_throughout(run: Run, *, seed: int) -> Run:
-    """A good log with a tone or an octave of noise from its first sample to its last."""
-    rng = np.random.default_rng((seed, 1))
-    kind = str(rng.choice(("tone", "noise")))
-    added = some_fault(kind, len(run.velocity), run, rng)
-    whole = Block(0.0, len(added) / run.rate, ADDED[kind])
-    blocks = kept((whole,), visible(added, run.velocity, rate=run.rate))
-    labelled = sum(block.stop - block.start for block in blocks)
-    event = {"label": whole.label, "start": 0.0, "stop": whole.stop, "labelled": labelled}
-    return replace(
-        run,
-        velocity=(run.velocity + added).astype(np.float32),
-        blocks=blocks,
-        meta={**run.meta, "scenario": "added-throughout", "events": [event]},
-    )
 
 
 def beginning_anywhere(run: Run, *, seed: int) -> Run:

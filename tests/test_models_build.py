@@ -12,7 +12,7 @@ SPEC = spec_from_file_location("build_models", Path(__file__).parents[1] / "mode
 build = module_from_spec(SPEC)
 SPEC.loader.exec_module(build)
 ADDED, LEVELS = build.ADDED, build.LEVELS
-with_faults, with_fault_throughout = build.with_faults, build.with_fault_throughout
+with_faults = build.with_faults
 
 
 def log(rate=500.0, seconds=7.0, noise=1e-4):
@@ -68,20 +68,6 @@ def test_equal_seeds_add_equal_faults():
     assert not np.array_equal(
         with_faults(log(), seed=1).velocity, with_faults(log(), seed=2).velocity
     )
-
-
-def test_a_fault_throughout_is_there_from_the_first_sample_to_the_last():
-    for seed in range(6):
-        found = with_fault_throughout(log(), seed=seed)
-        (event,), changed = found.meta["events"], found.velocity != log().velocity
-        assert (event["start"], event["stop"]) == (0.0, 7.0)
-        assert changed[:50].any()
-        assert changed[-50:].any()
-        assert {block.label for block in found.blocks} == {"oscillations"}
-        assert event["labelled"] == pytest.approx(7.0, abs=0.2)
-    silent = with_fault_throughout(log(noise=100.0 * LEVELS[1]), seed=1)
-    assert silent.blocks == ()
-    assert silent.meta["events"][0]["labelled"] == 0.0
 
 
 def test_a_piece_of_a_log_begins_at_zero_with_what_it_has_of_labels_and_events():
