@@ -14,6 +14,7 @@ import os
 import stat
 import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib import metadata
 from math import prod
 from pathlib import Path
@@ -43,19 +44,12 @@ BY_BANDS = {"single_precision": "comb", "drop_first_sample": "comb", "flush_end"
 LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times as many as the shipped ones."""
 
-ACCEPT = "that is replaced; accept these runs (`inspector accept`), and classify without this model"
-"""What becomes of models that earlier versions trained on good runs alone."""
-_ADAPTED = {"location": 1, "spread": 1}
-_BASELINE = {"good": 2, "limit": 1}
-
 _KINDS = [
-    {"manifest": 0, "mean": 1, "scale": 1, **own}
-    for own in (
-        *({name: len(axes) for name, axes in each.SHAPES.items()} for each in ESTIMATORS.values()),
-        _BASELINE,
-    )
+    {"manifest": 0, "mean": 1, "scale": 1}
+    | {name: len(axes) for name, axes in each.SHAPES.items()}
+    for each in ESTIMATORS.values()
 ]
-_KINDS += [{**kind, **_ADAPTED} for kind in _KINDS] + [
+_KINDS += [
     {name: count for name, count in kind.items() if name != "missing"}
     for kind in _KINDS
     if "missing" in kind
@@ -95,8 +89,6 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
 
     `noisemodel.files` offers a path for other writers; this package must not import it.
     """
-    if path.is_dir():
-        raise OutputError(path, "is a folder; name a file")
     if path.exists() and not path.is_file():
         raise OutputError(path, "is no regular file; name one")
     if path.exists() and not overwrite:
@@ -105,29 +97,20 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
         path = Path(os.path.realpath(path))
     temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")
     try:
-        file = temporary.open("xb")
-    except OSError as error:
-        raise OutputError(path, f"cannot be written ({error.strerror})") from error
-    try:
-        with file:
+        with temporary.open("xb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
         if not overwrite:
-            try:
-                os.link(temporary, path)  # unless another process has taken the name meanwhile
-                return
-            except FileExistsError:
-                raise
-            except OSError:  # a file system without hard links: an empty file claims the name
-                path.open("xb").close()
+            path.touch(exist_ok=False)  # unless another process has taken the name meanwhile
         temporary.replace(path)
     except FileExistsError:
         raise OutputError(path, EXISTS) from None
     except OSError as error:
         raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # its folder may not be one
+            temporary.unlink(missing_ok=True)
 
 
 def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
@@ -220,11 +203,8 @@ def _manifest(path: str | Path, text: str) -> dict[str, Any]:
             " train it again, or read it by the version that wrote it",
         )
     profile = manifest.get("profile")
-    if isinstance(profile, dict):
-        if given != FORMAT:
-            manifest["profile"] = profile = _of_this_version(path, profile)
-        if profile.get("estimator") == "baseline":
-            raise FileError(path, f"is a baseline of good runs: {ACCEPT}")
+    if given != FORMAT and isinstance(profile, dict):
+        manifest["profile"] = _of_this_version(path, profile)
     if given != FORMAT and isinstance(manifest.get("recipe"), dict):
         manifest["recipe"].pop("relative", None)
     return dict(manifest)
@@ -312,8 +292,6 @@ def _check_arrays(
             raise FileError(
                 path, f"array {name!r} has shape {shape}, its profile asks for {wanted}"
             )
-    if "location" in arrays:
-        raise FileError(path, f"is adapted to good runs: {ACCEPT}")
     if not (arrays["scale"] > 0).all():
         raise FileError(path, "array 'scale' holds values that are not above 0")
     indices = {"feature": count - 1, "left": profile.leaves, "missing": 1}
