@@ -56,7 +56,7 @@ def test_a_model_is_measured_by_runs_outside_of_its_training_set(classifier):
     assert found.protocol.pooled["class_recall"].value == 1.0
     assert found.protocol.counts["false_alarms"] == 0
     assert found.protocol.counts["ok_hours"] == pytest.approx(6 * (4.0 + 1.95) / 3600)
-    assert found.evaluation.balanced_accuracy > 0.95
+    assert found.evaluation.measures["balanced_accuracy"] > 0.95
     whole = classifier.evaluate(nc.Dataset.of(runs, PROFILE, training=False))
     assert found.evaluation.confusion.tolist() == whole.confusion.tolist()
     plain = found.as_dict()

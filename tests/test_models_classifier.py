@@ -48,7 +48,7 @@ def ours():
 
 def test_the_training_set_is_classified_right(ours):
     report = ours.evaluate(nc.Dataset.of(DATA, OURS))
-    assert report.subset_accuracy == 1.0
+    assert report.measures["subset_accuracy"] == 1.0
     assert ours.metrics["training"] == report.as_dict()
     assert not trained(PAPER).mean.any()
     assert ours.classes == ("ok", "impact", "oscillations")

@@ -131,7 +131,7 @@ def test_our_own_profile_beats_both_on_the_same_data(recordings):
             for name in ("training", "validation")
         )
         classifier = nc.Classifier.train(training, profile)
-        return classifier.evaluate(validation).balanced_accuracy
+        return classifier.evaluate(validation).measures["balanced_accuracy"]
 
     ours = balanced(nc.LogBands().at(10_000.0))
     assert ours > 0.9

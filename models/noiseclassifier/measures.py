@@ -17,6 +17,7 @@ fewer than five groups, shares have no interval.
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
+from functools import cached_property
 from math import isnan, nan
 from statistics import harmonic_mean
 from typing import Any, Self
@@ -61,16 +62,13 @@ KEYS = ("robot", "domain", "scenario")
 """What runs can be grouped by."""
 MOST = 0.1
 """False positive rate up to which the partial AUC counts."""
-BY_CLASS = ("recall", "precision", "false_negative_errors", "false_positive_errors")
-"""Measures of frames that each class has."""
-OF_ALL = (
-    "balanced_accuracy",
-    "failure_recall",
-    "false_alarm_rate",
+PAPER = (
+    "false_negative_errors",
+    "false_positive_errors",
     "failure_detection_rate",
     "subset_accuracy",
 )
-"""Measures of frames of all classes."""
+"""Measures of frames as the paper has them: of ALL frames."""
 
 
 def ratio(part: Array | float, whole: Array | float) -> Array:
@@ -86,7 +84,7 @@ def plain(value: Any) -> Any:
         value = vars(value)
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, list):
         return [plain(each) for each in value]
@@ -98,14 +96,10 @@ def plain(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Confusion matrix of frames, and measures of it: shares from 0 to 1, NaN where undefined.
-
-    Attributes:
-        confusion: Frames by true (row) and predicted class (column), shape (classes, classes).
-    """
+    """Confusion matrix of frames, and measures of it: shares from 0 to 1, NaN where undefined."""
 
     classes: tuple[str, ...]
-    confusion: NDArray[Any]
+    confusion: NDArray[Any]  # frames by true (row) and predicted class (column)
 
     @classmethod
     def of(cls, truth: Words, predicted: Words, classes: Sequence[str]) -> Self:
@@ -135,75 +129,50 @@ class Evaluation:
         """How many frames were compared."""
         return int(self.confusion.sum())
 
-    @property
-    def recall(self) -> Array:
-        """Frames of a class that were predicted as it, of its frames, shape (classes,)."""
-        return ratio(self.confusion.diagonal(), self.confusion.sum(axis=1))
-
-    @property
-    def precision(self) -> Array:
-        """Frames of a class, of those that were predicted as it, shape (classes,)."""
-        return ratio(self.confusion.diagonal(), self.confusion.sum(axis=0))
-
-    @property
-    def false_negative_errors(self) -> Array:
-        """Frames of a class predicted as another, of ALL frames, shape (classes,)."""
-        return ratio(self.confusion.sum(axis=1) - self.confusion.diagonal(), self.frames)
-
-    @property
-    def false_positive_errors(self) -> Array:
-        """Frames of others predicted as the class, of ALL frames, shape (classes,)."""
-        return ratio(self.confusion.sum(axis=0) - self.confusion.diagonal(), self.frames)
-
-    @property
-    def failure_detection_rate(self) -> float:
-        """The paper's: 1 less the false positive errors of `ok`."""
-        missed = self.confusion[~self._ok][:, self._ok].sum()
-        return float(ratio(self.frames - missed, self.frames))
-
-    @property
-    def subset_accuracy(self) -> float:
-        """Frames with the right prediction, of all frames."""
-        return float(ratio(self.confusion.trace(), self.frames))
-
-    @property
-    def balanced_accuracy(self) -> float:
-        """Mean recall of the classes that occur."""
-        return float(np.nanmean(self.recall))
-
-    @property
-    def failure_recall(self) -> float:
-        """Failure frames that were not predicted as `ok`, of the failure frames."""
-        return self._flagged(~self._ok)
-
-    @property
-    def false_alarm_rate(self) -> float:
-        """`ok` frames that were not predicted as `ok`, of the `ok` frames."""
-        return self._flagged(self._ok)
+    @cached_property
+    def measures(self) -> dict[str, Any]:
+        """Measures by name: of each class, shape (classes,), and then of all."""
+        cells, ok = self.confusion, np.array([name == OK for name in self.classes])
+        right, own, predicted = cells.diagonal(), cells.sum(axis=1), cells.sum(axis=0)
+        flagged = cells[:, ~ok].sum(axis=1)  # frames of a class that were not predicted as `ok`
+        recall = ratio(right, own)
+        return {
+            "recall": recall,
+            "precision": ratio(right, predicted),
+            "false_negative_errors": ratio(own - right, self.frames),
+            "false_positive_errors": ratio(predicted - right, self.frames),
+            "balanced_accuracy": np.nanmean(recall),  # of the classes that occur
+            "failure_recall": ratio(flagged[~ok].sum(), own[~ok].sum()),
+            "false_alarm_rate": ratio(flagged[ok].sum(), own[ok].sum()),
+            # 1 less the false positive errors of `ok`:
+            "failure_detection_rate": ratio(self.frames - (own - flagged)[~ok].sum(), self.frames),
+            "subset_accuracy": ratio(right.sum(), self.frames),
+        }
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
-        by_class = {
-            name: dict(zip(self.classes, plain(getattr(self, name)), strict=True))
-            for name in BY_CLASS
-        }
+        found = {name: plain(value) for name, value in self.measures.items()}
         return {
             "frames": self.frames,
             "classes": list(self.classes),
             "confusion": self.confusion.tolist(),
-            **by_class,
-            **{name: plain(getattr(self, name)) for name in OF_ALL},
+            **{
+                name: dict(zip(self.classes, value, strict=True))
+                if isinstance(value, list)
+                else value
+                for name, value in found.items()
+            },
         }
 
     def __str__(self) -> str:
-        ok = self.confusion[self._ok].sum() / self.frames
+        ok = self.confusion[[name == OK for name in self.classes]].sum() / self.frames
         width = max(26, *(len(name) + 2 for name in self.classes))
 
         def line(title: str, cells: Sequence[object]) -> str:
             return title.ljust(width) + "".join(str(cell).rjust(19) for cell in cells)
 
         def shares(name: str) -> str:
-            values = np.atleast_1d(getattr(self, name)).tolist()
+            values = np.atleast_1d(self.measures[name]).tolist()
             title = name.replace("_", " ").capitalize()
             return line(title, ["-" if isnan(value) else f"{value:.1%}" for value in values])
 
@@ -213,10 +182,10 @@ class Evaluation:
                 line(f"{self.frames} frames", self.classes),
                 "",
                 "As the paper measures",
-                *map(shares, (*BY_CLASS[2:], *OF_ALL[3:])),
+                *map(shares, PAPER),
                 "",
                 "Of the frames in question",
-                *map(shares, (*BY_CLASS[:2], *OF_ALL[:3])),
+                *(shares(name) for name in self.measures if name not in PAPER),
                 "",
                 "Frames of (row) predicted (column)",
                 *(line(name, row) for name, row in rows),
@@ -225,15 +194,6 @@ class Evaluation:
                 f"{ok:.1%} of failures by its measure, and none by failure recall.",
             ]
         )
-
-    def _flagged(self, classes: Mask) -> float:
-        """Frames of some classes that were not predicted as `ok`, of the frames of these."""
-        own = self.confusion[classes]
-        return float(ratio(own[:, ~self._ok].sum(), own.sum()))
-
-    @property
-    def _ok(self) -> Mask:
-        return np.array([name == OK for name in self.classes])
 
 
 # --- intervals

@@ -45,8 +45,7 @@ LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times as many as the shipped ones."""
 
 _KINDS = [
-    {"manifest": 0, "mean": 1, "scale": 1}
-    | {name: len(axes) for name, axes in each.SHAPES.items()}
+    {"manifest": 0, "mean": 1, "scale": 1} | {name: len(axes) for name, axes in each.SHAPES.items()}
     for each in ESTIMATORS.values()
 ]
 _KINDS += [

@@ -216,9 +216,8 @@ class Validation:
         for chosen in self.chosen:
             cells = np.zeros((len(names), len(names)), dtype=np.int64)
             np.add.at(cells, (self.truth, chosen), 1)
-            found = Evaluation(names, cells).as_dict()
-            values = (nan if found[name] is None else found[name] for name in wanted)
-            measures.append(Measures(*(round(value, DIGITS) for value in values)))
+            found = Evaluation(names, cells).measures
+            measures.append(Measures(*(round(float(found[name]), DIGITS) for name in wanted)))
         return measures
 
 
