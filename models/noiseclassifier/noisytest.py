@@ -57,15 +57,13 @@ def _columns(path: str | Path) -> tuple[Array, Array]:
             if len(line) == LONGEST_LINE:
                 raise FileError(path, f"has a line of more than {LONGEST_LINE} characters")
             words = line.partition("#")[0].split()
-            if len(words) not in (0, 2):
-                problem = f"line {number} has {len(words)} columns, expected time and noise"
-                raise FileError(path, problem)
             try:
                 row = [float(word) for word in words]
-            except ValueError as error:
-                raise FileError(path, f"line {number}: {error}") from error
-            if not all(map(isfinite, row)):
-                raise FileError(path, f"line {number} is not finite: {' '.join(words)}")
+            except ValueError:
+                row = []
+            if words and not (len(row) == 2 and all(map(isfinite, row))):
+                problem = f"line {number} is {line[:80].strip()!r}, expected time and noise, finite"
+                raise FileError(path, problem)
             found.extend(row)
     if not found:
         raise FileError(path, "is empty; expected rows of time and noise")
@@ -82,11 +80,10 @@ def _check_time(path: str | Path, time: Array) -> None:
     wrong = np.flatnonzero((steps <= 0) | (np.abs(steps - step) > 0.5 * step))
     if len(wrong):
         row = int(wrong[0])
-        what = "goes backward or stands still" if steps[row] <= 0 else "is not in even steps"
         raise FileError(
             path,
-            f"time {what} from row {row + 1} to row {row + 2}:"
-            f" {time[row]:.9g} s, then {time[row + 1]:.9g} s, where a step is {step:.6g} s",
+            f"time is not in even steps of {step:.6g} s from row {row + 1} to row {row + 2}:"
+            f" {time[row]:.9g} s, then {time[row + 1]:.9g} s",
         )
 
 
@@ -127,13 +124,10 @@ def read_annotations(path: str | Path) -> tuple[Block, ...]:
     try:
         return tuple(parse_annotations(text_of(path)))
     except OSError as error:
-        raise FileError(
-            path, f"cannot be read ({error.strerror}); each .log needs its .toml"
-        ) from error
-    except AnnotationError as error:
-        raise FileError(path, str(error)) from error
+        problem = f"cannot be read ({error.strerror}); each .log needs its .toml"
+        raise FileError(path, problem) from error
     except ValueError as error:
-        raise FileError(path, f"not TOML ({error})") from error
+        raise FileError(path, str(error)) from error
 
 
 def parse_annotations(text: str) -> Iterator[Block]:
@@ -144,10 +138,8 @@ def parse_annotations(text: str) -> Iterator[Block]:
         raise AnnotationError(f"not TOML ({error})") from error
     table = data if isinstance(data, dict) else {}
     ranges, labels = table.get("chunk_ranges"), table.get("chunk_labels")
-    if not (isinstance(ranges, list) and isinstance(labels, list)):
-        raise AnnotationError("lacks the lists chunk_ranges and chunk_labels in a table [data]")
-    if len(ranges) != len(labels):
-        raise AnnotationError(f"{len(ranges)} chunk_ranges and {len(labels)} chunk_labels")
+    if not (isinstance(ranges, list) and isinstance(labels, list) and len(ranges) == len(labels)):
+        raise AnnotationError("lacks chunk_ranges and chunk_labels, lists of one length, in [data]")
     for count, (span, label) in enumerate(zip(ranges, labels, strict=True), start=1):
         numbers = isinstance(span, list) and [
             type(each) in (int, float) and -LATEST < each < LATEST for each in span
