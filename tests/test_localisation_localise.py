@@ -9,7 +9,7 @@ from inspector.localisation.localise import Localisation, band, localise
 from inspector.localisation.stage import quiet_stretches
 from inspector.report.findings import report, sentence, words
 from inspector.report.html import found as tables
-from inspector.verdict import classify_file
+from inspector.verdict import Finding, classify_file
 from noisemodel import Block, Run
 
 RATE, SECONDS = 2000.0, 6.0
@@ -81,7 +81,7 @@ def test_the_words_for_a_localisation_are_stage_lead_joints_and_band():
     assert words(found) == ("commanded, 3.0 ms before measured", "knee 80%", "85-130 Hz")
     assert words(found, quote="`")[0] == "`commanded`, 3.0 ms before `measured`"
     slow = dataclasses.replace(found, lag=0.0123)
-    assert words(slow)[0] == "commanded, 12 ms before measured"
+    assert words(slow)[0] == "commanded, 12.3 ms before measured"
     assert words(Localisation("measured", band=(20.0, 20.0))) == ("measured", "", "20 Hz")
     assert words(Localisation(), quote="`") == ("", "", "")
 
@@ -99,8 +99,8 @@ def test_the_localisation_of_a_verdict_is_that_of_a_view_of_its_run():
     verdict = classify_file(demo_run(), library)
     assert verdict.events
     seen = analyse_file(demo_run(), library, links=False)
-    assert verdict.events == seen.findings
-    assert verdict.localisations == {event: seen.localisations[event] for event in seen.findings}
+    known = [Finding.of(event, localisation=seen.localisations[event]) for event in seen.findings]
+    assert list(verdict.events) == known
 
 
 def test_the_report_states_stage_and_band_of_each_failure(tmp_path):
