@@ -34,7 +34,7 @@ def test_help_explains_one_run_and_many():
     assert "dataset" in out
     assert "inspector simulate run talos --scenario 7" in " ".join(out.split())
     status, out, _ = inspector("simulate", "dataset", "--help")
-    assert {"--robots", "--seeds", "--only", "--first-seed"} <= set(out.split())
+    assert {"--robots", "--seeds", "--scenarios", "--first-seed"} <= set(out.split())
 
 
 def test_scenarios_are_listed_with_numbers_and_families():
@@ -79,7 +79,7 @@ def test_a_data_set_is_made_once_and_its_statistics_are_printed(simulated, tmp_p
     ("arguments", "status", "problem"),
     [
         (["--robots", "panda,baxter"], 3, "robot 'baxter' cannot be simulated"),
-        (["--scenarios", "7", "--only", "ok"], 3, "no scenario is left for 'panda'"),
+        (["--scenarios", "24"], 3, "no scenario is left for 'panda'"),
         (["--seeds", "0"], 2, "greater than or equal to 1"),
         (["--first-seed", "-1"], 2, "greater than or equal to 0"),
         (["--duration", "1"], 2, "greater than or equal to 3"),

@@ -81,7 +81,6 @@ def dataset(
     seeds: Annotated[int, option("Seeds per robot and scenario.", min=1)] = 8,
     first_seed: Annotated[int, option("The first random seed.", min=0)] = 0,
     scenarios: Annotated[str, option("Names or numbers; by default all.")] = "",
-    only: Annotated[Literal["ok"] | None, option("Only scenarios without a failure.")] = None,
     rate: Annotated[
         float, option("At which runs are kept, in Hz.", min=1.0, max=10_000.0)
     ] = 10_000.0,
@@ -100,7 +99,7 @@ def dataset(
 
     where = jobs_or_dask(jobs, dask)
     names, numbers = _listed(robots), _listed(scenarios)
-    tasks = scenario_tasks(names, numbers, healthy=only is not None, first=first_seed, seeds=seeds)
+    tasks = scenario_tasks(names, numbers, first=first_seed, seeds=seeds)
     folder = Folder.opened(output, duration=duration, rate=rate)
     _make(folder, folder.missing(tasks), where)
     found = statistics(folder)
@@ -114,7 +113,6 @@ def domains(
     seeds: Annotated[int, option("Seeds per robot; each draws a domain.", min=1)] = 8,
     first_seed: Annotated[int, option("The first random seed.", min=10_000)] = 10_000,
     faults: Annotated[int, option("Faulty runs per robot and seed.", min=0)] = 2,
-    always: Annotated[str, option("Faults of every robot that can have them.")] = "",
     throughout: Annotated[
         int, option("Faults of whole runs, per robot and seed.", min=0, max=6)
     ] = 0,
@@ -130,14 +128,8 @@ def domains(
         typer.echo(f"{len(sources)} robots to learn from: {', '.join(sources)}")
         typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}")
         return
-    chosen = wide_tasks(
-        _listed(robots),
-        first=first_seed,
-        seeds=seeds,
-        faults=faults,
-        always=_listed(always),
-        throughout=throughout,
-    )
+    names = _listed(robots)
+    chosen = wide_tasks(names, first=first_seed, seeds=seeds, faults=faults, throughout=throughout)
     folder = Folder.opened(output, wide=True)
     _make(folder, folder.missing(chosen), jobs)
     typer.echo(f"{output}: {described(statistics(folder))}")

@@ -66,27 +66,20 @@ def scenario_tasks(
     robots: Sequence[str],
     scenarios: Sequence[str] = (),
     *,
-    healthy: bool = False,
     first: int = 0,
     seeds: int = 8,
 ) -> list[Task]:
-    """The runs of a data set of scenarios, seed by seed: all scenarios, or those that are named.
-
-    Scenarios that a robot does not have are left out, with ``healthy`` those with a failure, too.
-    """
+    """The runs of a data set, seed by seed: all scenarios that a robot has, or those named."""
     if not robots:
         raise DatasetError(f"no robot is named; there are {', '.join(ROBOTS)}")
     asked = {scenario_of(name).name for name in scenarios} or set(SCENARIOS)
     chosen = {}
     for robot in robots:
         family = robot_of(robot).family
-        own = [entry for entry in SCENARIOS.values() if family in entry.cases]
-        chosen[robot] = [
-            entry.name for entry in own if entry.name in asked and (entry.healthy or not healthy)
-        ]
+        own = [name for name, entry in SCENARIOS.items() if family in entry.cases]
+        chosen[robot] = [name for name in own if name in asked]
         if not chosen[robot]:
-            known = ", ".join(entry.name for entry in own)
-            raise DatasetError(f"no scenario is left for {robot!r}; it has {known}")
+            raise DatasetError(f"no scenario is left for {robot!r}; it has {', '.join(own)}")
     return [
         Task(robot, scenario, seed)
         for seed in range(first, first + seeds)
@@ -101,35 +94,25 @@ def wide_tasks(
     first: int = FIRST,
     seeds: int = 8,
     faults: int = 2,
-    always: Sequence[str] = (),
     throughout: int = 0,
 ) -> list[Task]:
     """The runs of a data set of wide domains, seed by seed."""
-    known = {robot: faults_of(robot) for robot in robots or WIDE}
-    for name in always:
-        if not any(name in own for own in known.values()):
-            raise DatasetError(f"no fault {name!r} of {', '.join(robots or ('any robot',))}")
     return [
         Task(robot, name, seed)
         for seed in range(first, first + seeds)
-        for robot in known
-        for name in (GOOD, *_faults(robot, seed, faults, always, throughout))
+        for robot in robots or WIDE
+        for name in (GOOD, *_faults(robot, seed, faults, throughout))
     ]
 
 
-def _faults(robot: str, seed: int, count: int, always: Sequence[str], throughout: int) -> list[str]:
-    """Names of the faults of a seed: some that suit its motion, those asked for, of whole runs."""
-    suited = faults_of(robot, seed)
-    names = [name for name in suited if name not in always]
+def _faults(robot: str, seed: int, count: int, throughout: int) -> list[str]:
+    """Names of the faults of a seed: some that suit its motion, and some of whole runs."""
+    names = faults_of(robot, seed)
     number = crc32(robot.encode())
     rng, other = (np.random.default_rng((seed, number, stream)) for stream in (2, 4))
     chosen = rng.choice(len(names), min(count, len(names)), replace=False)
     whole = other.choice(list(THROUGHOUT), throughout, replace=False)
-    return [
-        *(names[index] for index in sorted(chosen.tolist())),
-        *(name for name in always if name in suited),
-        *sorted(whole.tolist()),
-    ]
+    return [*(names[index] for index in sorted(chosen.tolist())), *sorted(whole.tolist())]
 
 
 @dataclass(frozen=True)
@@ -257,17 +240,11 @@ def make(folder: Folder, tasks: Sequence[Task], *, jobs: Jobs = 1) -> Iterator[T
     if groups:
         software()  # says what to install
     dead: list[Task] = []
-    while groups:
-        rest = []
-        for place, alive in as_done(
-            partial(_make, folder), groups, jobs=jobs, died=lambda _: False
-        ):
-            left = folder.missing(groups[place])
-            yield from (task for task in groups[place] if task not in left)
-            if not alive:  # the first one that is missing killed the worker
-                dead += left[:1]
-                rest.append(left[1:])
-        groups = [group for group in rest if group]
+    for place, alive in as_done(partial(_make, folder), groups, jobs=jobs, died=lambda _: False):
+        left = folder.missing(groups[place])
+        yield from (task for task in groups[place] if task not in left)
+        if not alive:  # the first one that is missing killed the worker
+            dead += left[:1]
     if dead:
         names = ", ".join(task.name for task in dead)
         raise DatasetError(f"{names}: {DIED}; the same command tries again")
