@@ -69,7 +69,7 @@ def test_a_target_robot_walks_upright_and_where_it_is_planned(robot, gait):
     rng = np.random.default_rng(np.random.SeedSequence(1).spawn(1)[0])
     way_of = planned(robot, motion, rng, 3.0)
     way = trial.motion.base_pose[::10, :2] - trial.motion.base_pose[0, :2]
-    assert np.abs(way - way_of.centre[:, :2]).max() < 0.12 * way_of.size
+    assert np.abs(way - way_of.centre[:, :2]).max() < 0.12 * way_of.units.length
 
 
 @pytest.mark.slow
@@ -86,7 +86,7 @@ def test_the_body_of_a_walk_moves_as_its_feet_push_it():
     walk = plan(gait="walk")
     zmp = np.einsum("tf,tfa->ta", walk.load, walk.places[..., :2])
     acceleration = np.gradient(np.gradient(walk.centre[:, :2], 1e-3, axis=0), 1e-3, axis=0)
-    expected = GRAVITY / walk.size * (walk.centre[:, :2] - zmp)
+    expected = GRAVITY / walk.units.length * (walk.centre[:, :2] - zmp)
     np.testing.assert_allclose(acceleration[5:-5], expected[5:-5], atol=0.05)
     np.testing.assert_allclose(walk.push[5:-5], acceleration[5:-5] / GRAVITY, atol=0.01)
 
@@ -96,7 +96,7 @@ def test_a_standing_robot_lifts_no_foot_and_moves_its_body():
     assert not still.swing.any()
     assert not np.ptp(still.places, axis=0).any()
     assert 0.02 < np.abs(still.tilt).max() <= max(TILT)
-    assert 0.01 < np.ptp(still.centre, axis=0).max() / still.size < 2 * max(SHIFT)
+    assert 0.01 < np.ptp(still.centre, axis=0).max() / still.units.length < 2 * max(SHIFT)
     np.testing.assert_array_equal(still.tilt[[0, -1]], 0)
 
 

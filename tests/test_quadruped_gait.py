@@ -88,18 +88,18 @@ def test_feet_come_down_at_the_neutral_point(timing):
     for (beat, following), place in zip(pairwise(own), places[1:-1], strict=True):
         standing = following.lift - beat.touch  # Raibert: half a stance ahead of the hip
         expected = hip[0] + speed * (beat.touch + standing / 2)
-        assert place.x == pytest.approx(expected, abs=speed * TICK)
-        assert place.y == hip[1]
+        assert place[0] == pytest.approx(expected, abs=speed * TICK)
+        assert place[1] == hip[1]
 
 
 def test_feet_turn_with_the_body(timing):
     yaw = 0.3 * TIME
     own = [beat for beat in timing if beat.group == 1]
     places = footholds(own, np.array([0.2, 0.1]), way=np.zeros((6000, 2)), yaw=yaw, stop=5.5)
-    for place in places:
-        turned = (0.2 + 0.1j) * np.exp(1j * place.yaw)
-        assert (place.x, place.y) == pytest.approx((turned.real, turned.imag))
-    assert places[-1].yaw == pytest.approx(0.3 * 5.5)
+    for x, y, direction in places:
+        turned = (0.2 + 0.1j) * np.exp(1j * direction)
+        assert (x, y) == pytest.approx((turned.real, turned.imag))
+    assert places[-1][2] == pytest.approx(0.3 * 5.5)
 
 
 @pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])

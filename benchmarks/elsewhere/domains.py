@@ -20,7 +20,7 @@ from benchmarks.elsewhere import (
 from benchmarks.elsewhere.faults import Control, Sizes
 from benchmarks.elsewhere.recorded import Recorded
 from benchmarks.elsewhere.references import Reference
-from noiseclassifier.scenarios.labels import RULE, Trace, annotate
+from noiseclassifier.scenarios.labels import RULE, annotate
 from noisemodel import Block, Run
 from noisemodel.types import Array
 
@@ -226,7 +226,7 @@ def make(domain: Domain, kind: str, seed: int, *, rate: float = 1000.0, duration
     )
     _, healthy = measure(twin.position, twin.velocity, rng=_random(domain, seed, 1))
     events = tuple(sorted(control.events + recorded.events, key=lambda event: event.start))
-    blocks, traces = annotate(recorded.velocity, twin.velocity, events, rate=rate)
+    blocks, events = annotate(recorded.velocity, twin.velocity, events, rate=rate)
     kept = visible(blocks, recorded.velocity - twin.velocity, healthy - twin.velocity, rate)
     version = metadata.version(domain.package)
     return Run(
@@ -249,7 +249,7 @@ def make(domain: Domain, kind: str, seed: int, *, rate: float = 1000.0, duration
             "domain": {"name": domain.name, "sensor": sensor, "rate": rate,
                        "motion": scene.reference.kind, **asdict(scene.settings)},
             "versions": {domain.package: version, "numpy": np.__version__},
-            "events": [record(trace, blocks, kept) for trace in traces],
+            "events": [masked(event, blocks, kept) for event in events],
             "masked": len(blocks) - len(kept),
             "labelling": asdict(RULE),
         },
@@ -268,18 +268,19 @@ def _random(domain: Domain, seed: int, stream: int) -> np.random.Generator:
     return np.random.default_rng([list(DOMAINS).index(domain.name), seed, stream])
 
 
-def record(trace: Trace, blocks: tuple[Block, ...], kept: tuple[Block, ...]) -> dict[str, Any]:
-    """The trace of an event as plain data, without what the sensor masks."""
-    start, stop = trace.event.start, trace.event.stop + RULE.tail
-    masked = sum(
+def masked(
+    event: dict[str, Any], blocks: tuple[Block, ...], kept: tuple[Block, ...]
+) -> dict[str, Any]:
+    """The record of an event, without what the sensor masks."""
+    start, stop = event["start"], event["stop"] + RULE.tail
+    lost = sum(
         block.stop - block.start
         for block in set(blocks) - set(kept)
-        if start <= block.start < stop and block.label == trace.event.label
+        if start <= block.start < stop and block.label == event["label"]
     )
-    data = trace.record()
-    return data | {
-        "masked": masked > 0,
-        "labelled": round(max(0.0, data["labelled"] - masked), 6),
+    return event | {
+        "masked": lost > 0,
+        "labelled": round(max(0.0, event["labelled"] - lost), 6),
     }
 
 

@@ -240,7 +240,7 @@ def _mixed(span: Range, share: float) -> float:
     return span[0] + share * (span[1] - span[0])
 
 
-def arm_motion(rng: Rng, wildness: float, arm: Any, *, soft: bool = False) -> Picks | Reach:
+def arm_motion(rng: Rng, wildness: float, arm: Any) -> Picks | Reach:
     """Motion of an arm."""
     picks, kind, way = rng.uniform(size=3).tolist()
     fast, hard, wide, stops, carries, pace, force = rng.uniform(size=7).tolist()
@@ -265,9 +265,7 @@ def arm_motion(rng: Rng, wildness: float, arm: Any, *, soft: bool = False) -> Pi
     )
 
 
-def humanoid_motion(
-    rng: Rng, wildness: float, robot: Simulated, *, soft: bool = False
-) -> Stroll | Stand:
+def humanoid_motion(rng: Rng, wildness: float, robot: Simulated) -> Stroll | Stand:
     """Motion of a humanoid."""
     upper = Gesture(
         way=str(rng.choice(("still", "sines", "reaches"))),
@@ -288,7 +286,7 @@ def humanoid_motion(
     return Stroll(walk=walk, stops=int(rng.integers(3)), pause=(0.8, 2.0), upper=upper)
 
 
-def quadruped_motion(rng: Rng, wildness: float, robot: Simulated, *, soft: bool = False) -> Trot:
+def quadruped_motion(rng: Rng, wildness: float, robot: Simulated) -> Trot:
     """Motion of a quadruped."""
     gaits = _TABLE["gaits"]
     gait = str(rng.choice(list(gaits), p=[each["share"] for each in gaits.values()]))
@@ -300,7 +298,7 @@ def quadruped_motion(rng: Rng, wildness: float, robot: Simulated, *, soft: bool 
     period, height, posing = draw("period"), draw("height"), draw("posing")
     moves_body = gait == "stand" or float(rng.uniform()) < 0.4 * wildness
     pauses = int(rng.binomial(2, 0.4 * wildness)) if gait != "stand" else 0
-    drawn = Trot(
+    return Trot(
         gait=gait,
         way=str(rng.choice(WAYS)),
         period=(period, period),
@@ -311,7 +309,6 @@ def quadruped_motion(rng: Rng, wildness: float, robot: Simulated, *, soft: bool 
         pauses=pauses,
         duration=5.0 + 1.5 * pauses,
     )
-    return steady(drawn) if soft else drawn
 
 
 def steady(motion: Trot) -> Trot:

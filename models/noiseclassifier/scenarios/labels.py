@@ -70,26 +70,6 @@ class Rule:
 RULE = Rule()  # the rule that all simulated runs are labelled by
 
 
-@dataclass(frozen=True)
-class Trace:
-    """The effect of an event on the motion."""
-
-    event: Event
-    labelled: float  # time with its label, in [s]
-    peak: float  # its highest level, in [rad/s]
-    acceleration: float  # fastest change of a joint's deviation, in [rad/s²]
-    background: float  # highest level of its background, in [rad/s]
-
-    def record(self) -> dict[str, Any]:
-        """The trace as plain data."""
-        return asdict(self.event) | {
-            "labelled": round(self.labelled, 6),
-            "peak": round(self.peak, 6),
-            "acceleration": round(self.acceleration, 3),
-            "background": round(self.background, 6),
-        }
-
-
 def deviation(
     velocity: Array, twin: Array, *, rate: float, band: tuple[float, float] | None = None
 ) -> Array:
@@ -105,12 +85,16 @@ def deviation(
 
 def annotate(
     velocity: Array, twin: Array, events: Sequence[Event], *, rate: float
-) -> tuple[tuple[Block, ...], tuple[Trace, ...]]:
-    """Labels of a run by its velocities and those of its twin, and the effect of each event."""
+) -> tuple[tuple[Block, ...], list[dict[str, Any]]]:
+    """Labels of a run by its velocities and those of its twin, and the events with their effects.
+
+    An effect is the time with the event's label, in [s], the highest levels of the event and of its
+    background, in [rad/s], and the fastest change of a joint's deviation, in [rad/s²].
+    """
     events = _independent(events)
     fast = deviation(velocity, twin, rate=rate)
     broadband = _level(fast, rate)
-    samples, blocks, traces = len(fast), [], []
+    samples, blocks, records = len(fast), [], []
     busy, acting = np.zeros((2, samples), dtype=bool)
     for first, end in _spans(broadband > RULE.felt, round(RULE.gap * rate)):
         busy[first:end] = True
@@ -139,9 +123,13 @@ def annotate(
         for a, b in [*own, (first, round(event.stop * rate))]:
             busy[a:b] = True
         acting[until:end] = True
-        labelled = sum(b - a for a, b in own) / rate
-        peak, fastest = float(level[first:end].max(initial=0.0)), float(change.max(initial=0.0))
-        traces.append(Trace(event, labelled, peak, fastest, background))
+        effect = {
+            "labelled": round(sum(b - a for a, b in own) / rate, 6),
+            "peak": round(float(level[first:end].max(initial=0.0)), 6),
+            "acceleration": round(float(change.max(initial=0.0)), 3),
+            "background": round(background, 6),
+        }
+        records.append(asdict(event) | effect)
     margin = 2 * round(RULE.margin * rate) + 1
     near = uniform_filter1d(busy.astype(float), margin, mode="constant") > 0.5 / margin
     blocks += [
@@ -149,7 +137,7 @@ def annotate(
         for a, b in _spans(~near, 0)
         if b - a >= RULE.shortest * rate
     ]
-    return tuple(sorted(blocks)), tuple(traces)
+    return tuple(sorted(blocks)), records
 
 
 def _louder(velocity: Array, twin: Array, rate: float) -> Mask:

@@ -4,8 +4,8 @@ Forces from outside are weights, obstacles in the air, end stops and hands.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, Self
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -261,16 +261,6 @@ class Recording:
     base_pose: Array  # place and quaternion (w, x, y, z), shape (samples, 7)
     base_velocity: Array  # linear in the world's axes, angular in its own, shape (samples, 6)
 
-    @classmethod
-    def empty(cls, samples: int, joints: int, effectors: int, *, floating: bool) -> Self:
-        """Zeros for a recording."""
-        base = [7, 6] if floating else [0, 0]
-        return cls(*(np.zeros((samples, width)) for width in [*[joints] * 7, effectors, *base]))
-
-    def since(self, sample: int) -> "Recording":
-        """The signals from a sample on."""
-        return Recording(*(getattr(self, field.name)[sample:] for field in fields(self)))
-
 
 def _between(before: Reference, after: Reference) -> tuple[Array, Array, Array]:
     """Positions, velocities, and velocities of the plan, at the samples between two ticks."""
@@ -297,7 +287,8 @@ def record(
     data.qpos[:] = scene.start
     samples, joints = encoder_error.shape
     base = model.nq - joints
-    motion = Recording.empty(samples, joints, scene.effectors, floating=base > 0)
+    widths = [*[joints] * 7, scene.effectors, *([7, 6] if base else [0, 0])]
+    motion = Recording(*(np.zeros((samples, width)) for width in widths))
     joint_position, joint_velocity = data.qpos[-joints:], data.qvel[-joints:]
     base_pose, base_velocity = data.qpos[:base], data.qvel[:-joints]
     effector_force, sensed = data.sensordata[: scene.effectors], data.sensordata
@@ -337,4 +328,5 @@ def record(
             raise SimulationError(time, f"a joint moved at {fastest:.3g} rad/s")
         if scene.fallen(sensors):
             raise SimulationError(time, "it fell")
-    return motion.since(scene.settling * STEPS)
+    start = scene.settling * STEPS
+    return Recording(*(signal[start:] for signal in vars(motion).values()))

@@ -1,12 +1,10 @@
 """A quadruped: gaits, steps, paths and poses; estimate, foot placement, controller and scene."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import pairwise
 from math import asin, atan2, cos, sin
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +17,6 @@ from noiseclassifier.scenarios.motions import (
     Contact,
     Plan,
     Rng,
-    Tip,
     Trot,
     Units,
     minimum_jerk,
@@ -57,14 +54,12 @@ class Gait:
 
 TROT = Gait((0, 1, 1, 0), 0.62, level=True)  # diagonal pairs
 STAND = "stand"  # name of the gait without steps
-GAITS: Mapping[str, Gait] = MappingProxyType(
-    {
-        "trot": TROT,
-        "walk": Gait((1, 3, 0, 2), 0.8, period=1.8),
-        "pace": Gait((0, 1, 0, 1), 0.62, period=0.9),
-        STAND: TROT,  # without a step
-    }
-)
+GAITS = {
+    "trot": TROT,
+    "walk": Gait((1, 3, 0, 2), 0.8, period=1.8),
+    "pace": Gait((0, 1, 0, 1), 0.62, period=0.9),
+    STAND: TROT,  # without a step
+}
 """By name: "walk" is the lateral sequence, one foot at a time: rear left, front left, rear right,
 front right; a "pace" is by sides."""
 
@@ -124,19 +119,13 @@ def swings(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
     return groups[:, gait.groups]
 
 
+Foothold: TypeAlias = tuple[float, float, float]
+"""X and y of a foot, in [m], and the direction of the body, in [rad]."""
 TOP = 0.4  # share of a swing after which the foot is highest
 ACROSS = 0.8  # share of a swing after which the foot is over its next foothold
 NEAR = 0.8  # share of a swing after which a contact is planned
 LANDING = 0.1
 """Speed at which a foot is to touch the ground, in heights of its swing per time of its descent."""
-
-
-class Foothold(NamedTuple):
-    """Place of a foot, in [m], and the direction of the body, in [rad]."""
-
-    x: float
-    y: float
-    yaw: float
 
 
 def progress_of(share: Array) -> Array:
@@ -156,7 +145,7 @@ def height_of(share: Array) -> Array:
 def footholds(
     beats: Sequence[Beat], hip: Array, *, way: Array, yaw: Array, stop: float
 ) -> list[Foothold]:
-    """Footholds under the hip in the middle of each stance (Raibert 1986, neutral point)."""
+    """Under the hip in the middle of each stance (Raibert 1986, neutral point)."""
     ends = [*(beat.lift for beat in beats), np.inf][1:]
     middles = [(beat.touch + end) / 2 for beat, end in zip(beats, ends, strict=True)]
     ticks = [0, *(round(min(stop, middle) / TICK) for middle in middles)]
@@ -164,7 +153,7 @@ def footholds(
     for (x, y), turn in zip(way[ticks].tolist(), yaw[ticks].tolist(), strict=True):
         cosine, sine = np.cos(turn), np.sin(turn)
         hip_x = float(x + cosine * hip[0] - sine * hip[1])
-        out.append(Foothold(hip_x, float(y + sine * hip[0] + cosine * hip[1]), turn))
+        out.append((hip_x, float(y + sine * hip[0] + cosine * hip[1]), turn))
     return out
 
 
@@ -185,8 +174,8 @@ def contacts_of(foot: int, beats: Sequence[Beat], places: Sequence[Foothold]) ->
         return [beat.lift + share * (beat.touch - beat.lift) for beat in beats]
 
     return [
-        Contact(start, lift, stop, (place.x, place.y, 0.0), foot, place.yaw, approach)
-        for start, lift, stop, approach, place in zip(
+        Contact(start, lift, stop, (x, y, 0.0), foot, yaw, approach)
+        for start, lift, stop, approach, (x, y, yaw) in zip(
             [-1.0, *during(NEAR)],
             [*during(0.0), np.inf],
             [*during(TOP), np.inf],
@@ -280,13 +269,9 @@ class Standing:
 
 def stand(robot: Quadruped) -> Standing:
     """Standing posture with the joints near their rest positions."""
-    return _stand(robot.name, robot.rest, robot.effectors, reduced_model(robot))
-
-
-@lru_cache(maxsize=8)
-def _stand(name: str, rest: tuple[float, ...], feet: tuple[Tip, ...], model: Any) -> Standing:
+    model, feet = reduced_model(robot), robot.effectors
     configuration = pin.neutral(model)
-    configuration[7:] = rest
+    configuration[7:] = robot.rest
     data = model.createData()
     pin.framesForwardKinematics(model, data, configuration)
     places = np.array([data.oMf[model.getFrameId(foot.frame)].translation for foot in feet])
@@ -316,8 +301,6 @@ class GaitPlan(Plan):
     swing: Mask  # whether each foot is in the air, shape (ticks, feet)
     progress: Array  # completed share of the path of each foot; 1 in stance, shape (ticks, feet)
     load: Array  # planned share of the weight on each foot, shape (ticks, feet)
-    size: float  # height of the centre of mass, in [m]
-    weight: float  # in [N]
 
 
 def plan(robot: Quadruped, motion: Trot, rng: Rng, duration: float) -> GaitPlan:
@@ -375,8 +358,6 @@ def plan(robot: Quadruped, motion: Trot, rng: Rng, duration: float) -> GaitPlan:
         torques=robot.drives.torque,
         ground=(Box(centre=(0.0, 0.0, -0.5), half=(20.0, 20.0, 0.5)),),
         units=Units(length=size, force=weight, torque=size * weight),
-        size=size,
-        weight=weight,
     )
 
 
@@ -450,12 +431,6 @@ class StateEstimate:
         self.slip += self._slip_share * (slip - self.slip)
         self.force += self._force_share * (sensors[: len(self.force)] - self.force)
 
-    def fallen(self, sensors: Array, height: float) -> bool:
-        """Whether the robot is too low for its height, or too much tilted."""
-        _, x, y, _ = sensors[self._where["base.turn"]].tolist()
-        low = float(sensors[self._where["centre.place"]][2]) < LOWEST * height
-        return low or 1 - 2 * (x * x + y * y) < cos(STEEPEST)
-
 
 BALANCE = 0.7  # gain of the foot placement on the offset of the capture point
 FURTHEST = 0.3
@@ -477,9 +452,9 @@ class Feet:
         self._plan, self._lever = plan, standing.feet
         self._lean = 1 + robot.attitude_gain  # from the commanded tilt to the measured one
         self._gain = robot.force_gain * gain
-        self._load = plan.weight * plan.load
+        self._load = plan.units.force * plan.load
         # A body at velocity v stops over a foot that stands v sqrt(h/g) ahead: the capture point.
-        self._balance = BALANCE * np.sqrt(plan.size / GRAVITY)
+        self._balance = BALANCE * np.sqrt(plan.units.length / GRAVITY)
         self._left, self._right = np.zeros((feet, 2)), np.zeros((feet, 2))
         self._rise, self._speed = np.zeros(feet), np.zeros(feet)
         self._early = np.zeros(feet, dtype=bool)
@@ -497,11 +472,11 @@ class Feet:
         swing, progress = plan.swing[number], plan.progress[number]
         begins = swing & ~plan.swing[number - 1]
         self._left[begins] = self._right[begins]
-        furthest = FURTHEST * plan.size
+        furthest = FURTHEST * plan.units.length
         balance = np.minimum(np.maximum(self._balance * estimate.slip, -furthest), furthest)
         lever = plan.places[number, :, :2] - plan.centre[number, :2]
         turned = estimate.yaw_correction * lever[:, ::-1] * (-1.0, 1.0)  # of a small angle
-        upright = self._lean * plan.size * np.array((estimate.pitch, -estimate.roll))
+        upright = self._lean * plan.units.length * np.array((estimate.pitch, -estimate.roll))
         adjustable = swing & (progress < FIXED)
         target = estimate.position_correction + balance + turned + upright
         self._right[adjustable] = target[adjustable]
@@ -514,7 +489,9 @@ class Feet:
         planned force, as does a foot from an early touch-down on.
         """
         plan, swing = self._plan, self._plan.swing[number]
-        in_contact = (plan.progress[number] > DESCENDING) & (estimate.force > CONTACT * plan.weight)
+        in_contact = (plan.progress[number] > DESCENDING) & (
+            estimate.force > CONTACT * plan.units.force
+        )
         self._early = swing & (self._early | in_contact)
         tilt = estimate.pitch * self._lever[:, 0] - estimate.roll * self._lever[:, 1]
         levelling = LEVELLING * (self._lean * tilt - self._rise)
@@ -523,7 +500,7 @@ class Feet:
         self._speed += TICK / (SMOOTHING + TICK) * (desired - self._speed)
         rise = self._rise + TICK * self._speed
         rise += self._early * (plan.places[number - 1, :, 2] - plan.places[number, :, 2])
-        highest = HIGHEST * plan.size
+        highest = HIGHEST * plan.units.length
         self._rise = np.minimum(np.maximum(rise, -highest), highest)
         return self._rise
 
@@ -549,7 +526,7 @@ class TrotControl:
         self._model.armature = np.array([*[0.0] * 6, *robot.drives.armature])
         self._data = self._model.createData()
         self._body = WholeBody(model, robot.effectors, standing.configuration)
-        self._estimate = StateEstimate(robot, sensors)
+        self._where, self._estimate = sensors, StateEstimate(robot, sensors)
         self._feet = Feet(robot, standing, plan, gain)
         self._plan, self._rates = plan, _rates(plan)
         self._lean = robot.attitude_gain
@@ -575,7 +552,10 @@ class TrotControl:
 
     def fallen(self, sensors: Array) -> bool:
         """Whether the robot is too low or too much tilted."""
-        return self._estimate.fallen(sensors, self._plan.size)
+        _, x, y, _ = sensors[self._where["base.turn"]].tolist()
+        height = float(sensors[self._where["centre.place"]][2])
+        low = height < LOWEST * self._plan.units.length
+        return low or 1 - 2 * (x * x + y * y) < cos(STEEPEST)
 
     def _configuration(self, number: int, sensors: Array) -> Array:
         """Configuration by plan and feedback."""
@@ -599,7 +579,7 @@ class TrotControl:
         acceleration = (velocity - self._velocity) / TICK
         acceleration = np.minimum(np.maximum(acceleration, -highest), highest)
         torque = pin.rnea(self._model, self._data, configuration, velocity, acceleration)
-        load = self._plan.weight * self._plan.load[number]
+        load = self._plan.units.force * self._plan.load[number]
         push = np.outer(load, self._plan.push[number]).ravel()
         return np.asarray((torque - load @ self._body.heights - push @ self._body.planes)[6:])
 

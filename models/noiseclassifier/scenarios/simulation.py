@@ -11,7 +11,7 @@ from zlib import crc32
 import numpy as np
 
 from noiseclassifier.scenarios import faults
-from noiseclassifier.scenarios.domains import LIMITS, MOTIONS, Domain
+from noiseclassifier.scenarios.domains import LIMITS, MOTIONS, Domain, steady
 from noiseclassifier.scenarios.drives import LOAD_SHARE, DomainDrives, Drives
 from noiseclassifier.scenarios.faults import Defect, Faults, Imperfections, no_defect
 from noiseclassifier.scenarios.labels import RULE, annotate, unplanned
@@ -250,7 +250,7 @@ def simulate(
     events = (*trial.events, *trial.contacts)
     if wide:  # soft legs scuff
         events = () if trial is twin else (*trial.events, *_further(trial, twin))
-    blocks, traces = annotate(trial.motion.velocity, twin.motion.velocity, events, rate=RATE)
+    blocks, records = annotate(trial.motion.velocity, twin.motion.velocity, events, rate=RATE)
     meta = {
         "source": "simulation",
         "scenario": name,
@@ -258,7 +258,7 @@ def simulate(
         "duration": float(duration),
         "versions": versions,
         "defect": dict(trial.faults.facts),
-        "events": [trace.record() for trace in traces],
+        "events": records,
         "labelling": asdict(RULE),
         **_facts(start, name, trial),
     }
@@ -417,8 +417,9 @@ def _setup(start: Start) -> Setup:
     seeds = np.random.SeedSequence((start.seed, crc32(nominal.name.encode()))).spawn(7)
     domains, motions, planned, body, gears, sensors, faulty = map(np.random.default_rng, seeds)
     robot, domain = _changed(nominal, Domain.draw(domains, LIMITS[nominal.family]))
-    soft = domain.stiffness < SOFT or domain.policy_rate > 0
-    motion = MOTIONS[nominal.family](motions, domain.wildness, nominal, soft=soft)
+    motion = MOTIONS[nominal.family](motions, domain.wildness, nominal)
+    if isinstance(motion, Trot) and (domain.stiffness < SOFT or domain.policy_rate > 0):
+        motion = steady(motion)
     scaled = robot.scaled(domain.length)
     return Setup(scaled, motion, domain, planned, body, sensors, faulty, gears)
 
@@ -531,18 +532,12 @@ def _whole(motion: "Recording", simulated: Simulated, **facts: Any) -> Run:
 
 def kept(motion: "Recording", rate: float, **facts: Any) -> Run:
     """What is kept of a recording: positions, velocities, torques, single precision, at a rate."""
+    names = ("velocity", "velocity_desired", "planned", "position", "position_desired")
+    signals = {name: _single(getattr(motion, name)) for name in names}
+    signals["effort"] = _single(motion.torque)
     # As stages, since only velocities and stages are decimated.
-    stages = {name: getattr(motion, name) for name in ("planned", "position", "position_desired")}
-    run = Run(
-        time=times(len(motion.velocity), STEP),
-        velocity=_single(motion.velocity),
-        velocity_desired=_single(motion.velocity_desired),
-        stages={
-            name: _single(signal) for name, signal in {**stages, "effort": motion.torque}.items()
-        },
-        **facts,
-    )
-    run = decimated(run, rate)
-    signals = {**run.stages, "velocity": run.velocity, "velocity_desired": run.velocity_desired}
-    single = {name: _single(signal) for name, signal in signals.items()}
-    return replace(run, stages={"planned": single.pop("planned")}, **single)
+    time, velocity = times(len(motion.velocity), STEP), signals.pop("velocity")
+    run = decimated(Run(time=time, velocity=velocity, stages=signals, **facts), rate)
+    single = {name: _single(signal) for name, signal in run.stages.items()}
+    planned = {"planned": single.pop("planned")}
+    return replace(run, velocity=_single(run.velocity), stages=planned, **single)

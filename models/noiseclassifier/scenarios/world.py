@@ -1,7 +1,6 @@
 """MuJoCo models made from Pinocchio models, and inverse kinematics of whole robots."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 import mujoco
@@ -21,29 +20,14 @@ GRAVITY = 9.81  # in [m/s²]
 
 def reduced_model(robot: Simulated) -> Any:
     """Pinocchio model of a robot, with all joints but its drives locked."""
-    held = tuple(sorted(robot.held.items()))
-    return _reduced(robot.name, robot.drives.joints, held, robot.length_scale)
-
-
-def configuration(model: Any, joints: Array) -> Array:
-    """Pinocchio's configuration of a robot with a fixed base."""
-    if model.nq == model.nv:
-        return joints
-    return np.asarray(pin.integrate(model, pin.neutral(model), joints))
-
-
-@lru_cache(maxsize=8)
-def _reduced(
-    name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], ...], scale: float
-) -> Any:
-    model = Robot.load(name).model
+    model = Robot.load(robot.name).model
     posture = pin.neutral(model)
-    for joint, position in held:
+    for joint, position in robot.held.items():
         posture[model.joints[model.getJointId(joint)].idx_q] = position
     fixed = [
         model.getJointId(joint)
         for joint in model.names[1:]
-        if joint not in moved and model.joints[model.getJointId(joint)].nv == 1
+        if joint not in robot.drives.joints and model.joints[model.getJointId(joint)].nv == 1
     ]
     # Pinocchio refuses two frames of one name, as in anymal_c, and a joint and a body of one name.
     try:
@@ -52,7 +36,14 @@ def _reduced(
         if fixed:
             raise
         reduced = model
-    return reduced if scale == 1.0 else _scaled(reduced, scale)
+    return reduced if robot.length_scale == 1.0 else _scaled(reduced, robot.length_scale)
+
+
+def configuration(model: Any, joints: Array) -> Array:
+    """Pinocchio's configuration of a robot with a fixed base."""
+    if model.nq == model.nv:
+        return joints
+    return np.asarray(pin.integrate(model, pin.neutral(model), joints))
 
 
 def _scaled(model: Any, scale: float) -> Any:
