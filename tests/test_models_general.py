@@ -242,7 +242,7 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
         ({"leaves": 8}, "array 'feature' has shape"),
         ({"highest": 1000.0}, "array 'known' has shape"),
         ({"estimator": "svm"}, "a recipe for any rate has trees and a reference"),
-        ({"reference": False}, "expected 'log' and one of both"),
+        ({"reference": False}, "joint by joint takes 'log' and one of both"),
     ],
 )
 def test_a_wrong_recipe_is_refused(path, changes, reason):

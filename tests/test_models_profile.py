@@ -181,8 +181,14 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
         ({"classes": "ok"}, "classes is 'ok', expected a tuple of str"),
         ({"bands": "log"}, r"edges are \(\), expected two or more, ascending"),
         ({"bands": "log", "edges": (10.0, float("nan"))}, r"edges are \(10.0, nan\), expected two"),
-        ({"bands": "log", "edges": (10.0, 6000.0)}, "to 6000 Hz, expected 0 to half the rate"),
-        ({"bands": "log", "edges": (-1.0, 100.0)}, "from -1 to 100 Hz, expected 0 to half the"),
+        (
+            {"bands": "log", "edges": (10.0, 6000.0)},
+            r"\(10.0, 6000.0\), expected two or more, ascending, from 0 to half the rate, 5000 Hz",
+        ),
+        (
+            {"bands": "log", "edges": (-1.0, 100.0)},
+            r"edges are \(-1.0, 100.0\), expected two or more, asc",
+        ),
         (
             {"bands": "log", "edges": (9.0, 9.0)},
             r"edges are \(9.0, 9.0\), expected two or more, asc",
@@ -204,8 +210,11 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
             "window of 5000 samples is longer than a frame of 4000",
         ),
         ({"quick_window": -1}, "quick_window is -1, expected 0 or more"),
-        ({"signals": ()}, "signals are none, expected one or more, each once"),
-        ({"signals": ("noise", "noise")}, "signals are noise, noise, expected one or more, each"),
+        (
+            {"signals": ()},
+            "none, expected norms, and after them those that go joint by joint, each once$",
+        ),
+        ({"signals": ("noise", "noise")}, "signals are noise, noise, expected norms, and after"),
         (
             {"signals": ("measured_joints",), **LOG},
             "are measured_joints, expected norms, and after them those that go joint by joint",
@@ -216,22 +225,28 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
         ),
         (
             {"signals": ("measured", "measured_joints"), **LOG, "reference": False},
-            "with bands 'log', relative False and reference False, expected 'log' and one of both",
+            "with bands 'log', relative False and reference False: joint by joint takes 'log' a",
         ),
         (
             {"signals": ("measured", "measured_joints"), "relative": True},
-            "with bands 'adjacent', relative True and reference False, expected 'log' and one of",
+            "measured_joints with bands 'adjacent', relative True and reference False: joint by",
         ),
         (
             {"signals": ("measured", "effort_joints", "measured_joints"), **LOG},
-            "with reference True, expected effort_joints last, and True",
+            "and reference True: .* and one of both, effort_joints at the end a reference",
         ),
         (
             {"signals": ("measured", "effort_joints"), **LOG, "reference": False, "relative": True},
-            "with reference False, expected effort_joints last, and True",
+            "relative True and reference False: .*, effort_joints at the end a reference",
         ),
-        ({"reference": True}, "reference is True with bands 'adjacent' and relative False"),
-        ({**LOG, "relative": True}, "reference is True with bands 'log' and relative True, expec"),
+        (
+            {"reference": True},
+            "noise with bands 'adjacent', relative False and reference True: .* relative False$",
+        ),
+        (
+            {**LOG, "relative": True},
+            "with bands 'log', relative True and reference True: .* a reference 'log' and relative",
+        ),
         ({"classes": ("ok",)}, "classes are ok, expected 'ok' and others, each once"),
         ({**LOG, **QUICK, "quick_stride": 0}, "with quick_stride 0 and bands 'log', expected a st"),
         ({**QUICK}, "quick_window is 200 with quick_stride 9 and bands 'adjacent', expected a str"),

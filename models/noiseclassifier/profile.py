@@ -281,24 +281,17 @@ def _rules(profile: Profile) -> Iterator[tuple[bool, str]]:
 def _rules_of_signals(profile: Profile) -> Iterator[tuple[bool, str]]:
     names, norms, log = profile.signals, profile.norms, profile.bands == "log"
     signals = f"signals are {', '.join(names) or 'none'}"
-    yield 0 < len(names) == len(set(names)), f"{signals}, expected one or more, each once"
     yield (
-        norms > 0 and not any(map(by_joint, names[:norms])),
-        f"{signals}, expected norms, and after them those that go joint by joint",
+        norms > 0 and len(names) == len(set(names)) and not any(map(by_joint, names[:norms])),
+        f"{signals}, expected norms, and after them those that go joint by joint, each once",
     )
     yield (
-        norms == len(names) or (log and profile.differences),
-        f"{signals}, with bands {profile.bands!r}, relative {profile.relative} and reference"
-        f" {profile.reference}, expected 'log' and one of both for those that go joint by joint",
-    )
-    yield (
-        EFFORT not in names or (names[-1] == EFFORT and profile.reference),
-        f"{signals} with reference {profile.reference}, expected {EFFORT} last, and True",
-    )
-    yield (
-        not profile.reference or (log and not profile.relative),
-        f"reference is True with bands {profile.bands!r} and relative {profile.relative},"
-        " expected 'log' and False",
+        (norms == len(names) or (log and profile.differences))
+        and (EFFORT not in names or (names[-1] == EFFORT and profile.reference))
+        and (not profile.reference or (log and not profile.relative)),
+        f"{signals} with bands {profile.bands!r}, relative {profile.relative} and reference"
+        f" {profile.reference}: joint by joint takes 'log' and one of both, {EFFORT} at the end a"
+        " reference, and a reference 'log' and relative False",
     )
     classes = profile.classes
     yield (
@@ -311,13 +304,10 @@ def _rules_of_signals(profile: Profile) -> Iterator[tuple[bool, str]]:
         " (256, 1024, 4096)",
     )
     for edges in (each.edges for each in profile.resolutions * log):
+        ascending = len(edges) > 1 and all(low < high for low, high in pairwise(edges))
         yield (
-            len(edges) > 1 and all(low < high for low, high in pairwise(edges)),
-            f"edges are {edges}, expected two or more, ascending",
-        )
-        yield (
-            edges[0] >= 0 and edges[-1] <= profile.rate / 2,
-            f"edges reach from {edges[0]:g} to {edges[-1]:g} Hz, expected 0 to half the rate,"
+            ascending and edges[0] >= 0 and edges[-1] <= profile.rate / 2,
+            f"edges are {edges}, expected two or more, ascending, from 0 to half the rate,"
             f" {profile.rate / 2:g} Hz",
         )
 
