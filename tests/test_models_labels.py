@@ -1,15 +1,14 @@
 """A finding takes two frames of evidence; failure frames beside them belong to it."""
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from noiseclassifier import UNKNOWN, Event, Labels
-from noiseclassifier.labels import confirmed
 
 CLASSES = ("ok", "impact", "oscillations")
 HOP, LENGTH = 0.1, 0.4
@@ -104,28 +103,21 @@ def test_raw_labels_are_failures_above_the_threshold_only():
     ]  # fmt: skip
 
 
-def test_confirmed_frames_are_failure_frames_and_fewer_if_more_evidence_is_required():
+def test_stretches_with_two_frames_of_evidence_are_flagged_and_lone_frames_count_twice():
     generator = np.random.default_rng(3)
-    for _ in range(50):
-        failing, apart = generator.random(40) < 0.6, generator.random(39) < 0.1
-        above_threshold = failing & (generator.random(40) < 0.4)
-        kept = [confirmed(failing, above_threshold, apart, least=least) for least in (0, 1, 2, 3)]
-        assert (kept[0] == failing).all()
-        assert all((more >= less).all() for more, less in pairwise(kept))
-        assert (kept[1] >= above_threshold).all()
-
-
-def test_a_frame_without_neighbours_counts_for_two_and_one_with_them_for_one():
-    alone, beside = np.ones(1, dtype=bool), np.array([False, True, False])
-    for suspect, most in ((alone, 2), (beside, 1)):
-        apart = np.zeros(len(suspect) - 1, dtype=bool)
-        assert (confirmed(suspect, suspect, apart, least=most) == suspect).all()
-        assert not confirmed(suspect, suspect, apart, least=most + 1).any()
-
-
-def test_no_frames_are_confirmed_of_none():
-    none = np.zeros(0, dtype=bool)
-    assert confirmed(none, none, none).shape == (0,)
+    for size in [0, 1, 2, 3] * 5 + [40] * 50:
+        text = "".join(generator.choice(list(".iIuoO"), size))
+        apart = generator.random(max(size - 1, 0)) < 0.1
+        start = np.cumsum(np.append(0.0, np.where(apart, 1.0, HOP)))[:size]
+        expected = []
+        for part in np.split(np.arange(size), np.flatnonzero(apart) + 1):
+            for suspect, frames in groupby(part.tolist(), key=lambda frame: text[frame] != "."):
+                stretch = list(frames)
+                evidence = [frame for frame in stretch if text[frame] not in "io"]
+                weight = sum(2 if frame in (part[0], part[-1]) else 1 for frame in evidence)
+                expected += [suspect and weight >= 2] * len(stretch)
+        found = replace(labels(text), start=start, stop=start + LENGTH)
+        assert found.flagged.tolist() == expected
 
 
 @pytest.mark.parametrize(
@@ -178,6 +170,7 @@ def test_no_frame_out_of_distribution_is_ever_ok(text):
     assert not (found.debounced[found.label == UNKNOWN] == "ok").any()
 
 
+@settings(deadline=None)
 @given(LETTERS, st.data())
 def test_a_frame_that_becomes_louder_never_removes_a_finding(text, data):
     """Louder: `ok` becomes failure or unknown, a failure exceeds the threshold, for good."""

@@ -83,7 +83,11 @@ class Labels:
             suspect = suspect & ~unknown
         if self.above_threshold is None:
             return suspect
-        return confirmed(suspect, self.above_threshold | (suspect & unknown), self.apart)
+        begins, weight = sides(suspect, self.apart)
+        stretch = np.cumsum(begins)
+        evidence = suspect & (self.above_threshold | unknown)
+        total = np.bincount(stretch[evidence], weight[evidence], minlength=len(suspect) + 1)
+        return np.asarray(suspect & (total[stretch] >= CONFIRM))
 
     @property
     def apart(self) -> Mask:
@@ -179,15 +183,6 @@ def interval(start: float, stop: float) -> str:
     """Write two times in [s]: to a hundredth, or to a thousandth if they are less apart."""
     digits = 2 if stop - start >= 0.01 else 3
     return f"{start:.{digits}f} s to {stop:.{digits}f} s"
-
-
-def confirmed(suspect: Mask, evidence: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:
-    """Keep the suspect frames of those stretches that hold enough frames of evidence."""
-    begins, weight = sides(suspect, apart)
-    stretch = np.cumsum(begins)
-    own = suspect & evidence
-    enough = np.bincount(stretch[own], weight[own], minlength=len(suspect) + 1) >= least
-    return np.asarray(suspect & enough[stretch])
 
 
 def sides(suspect: Mask, apart: Mask) -> tuple[Mask, Index]:
