@@ -135,13 +135,12 @@ def robot_of(name: str) -> str:
     return sample[1] if sample else ""
 
 
-def held_out(group: str, share: float = SHARE) -> bool:
+def held_out(group: str) -> bool:
     """Whether a group belongs to the fixed test set, whatever other groups there are.
 
-    The first 8 bytes of the SHA-256 of the group's name (UTF-8), read as a fraction of 2^64, lie
-    below the share. A group that is held out at one share is held out at all larger ones.
+    The first 8 bytes of the SHA-256 of its name (UTF-8), as a fraction of 2^64, lie below `SHARE`.
     """
-    return int.from_bytes(_digest(group)[:8], "big") / 2.0**64 < share
+    return int.from_bytes(_digest(group)[:8], "big") / 2.0**64 < SHARE
 
 
 def folds(groups: Sequence[str], count: int) -> list[tuple[Index, Index]]:
@@ -202,11 +201,7 @@ def seen(train: Mapping[str, str], test: Mapping[str, str]) -> dict[str, str]:
 def check_apart(
     train: Mapping[str, str], test: Mapping[str, str], advice: str = "measure it on other runs"
 ) -> None:
-    """Refuse to test a model on its training set: a check against overlapping frames.
-
-    Args:
-        train, test: SHA-256 of each recording, by name.
-        advice: What to do about it.
+    """Refuse to test a model on its training set, both given as SHA-256 of recordings by name.
 
     Raises:
         DatasetError: If a recording, its content, or its group is on both sides.
