@@ -32,8 +32,8 @@ WIDTHS = (38, 26, 26, 12, 12)
 """Of the columns of the summary: names, figures with intervals, plain numbers."""
 SHOWN = 5
 """Most lines of a list; the JSON has all."""
-LONGEST = 32
-"""Characters of a name in a table at most."""
+WIDTH = 32
+"""Of the names in a table by robot, domain or scenario; longer ones push their row."""
 ROWS = (
     ("False alarms per hour of ok time", "false_alarms_per_hour", "false_alarms"),
     ("Ok time flagged", "ok_flagged", ""),
@@ -213,7 +213,7 @@ def measure(
 
 
 def table(assessment: Assessment, by: str = "") -> str:
-    """Table of an assessment, as text, in lines of up to 140 characters.
+    """Table of an assessment, as text.
 
     Args:
         by: ``robot``, ``domain`` or ``scenario``: the one table of parts to print.
@@ -296,12 +296,12 @@ def _parts(key: str, parts: Mapping[str, Part]) -> list[str]:
     for name, part in parts.items():
         runs = f"{part.counts['runs']:.0f}" + (f"+{part.unanswered}" if part.unanswered else "")
         figures = [_figure(measure, part.measures[measure]) for measure in COLUMNS.values()]
-        rows.append((_short(name), [runs, f"{part.counts['ok_hours']:.3g}", *figures]))
+        rows.append((name, [runs, f"{part.counts['ok_hours']:.3g}", *figures]))
     lines = []
     for name, cells in rows:
         pairs = zip(cells, titles, strict=True)
         columns = [cell.rjust(max(len(title), 7) + 2) for cell, title in pairs]
-        lines.append(name.ljust(LONGEST) + "".join(columns))
+        lines.append(f"{name}  ".ljust(WIDTH) + "".join(columns))
     if any(part.unanswered for part in parts.values()):
         lines.append("(+n: runs without a verdict)")
     return lines
@@ -340,12 +340,6 @@ def _ranged(measure: str, estimate: Estimate) -> str:
     """A figure and its bounds as text: ``97.9% [96.1, 98.8]``."""
     value, low, high = (_figure(measure, each) for each in vars(estimate).values())
     return value if low == "-" else f"{value} [{low}, {high}]".replace("%,", ",").replace("%]", "]")
-
-
-def _short(name: str) -> str:
-    """A name that fits its column: its middle is left out if it is long."""
-    half = (LONGEST - 3) // 2
-    return name if len(name) <= LONGEST - 2 else f"{name[:half]}…{name[-half:]}"
 
 
 def _named(names: Iterable[str], what: str) -> str:
