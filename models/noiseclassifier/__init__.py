@@ -104,8 +104,3 @@ __all__ = [
     "nominal_rate",
     "read_log",
 ]
-
-
-def __dir__() -> list[str]:
-    """The public names."""
-    return [*__all__]

@@ -57,17 +57,14 @@ class SupportVectorMachines:
         vectors, coefficients, intercept = train(features, targets, profile)
         if profile.kernel == "linear":
             vectors, coefficients = coefficients @ vectors, np.eye(len(intercept))
-        return cls(
-            vectors, coefficients, intercept, profile.kernel, profile.gamma, profile.multiclass
-        )
+        arrays = {"vectors": vectors, "coefficients": coefficients, "intercept": intercept}
+        return cls.of(arrays, profile)
 
     @classmethod
     def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
         """SVMs from the arrays of a model file."""
-        vectors, coefficients, intercept = (arrays[name] for name in cls.SHAPES)
-        return cls(
-            vectors, coefficients, intercept, profile.kernel, profile.gamma, profile.multiclass
-        )
+        own = {name: arrays[name] for name in cls.SHAPES}
+        return cls(**own, kernel=profile.kernel, gamma=profile.gamma, multiclass=profile.multiclass)
 
     @property
     def width(self) -> int:
@@ -542,15 +539,9 @@ class Detector(Trees):
         return found
 
 
-def _first_bits() -> NDArray[np.uint8]:
-    """Lowest set bit of each number of 16 bits, shape (65536,); 0 if none is set."""
-    numbers = np.arange(1 << MOST_LEAVES)
-    first = np.frexp(numbers & -numbers)[1] - 1
-    found: NDArray[np.uint8] = np.maximum(first, 0).astype(np.uint8)
-    return found
-
-
-_FIRST = _first_bits()
+_NUMBERS = np.arange(1 << MOST_LEAVES)
+_FIRST = np.maximum(np.frexp(_NUMBERS & -_NUMBERS)[1] - 1, 0).astype(np.uint8)
+"""Lowest set bit of each number of 16 bits, shape (65536,); 0 if none is set."""
 
 
 def _parts(targets: Index, groups: Words) -> list[tuple[Index, Index]]:
