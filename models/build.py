@@ -39,21 +39,19 @@ HERE = Path(__file__).parent
 DOMAINS = 10  # seeds of every robot in wide domains: a good run, two with faults of a while,
 THROUGHOUT = 1  # and one with a fault of the whole run
 FAST = 10_018  # a further one, the first whose runs are kept at 10 kHz
+# Robots whose scenarios are in the training data, too.
 HOME = ("panda", "go2", "solo12", "anymal", "g1")
-"""Robots whose scenarios are in the training data, too."""
 SEEDS = 4  # their seeds in every scenario, from 0
+# Robots whose scenarios at home are measured on, and their seed.
 TEST, FIRST = ("panda", "go2", "talos"), 55
-"""Robots whose scenarios at home are measured on, and their seed."""
+# Rates of the logs in the training data, in [Hz].
 RATES = (10_000.0, 2000.0, 1000.0, 500.0, 250.0, 125.0, 80.0)
-"""Rates of the logs in the training data, in [Hz]."""
-SHOWN = (1000.0, 500.0, 250.0, 125.0)
-"""Rates of the logs of targets, in [Hz]."""
-COPIES = 2
-"""Logs of each run at 1 kHz and above, each of another logger; below, one."""
+SHOWN = (1000.0, 500.0, 250.0, 125.0)  # rates of the logs of targets, in [Hz]
+COPIES = 2  # logs of each run at 1 kHz and above, each of another logger; below, one
 EVERY = 3  # one log in so many is also trained on as a piece that begins anywhere
 WHOLE = "throughout"  # in the names of runs with a fault of the whole run
+# Faults that are added to good logs, and the class of each kind.
 ADDED = {"tone": "oscillations", "noise": "oscillations", "blow": "impact"}
-"""Faults that are added to good logs, and the class of each kind."""
 LOWEST = 15.0  # lowest frequency, in [Hz]; the highest is 0.45 of the sample rate
 LEVELS = 0.03, 10.0  # least and most root mean square while it lasts, in [rad/s]
 LASTS = 0.4, 1.2  # shortest and longest tone or noise, in [s]

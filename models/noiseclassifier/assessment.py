@@ -28,12 +28,11 @@ from noiseclassifier.signals import named
 FORMAT = "noise-evaluation/3"
 ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"
 NO_FRAME = "no frame without a gap"
+# Of the columns of the summary: names, figures with intervals, plain numbers.
 WIDTHS = (38, 26, 26, 12, 12)
-"""Of the columns of the summary: names, figures with intervals, plain numbers."""
-SHOWN = 5
-"""Most lines of a list; the JSON has all."""
-WIDTH = 32
-"""Of the names in a table by robot, domain or scenario; longer ones push their row."""
+SHOWN = 5  # most lines of a list; the JSON has all
+WIDTH = 32  # of the names in a table by robot, domain or scenario; longer ones push their row
+# Title, measure and counts of each row.
 ROWS = (
     ("False alarms per hour of ok time", "false_alarms_per_hour", "false_alarms"),
     ("Ok time flagged", "ok_flagged", ""),
@@ -47,7 +46,7 @@ ROWS = (
     ("Delay until a live listener knows", "delay", ""),
     ("  90 %", "late_delay", ""),
 )
-"""Title, measure and counts of each row."""
+# Measures of a table by robot, domain or scenario, by title.
 COLUMNS = {
     "false/h": "false_alarms_per_hour",
     "ok flagged": "ok_flagged",
@@ -58,22 +57,20 @@ COLUMNS = {
     "AUC": "auc",
     "pAUC": "pauc",
 }
-"""Measures of a table by robot, domain or scenario, by title."""
-
+# Gives the events of labels by their frames, and the same from onset to end.
 Localise = Callable[[Recording, Labels], tuple[tuple[Event, ...], tuple[Event, ...]]]
-"""Gives the events of labels by their frames, and the same from onset to end."""
 
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
     """All measures of a model."""
 
-    runs: int  # recordings that have a verdict
-    groups: int  # groups of them that share their motion
-    copies: dict[str, str]  # recordings that were left out, and the equal one of each, by name
-    seen: dict[str, str]  # recordings that the model was trained on, and what of them, by name
-    protocol: Protocol  # measures of the findings as they are reported
-    evaluation: Evaluation  # all frames that are cut from blocks
+    runs: int  #: recordings that have a verdict
+    groups: int  #: groups of them that share their motion
+    copies: dict[str, str]  #: recordings that were left out, and the equal one of each, by name
+    seen: dict[str, str]  #: recordings that the model was trained on, and what of them, by name
+    protocol: Protocol  #: measures of the findings as they are reported
+    evaluation: Evaluation  #: all frames that are cut from blocks
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""

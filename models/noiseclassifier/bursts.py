@@ -20,33 +20,25 @@ from noiseclassifier.labels import Event
 from noiseclassifier.lasting import AROUND, HIGHEST, STRONG, Windows, merged, spectrum
 from noiseclassifier.signals import Array
 
-WINDOW, HOP = 0.5, 0.125
-"""Duration of a window, and time from one to the next, in [s]."""
+WINDOW, HOP = 0.5, 0.125  # duration of a window, and time from one to the next, in [s]
+# Time by which a burst begins after its window, and ends before it, in [s]: those of windows that
+# follow each other overlap, and are one.
 MARGIN = (WINDOW - HOP) / 2 - 0.01
-"""Time by which a burst begins after its window, and ends before it, in [s]: those of windows that
-follow each other overlap, and are one."""
-LOWEST = 13.0
-"""Lowest frequency, in [Hz]."""
-WIDTH = 5
-"""Frequencies of a window that are one line."""
-NEAR = 5
-"""Windows on either side that are no rest."""
-REST, PAST = 8, 16
-"""Least windows of the rest of a file, and of the past of a stream."""
+LOWEST = 13.0  # lowest frequency, in [Hz]
+WIDTH = 5  # frequencies of a window that are one line
+NEAR = 5  # windows on either side that are no rest
+REST, PAST = 8, 16  # least windows of the rest of a file, and of the past of a stream
 # Thresholds: of 457 good runs of 24 simulated robots (0.76 h) at 1000 and 250 Hz, 8 have a burst,
 # of which 6 have a finding anyway. Of tones of half a second, 17, 51, 73 and 91 % are found at 10,
 # 15, 20 and 30 dB above the level of their joint and octave.
-LEVEL = -50.0
-"""Least level of a line, in [dB re 1 rad/s]."""
-PROMINENT = 25.0
-"""Least level of a line over the median of the frequencies around it, in [dB]."""
+LEVEL = -50.0  # least level of a line, in [dB re 1 rad/s]
+PROMINENT = 25.0  # least level of a line over the median of the frequencies around it, in [dB]
+# Score of a burst: that of a line of this strength that lasts. How much less the rest of the run
+# has is not known of a stream.
 SCORE = 1.0 - 0.5 * 10.0 ** (-(PROMINENT - STRONG) / 10.0)
-"""Score of a burst: that of a line of this strength that lasts. How much less the rest of the run
-has is not known of a stream."""
-PURE = 0.7
-"""Least share of a line in its octave."""
+PURE = 0.7  # least share of a line in its octave
+# Least level of a line over the mean of the rest of the run at its frequencies, in [dB].
 ABOVE = 20.0
-"""Least level of a line over the mean of the rest of the run at its frequencies, in [dB]."""
 
 
 @dataclass

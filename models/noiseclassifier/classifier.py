@@ -54,10 +54,9 @@ from noiseclassifier.signals import (
     stacked,
 )
 
+# Of the inputs, those that training takes of each log: the others lack features of the first.
 TAKEN = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
-"""Of the inputs, those that training takes of each log: the others lack features of the first."""
-UNBOUNDED = 1e9
-"""Highest value of features relative to the run: they say nothing of novelty."""
+UNBOUNDED = 1e9  # highest value of features relative to the run: they say nothing of novelty
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +64,15 @@ class Classifier:
     """A trained model: predicts the class of frames of noise."""
 
     profile: Profile
-    classes: tuple[str, ...]  # that it was trained with, in the profile's order
-    estimator: Estimator  # decides on standardised features
-    mean: Array  # of each feature, to be subtracted, shape (features,)
-    scale: Array  # of each feature, to be divided by, shape (features,)
-    runs: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of training recordings, by name
-    metrics: Mapping[str, Any] = field(default_factory=dict)  # of training and validation set
-    versions: Mapping[str, str] = field(default_factory=dict)  # of the software that trained it
-    sha256: str = ""  # of the file that it was loaded from
+    classes: tuple[str, ...]  #: that it was trained with, in the profile's order
+    estimator: Estimator  #: decides on standardised features
+    mean: Array  #: of each feature, to be subtracted, shape (features,)
+    scale: Array  #: of each feature, to be divided by, shape (features,)
+    #: SHA-256 of training recordings, by name
+    runs: Mapping[str, str] = field(default_factory=dict)
+    metrics: Mapping[str, Any] = field(default_factory=dict)  #: of training and validation set
+    versions: Mapping[str, str] = field(default_factory=dict)  #: of the software that trained it
+    sha256: str = ""  #: of the file that it was loaded from
 
     @classmethod
     def train(
@@ -434,8 +434,7 @@ def frames_of(
 
 # --- files, and the choice of a model
 
-Model: TypeAlias = Classifier | General
-"""A model of one rate, or of any."""
+Model: TypeAlias = Classifier | General  # a model of one rate, or of any
 
 
 def load(path: str | Path) -> Model:

@@ -15,18 +15,17 @@ from noiseclassifier.profile import NOMINAL, Profile
 from noiseclassifier.recording import Block, Recording, group_of
 from noiseclassifier.signals import Mask, Real, Words, stacked
 
-OPEN_END = 1000
-"""Samples after the last one at which NoisyTest stops a block that lasts to the end."""
+OPEN_END = 1000  # samples after the last one at which NoisyTest stops a block that lasts to the end
 
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """Labelled frames by their features; recordings and their blocks keep their order."""
 
-    features: Real  # not yet standardised, shape (frames, features); NaN where one is missing
-    labels: Words  # class of each frame
-    runs: Words  # name of the recording that each frame is from
-    hashes: Mapping[str, str]  # SHA-256 of each recording, by name
+    features: Real  #: not yet standardised, shape (frames, features); NaN where one is missing
+    labels: Words  #: class of each frame
+    runs: Words  #: name of the recording that each frame is from
+    hashes: Mapping[str, str]  #: SHA-256 of each recording, by name
 
     @classmethod
     def of(

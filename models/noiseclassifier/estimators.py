@@ -23,8 +23,8 @@ from noiseclassifier.profile import MOST_LEAVES, EstimatorKind, Kernel, Multicla
 from noiseclassifier.recording import folds
 from noiseclassifier.signals import Array, Index, Mask, Words
 
+# Size of each axis of arrays by name, or what there are as many of.
 Shapes: TypeAlias = Mapping[str, tuple[int | str, ...]]
-"""Size of each axis of arrays by name, or what there are as many of."""
 
 # --- support vector machines
 
@@ -192,12 +192,10 @@ def svc(
 
 # --- estimators with calibrated probabilities
 
-NOVELTY_LIMIT = 2.0
-"""A frame is out of distribution if its novelty score exceeds this."""
-TINY = 1e-12
-"""Added to a probability before its logarithm."""
+NOVELTY_LIMIT = 2.0  # a frame is out of distribution if its novelty score exceeds this
+TINY = 1e-12  # added to a probability before its logarithm
+# Least probability of any failure of a frame that is predicted as one: misses cost more.
 LIKELY = 0.2
-"""Least probability of any failure of a frame that is predicted as one: misses cost more."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -351,21 +349,18 @@ class Networks(Probable):
 # first one is where the walk would have led (C. Lucchese et al., *QuickScorer: A Fast Algorithm to
 # Rank Documents with Additive Ensembles of Regression Trees*, 2015).
 
+# Frames that are evaluated together: fewer take longer, more take memory and no less time.
 BATCH = 32
-"""Frames that are evaluated together: fewer take longer, more take memory and no less time."""
-MANY = 10_000
-"""Training frames from which several processes train the trees."""
+MANY = 10_000  # training frames from which several processes train the trees
+# Parts of the groups; each is left out of the training of some trees, for the calibration.
 PARTS = 3
-"""Parts of the groups; each is left out of the training of some trees, for the calibration."""
-UNSEEN = -30.0
-"""Prior of a class without training frames."""
+UNSEEN = -30.0  # prior of a class without training frames
+# Rounds of boosting of the trees that tell failures from `ok`, for each of those that name one:
+# these have a small part of the frames.
 NAMING = 3
-"""Rounds of boosting of the trees that tell failures from `ok`, for each of those that name one:
-these have a small part of the frames."""
+# Factor of the leaves of each tree, and penalty on their squares.
 LEARNING_RATE, PENALTY = 0.15, 1.0
-"""Factor of the leaves of each tree, and penalty on their squares."""
-TAIL = 1e-3
-"""Share of the training frames above the upper bound of a feature."""
+TAIL = 1e-3  # share of the training frames above the upper bound of a feature
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -540,8 +535,8 @@ class Detector(Trees):
 
 
 _NUMBERS = np.arange(1 << MOST_LEAVES)
+# Lowest set bit of each number of 16 bits, shape (65536,); 0 if none is set.
 _FIRST = np.maximum(np.frexp(_NUMBERS & -_NUMBERS)[1] - 1, 0).astype(np.uint8)
-"""Lowest set bit of each number of 16 bits, shape (65536,); 0 if none is set."""
 
 
 def _parts(targets: Index, groups: Words) -> list[tuple[Index, Index]]:
@@ -623,15 +618,15 @@ def _lay_out(nodes: Any) -> tuple[list[list[float]], list[float]]:
 
 Estimator: TypeAlias = SupportVectorMachines | Networks | Trees
 
+# Class of each estimator, by the name that profiles have for it.
 ESTIMATORS: Mapping[EstimatorKind, type[Estimator]] = {
     "svm": SupportVectorMachines,
     "networks": Networks,
     "trees": Trees,
     "detector": Detector,
 }
-"""Class of each estimator, by the name that profiles have for it."""
+# Those that can be trained.
 LEARNT: Mapping[EstimatorKind, type[SupportVectorMachines | Detector]] = {
     "svm": SupportVectorMachines,
     "detector": Detector,
 }
-"""Those that can be trained."""

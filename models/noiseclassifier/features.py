@@ -23,34 +23,26 @@ from noiseclassifier.signals import Array, Index, Mask, Real, Signals, by_joint,
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
+# How many samples are transformed at once, of all rows: more leave the cache of the processor.
 AT_ONCE = 2**16
-"""How many samples are transformed at once, of all rows: more leave the cache of the processor."""
-CHUNK = 64
-"""Frames that are evaluated at once, which bounds the memory that they take."""
+CHUNK = 64  # frames that are evaluated at once, which bounds the memory that they take
+# Frames' lengths of samples that are taken at once, which bounds the memory that they take.
 LENGTHS = 8
-"""Frames' lengths of samples that are taken at once, which bounds the memory that they take."""
-
+# Added to each spread, in [Np]: features of a robot that stands hardly vary at all.
 LEAST_SPREAD = 0.15
-"""Added to each spread, in [Np]: features of a robot that stands hardly vary at all."""
-MOST_RELATIVE = 15.0
-"""Largest relative feature."""
-NORMAL = 1.48
-"""Standard deviation of a normal distribution, in median absolute deviations."""
+MOST_RELATIVE = 15.0  # largest relative feature
+NORMAL = 1.48  # standard deviation of a normal distribution, in median absolute deviations
+# Frames that a running reference remembers at most, so that it follows slow changes: a minute.
 MEMORY = 600
-"""Frames that a running reference remembers at most, so that it follows slow changes: a minute."""
-FIRST = 0.3
-"""Spread before anything is known, in [Np]; it counts as ``FIRST_FRAMES`` frames."""
+FIRST = 0.3  # spread before anything is known, in [Np]; it counts as ``FIRST_FRAMES`` frames
 FIRST_FRAMES = 10
-BOUND = 1.5
-"""Spreads by which a frame moves a running location at most, times its share."""
+BOUND = 1.5  # spreads by which a frame moves a running location at most, times its share
+# Frames that are kept of a whole signal at most, beside those that may be failures: 10 minutes.
 KEPT = 6000
-"""Frames that are kept of a whole signal at most, beside those that may be failures: 10 minutes."""
-FEWEST = 10
-"""Frames of the rest of a signal that make a reference."""
-
+FEWEST = 10  # frames of the rest of a signal that make a reference
+# First sample of each frame, shape (frames,), and its features, not yet standardised, shape
+# (frames, features).
 Frames: TypeAlias = tuple[Index, Array]
-"""First sample of each frame, shape (frames,), and its features, not yet standardised, shape
-(frames, features)."""
 
 
 # --- frames alone

@@ -8,15 +8,9 @@ from datetime import date, time
 from pathlib import Path
 from typing import Any
 
-MAX_CHARACTERS = 64 * 2**20
-"""Longest text that is parsed: a hundred times the longest manifest."""
-
-DIGITS = 20
-"""Most digits of an integer: enough for 64 bits."""
-
-PARTS = 100
-"""Most parts of a TOML key; `tomllib` takes memory by their square."""
-
+MAX_CHARACTERS = 64 * 2**20  # longest text that is parsed: a hundred times the longest manifest
+DIGITS = 20  # most digits of an integer: enough for 64 bits
+PARTS = 100  # most parts of a TOML key; `tomllib` takes memory by their square
 LONG_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*"|'[^'\n]*')[ \t]*+\.[ \t]*+){{{PARTS}}}"""
 )

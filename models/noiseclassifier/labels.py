@@ -23,24 +23,21 @@ import numpy as np
 
 from noiseclassifier.signals import Array, Index, Mask, Words
 
-UNKNOWN = "unknown"
-"""Label of a frame that is out of distribution and below the alarm threshold."""
-
-CONFIRM = 2
-"""Frames of evidence in a stretch that make it a finding."""
+UNKNOWN = "unknown"  # label of a frame that is out of distribution and below the alarm threshold
+CONFIRM = 2  # frames of evidence in a stretch that make it a finding
 
 
 @dataclass(frozen=True)
 class Event:
     """A finding: neighbouring frames of one failure class, as one."""
 
-    label: str  # the class
-    start: float  # when its first frame starts, in [s]
-    stop: float  # when its last frame stops, in [s]
+    label: str  #: the class
+    start: float  #: when its first frame starts, in [s]
+    stop: float  #: when its last frame stops, in [s]
+    #: The highest probability of any failure in one of its frames, which the alarm threshold is of
+    #: too; of a model without one, the highest score of the class.
     score: float
-    """The highest probability of any failure in one of its frames, which the alarm threshold is of
-    too; of a model without one, the highest score of the class."""
-    novel: bool = False  # whether one of its frames is out of distribution
+    novel: bool = False  #: whether one of its frames is out of distribution
 
     @property
     def novelty(self) -> str:
@@ -56,15 +53,15 @@ class Event:
 class Labels:
     """Predictions for each frame of a signal, in order of time."""
 
-    start: Array  # when each frame starts, shape (frames,), in [s]
-    stop: Array  # when it stops
-    label: Words  # its class, or `unknown`, by the frame alone
-    scores: Array  # how certain each class is, shape (frames, classes); comparable in one model
-    classes: tuple[str, ...]  # their names, `ok` first
-    above_threshold: Mask | None = None  # the alarm threshold; None: each frame that is not `ok`
-    novel: Mask | None = None  # out of distribution; None: the estimator has no measure of that
-    unknown_is_finding: bool = True  # whether `unknown` frames are evidence, or raise nothing
-    hop: float | None = None  # from one frame to the next, in [s]; None: the smallest distance
+    start: Array  #: when each frame starts, shape (frames,), in [s]
+    stop: Array  #: when it stops
+    label: Words  #: its class, or `unknown`, by the frame alone
+    scores: Array  #: how certain each class is, shape (frames, classes); comparable in one model
+    classes: tuple[str, ...]  #: their names, `ok` first
+    above_threshold: Mask | None = None  #: the alarm threshold; None: each frame that is not `ok`
+    novel: Mask | None = None  #: out of distribution; None: the estimator has no measure of that
+    unknown_is_finding: bool = True  #: whether `unknown` frames are evidence, or raise nothing
+    hop: float | None = None  #: from one frame to the next, in [s]; None: the smallest distance
 
     @property
     def step(self) -> float:

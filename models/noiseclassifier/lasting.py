@@ -26,34 +26,25 @@ import numpy as np
 from noiseclassifier.labels import UNKNOWN, Event
 from noiseclassifier.signals import JOINTS, Array, Mask, Real
 
-WINDOW, HOP = 1.0, 0.25
-"""Duration of a window, and time from one to the next, in [s]."""
+WINDOW, HOP = 1.0, 0.25  # duration of a window, and time from one to the next, in [s]
+# Time by which a finding begins after the first of its windows, and ends before the last, in [s],
+# but where the signal begins or ends.
 MARGIN = (WINDOW - HOP) / 2
-"""Time by which a finding begins after the first of its windows, and ends before the last, in [s],
-but where the signal begins or ends."""
+# Shortest stretch without a gap that can be judged, in [s]: it is a window of its own.
 SHORTEST = 0.6
-"""Shortest stretch without a gap that can be judged, in [s]: it is a window of its own."""
+# Lines that count: lowest frequency, in [Hz], and highest, as a share of the sample rate.
 LOWEST, HIGHEST = 10.0, 0.47
-"""Lines that count: lowest frequency, in [Hz], and highest, as a share of the sample rate."""
-AROUND = 1.5
-"""Ratio of frequencies up to which the neighbourhood of a line reaches."""
-BAND = 1.1
-"""Ratio of frequencies whose lines have one neighbourhood."""
-FLOOR = -50.0
-"""Level of a line whose strength is 0 at most, in [dB re 1 rad/s]."""
+AROUND = 1.5  # ratio of frequencies up to which the neighbourhood of a line reaches
+BAND = 1.1  # ratio of frequencies whose lines have one neighbourhood
+FLOOR = -50.0  # level of a line whose strength is 0 at most, in [dB re 1 rad/s]
 # Thresholds: of 72 good runs of 20 simulated robots, the strongest line has 15 dB in three windows,
 # and 18 dB in one, but 23 and 31 dB in two runs. Of 49 runs with oscillations, half have more than
 # 18 dB in three windows. `python -m benchmarks.lasting` measures them anew.
-STRONG = 18.0
-"""Strength of a line in each of ``WINDOWS`` windows that makes it a finding, in [dB]."""
-WINDOWS = 3
-"""Windows in a row; in a stretch that has fewer, all of them."""
-SHARP = 25.0
-"""Strength in one window that makes a finding of a strong line of any length, in [dB]."""
-DRIFT = 2.0
-"""How far a line moves from one window to the next, in [Hz]."""
-TINY = 1e-30
-"""Mean square of silence, in [rad²/s²]."""
+STRONG = 18.0  # strength of a line in each of ``WINDOWS`` windows that makes it a finding, in [dB]
+WINDOWS = 3  # windows in a row; in a stretch that has fewer, all of them
+SHARP = 25.0  # strength in one window that makes a finding of a strong line of any length, in [dB]
+DRIFT = 2.0  # how far a line moves from one window to the next, in [Hz]
+TINY = 1e-30  # mean square of silence, in [rad²/s²]
 MEASURED, ERROR = JOINTS[1], JOINTS[2]
 
 

@@ -35,17 +35,13 @@ from noiseclassifier.recording import Block, Fault, Recording, robot_of
 from noiseclassifier.signals import Array, Index, Mask, Words
 
 OK, UNCLEAR = "ok", ""
-UNNAMED = "unnamed"
-"""Robot or domain of a recording that names none."""
-COLLAR = 0.2
-"""Time between a finding and a fault that still meet, in [s]."""
-CLOSE = 0.2
-"""Largest error of an onset that counts as right, in [s]."""
-SHIFTS = 40
-"""Random shifts of the findings of each run."""
+UNNAMED = "unnamed"  # robot or domain of a recording that names none
+COLLAR = 0.2  # time between a finding and a fault that still meet, in [s]
+CLOSE = 0.2  # largest error of an onset that counts as right, in [s]
+SHIFTS = 40  # random shifts of the findings of each run
 HOUR = 3600.0
+# Kinds of findings: on a fault or failure, in `ok` time, and in unlabelled time.
 MET, FALSE, UNLABELLED = "met", "false", "unlabelled"
-"""Kinds of findings: on a fault or failure, in `ok` time, and in unlabelled time."""
 
 
 class Span(Protocol):
@@ -172,10 +168,8 @@ class Unanswered:
     """A recording that a model cannot classify."""
 
     name: str
-    facts: Mapping[str, str] = field(default_factory=dict)
-    """Its robot, scenario and domain."""
-    reason: str = ""
-    """Why there is no verdict, in a few words."""
+    facts: Mapping[str, str] = field(default_factory=dict)  #: its robot, scenario and domain
+    reason: str = ""  #: why there is no verdict, in a few words
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,15 +31,15 @@ from noiseclassifier.signals import Array, Index, Mask, Words
 
 RESAMPLES = 2000
 SEED = 0
-TAIL = 0.025
-"""Probability beyond each bound."""
+TAIL = 0.025  # probability beyond each bound
 LEAST_GROUPS = 5
 
+# Rates: what is counted, and the time of it in [h].
 RATES = {
     "false_alarms_per_hour": ("false_alarms", "ok_hours"),
     "alarms_in_unlabelled_per_hour": ("alarms_in_unlabelled", "unlabelled_hours"),
 }
-"""Rates: what is counted, and the time of it in [h]."""
+# Shares: of what is counted, and of what.
 SHARES = {
     "ok_flagged": ("ok_hours_flagged", "ok_hours"),
     "recall_injected": ("found", "faults"),
@@ -49,26 +49,22 @@ SHARES = {
     "class_f1": ("matched_by_class", "half_of_both"),
     "onset_within": ("onset_close", "found"),
 }
-"""Shares: of what is counted, and of what."""
+# Shares of findings that are shifted at random.
 BY_CHANCE = {
     name: (f"{part}_by_chance", "found_by_chance" if whole == "found" else whole)
     for name, (part, whole) in SHARES.items()
     if name != "ok_flagged"
 }
-"""Shares of findings that are shifted at random."""
-DELAYS = {"delay": 0.5, "late_delay": 0.9}
-"""Quantiles of the delays, by name."""
-KEYS = ("robot", "domain", "scenario")
-"""What runs can be grouped by."""
-MOST = 0.1
-"""False positive rate up to which the partial AUC counts."""
+DELAYS = {"delay": 0.5, "late_delay": 0.9}  # quantiles of the delays, by name
+KEYS = ("robot", "domain", "scenario")  # what runs can be grouped by
+MOST = 0.1  # false positive rate up to which the partial AUC counts
+# Measures of frames as the paper has them: of ALL frames.
 PAPER = (
     "false_negative_errors",
     "false_positive_errors",
     "failure_detection_rate",
     "subset_accuracy",
 )
-"""Measures of frames as the paper has them: of ALL frames."""
 
 
 def ratio(part: Array | float, whole: Array | float) -> Array:
@@ -99,7 +95,7 @@ class Evaluation:
     """Confusion matrix of frames, and measures of it: shares from 0 to 1, NaN where undefined."""
 
     classes: tuple[str, ...]
-    confusion: NDArray[Any]  # frames by true (row) and predicted class (column)
+    confusion: NDArray[Any]  #: frames by true (row) and predicted class (column)
 
     @classmethod
     def of(cls, truth: Words, predicted: Words, classes: Sequence[str]) -> Self:

@@ -34,16 +34,15 @@ from noiseclassifier.signals import Array
 
 FORMAT = "noise-model/7"
 OLD_FORMATS = ("noise-model/4", "noise-model/5", "noise-model/6")
+# Settings of profiles in older formats that labels do not depend on.
 DROPPED = {
     *("name", "networks", "units", "decay", "epochs", "learning_rate", "penalty"),
     *("pad_short", "spread_failures", "open_end", "cut_by_time", "widen_extra", "pad_widened"),
 }
-"""Settings of profiles in older formats that labels do not depend on."""
+# Settings in older formats, and the bands that have them now.
 BY_BANDS = {"single_precision": "comb", "drop_first_sample": "comb", "flush_end": "log"}
-"""Settings in older formats, and the bands that have them now."""
+# Bytes that a model file may have: a thousand times as many as the shipped ones.
 LARGEST = 512 * 1024**2
-"""Bytes that a model file may have: a thousand times as many as the shipped ones."""
-
 _KINDS = [
     {"manifest": 0, "mean": 1, "scale": 1} | {name: len(axes) for name, axes in each.SHAPES.items()}
     for each in ESTIMATORS.values()

@@ -15,8 +15,7 @@ from noiseclassifier.profile import TOLERANCE
 from noiseclassifier.recording import Block, Recording
 from noiseclassifier.signals import Array
 
-LONGEST_LINE = 2**16
-"""Characters of a line: far more than two numbers and a comment have."""
+LONGEST_LINE = 2**16  # characters of a line: far more than two numbers and a comment have
 
 
 def read_log(path: str | Path) -> tuple[Array, Array]:
@@ -87,10 +86,8 @@ def _check_time(path: str | Path, time: Array) -> None:
         )
 
 
-END = -1.0
-"""A stop that stands for the end of the recording."""
-LATEST = 1e12
-"""All times lie before, in [s]."""
+END = -1.0  # a stop that stands for the end of the recording
+LATEST = 1e12  # all times lie before, in [s]
 
 
 def read_folder(folder: str | Path, *, rate: float | None = None) -> Iterator[Recording]:

@@ -17,21 +17,17 @@ import numpy as np
 from noiseclassifier.errors import ProfileError
 from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE, Index, by_joint
 
+# NoisyTest's classes, in its order; `ok` is the first of every model.
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
-"""NoisyTest's classes, in its order; `ok` is the first of every model."""
-MOST_LEAVES = 16
-"""Leaves that a tree may have: a bit for each."""
-TOLERANCE = 1e-3
-"""Two sample rates are the same if they differ by less than this share."""
+MOST_LEAVES = 16  # leaves that a tree may have: a bit for each
+TOLERANCE = 1e-3  # two sample rates are the same if they differ by less than this share
+# Two nominal rates, such as from jittering timestamps, are the same up to this share; what is
+# computed of the spectrum is off by as much.
 NOMINAL = 0.02
-"""Two nominal rates, such as from jittering timestamps, are the same up to this share; what is
-computed of the spectrum is off by as much."""
+# Statistics over a frame of each log-band energy. Beside a reference, the last one adds nothing on
+# robots left out, and is not computed.
 STATISTICS = ("mean", "maximum", "deviation")
-"""Statistics over a frame of each log-band energy. Beside a reference, the last one adds nothing on
-robots left out, and is not computed."""
-RELATIVE = "relative"
-"""What the names of features begin with that are relative to a reference."""
-
+RELATIVE = "relative"  # what the names of features begin with that are relative to a reference
 Kernel: TypeAlias = Literal["linear", "rbf"]
 EstimatorKind: TypeAlias = Literal["svm", "networks", "trees", "detector"]
 Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
@@ -78,43 +74,43 @@ class Profile:
         ProfileError: If a setting is out of its range, or two do not fit together.
     """
 
-    classes: tuple[str, ...] = CLASSES  # names of the classes, `ok` first
+    classes: tuple[str, ...] = CLASSES  #: names of the classes, `ok` first
+    #: Input signals, all in [rad/s]: noise estimates, norms of velocities, and after those the ones
+    #: joint by joint (`signals.JOINTS`), of which the loudest joint counts.
     signals: tuple[str, ...] = ("noise",)
-    """Input signals, all in [rad/s]: noise estimates, norms of velocities, and after those the ones
-    joint by joint (`signals.JOINTS`), of which the loudest joint counts."""
-    rate: float = 10_000.0  # sample rate of the signal, in [Hz]
-    length: int = 4000  # samples of a frame
-    hop: int = 1000  # samples from the start of one frame to the start of the next
-    window: int = 1024  # samples of the Hann window of one Fourier transform
-    stride: int = 834  # samples from one Fourier transform to the next (the paper's s_fft)
+    rate: float = 10_000.0  #: sample rate of the signal, in [Hz]
+    length: int = 4000  #: samples of a frame
+    hop: int = 1000  #: samples from the start of one frame to the start of the next
+    window: int = 1024  #: samples of the Hann window of one Fourier transform
+    stride: int = 834  #: samples from one Fourier transform to the next (the paper's s_fft)
+    #: How bins become bands: three adjacent ones as in the paper, NoisyTest's comb, or ``edges``.
+    #: NoisyTest's profile also rounds times, samples and features to 32-bit floats, and loses the
+    #: first sample of a recording (its reader takes that row for the header).
     bands: Literal["adjacent", "comb", "log"] = "adjacent"
-    """How bins become bands: three adjacent ones as in the paper, NoisyTest's comb, or ``edges``.
-    NoisyTest's profile also rounds times, samples and features to 32-bit floats, and loses the
-    first sample of a recording (its reader takes that row for the header)."""
-    edges: tuple[float, ...] = ()  # edges of the bands of ``log``, ascending, in [Hz]
-    quick_window: int = 0  # samples of a second, shorter Hann window beside the first; 0 for none
-    quick_stride: int = 0  # samples from one of its transforms to the next
-    quick_edges: tuple[float, ...] = ()  # edges of its bands, ascending, in [Hz]
+    edges: tuple[float, ...] = ()  #: edges of the bands of ``log``, ascending, in [Hz]
+    quick_window: int = 0  #: samples of a second, shorter Hann window beside the first; 0 for none
+    quick_stride: int = 0  #: samples from one of its transforms to the next
+    quick_edges: tuple[float, ...] = ()  #: edges of its bands, ascending, in [Hz]
+    #: Whether log-band energies are relative to the level of the frame, and differences from the
+    #: signal before are features, too; of models of earlier versions.
     relative: bool = False
-    """Whether log-band energies are relative to the level of the frame, and differences from the
-    signal before are features, too; of models of earlier versions."""
+    #: Whether log-band energies and their differences from the signal before are features as they
+    #: are, and once more relative to a reference (`features.RunningReference`).
     reference: bool = False
-    """Whether log-band energies and their differences from the signal before are features as they
-    are, and once more relative to a reference (`features.RunningReference`)."""
-    floor: float = 1e-6  # added to an amplitude before its logarithm
+    floor: float = 1e-6  #: added to an amplitude before its logarithm
+    #: Least standard deviation in the standardisation of features by the training set; 0 leaves them
+    #: as they are.
     least_deviation: float = 0.0
-    """Least standard deviation in the standardisation of features by the training set; 0 leaves
-    them as they are."""
+    #: Support vector machines, or trees that first tell failures from `ok` and then name them
+    #: (``detector``); networks and other trees are of model files of earlier versions.
     estimator: EstimatorKind = "svm"
-    """Support vector machines, or trees that first tell failures from `ok` and then name them
-    (``detector``); networks and other trees are of model files of earlier versions."""
-    kernel: Kernel = "rbf"  # kernel of the support vector machine
-    regularization: float = 1.1  # C of the support vector machine
-    gamma: float = 5.7e-4  # kernel parameter; the linear kernel has none
-    multiclass: Multiclass = "one-vs-rest"  # how two-class SVMs are combined for more classes
-    rounds: int = 100  # rounds of boosting; each adds a tree for each class
-    leaves: int = 16  # leaves of a tree at most
-    alarm: float = 0.5  # alarm threshold: a probability of any failure
+    kernel: Kernel = "rbf"  #: kernel of the support vector machine
+    regularization: float = 1.1  #: C of the support vector machine
+    gamma: float = 5.7e-4  #: kernel parameter; the linear kernel has none
+    multiclass: Multiclass = "one-vs-rest"  #: how two-class SVMs are combined for more classes
+    rounds: int = 100  #: rounds of boosting; each adds a tree for each class
+    leaves: int = 16  #: leaves of a tree at most
+    alarm: float = 0.5  #: alarm threshold: a probability of any failure
 
     def __post_init__(self) -> None:
         """Check every setting once."""
@@ -314,8 +310,9 @@ def _rules_of_signals(profile: Profile) -> Iterator[tuple[bool, str]]:
 
 # --- for any rate
 
+# Rates that a general model takes, in [Hz]; faster logs are decimated.
 LOWEST, HIGHEST = 80.0, 10_000.0
-"""Rates that a general model takes, in [Hz]; faster logs are decimated."""
+# Signals that a general model takes: the first of these that a log has.
 INPUTS = (
     (*MOTION, *JOINTS, EFFORT),
     (*MOTION, *JOINTS),
@@ -325,13 +322,10 @@ INPUTS = (
     ("measured",),
     (NOISE,),
 )
-"""Signals that a general model takes: the first of these that a log has."""
+# Bins of a Hann window that the mean leaks into: up to here, a quick band is the speed itself.
 SPEED = 1.5
-"""Bins of a Hann window that the mean leaks into: up to here, a quick band is the speed itself."""
-WIDE = 2.0 ** (4 / 3)
-"""From the lower to the upper edge of a quick window's other bands."""
-FEWEST = 2
-"""Fewest bands that a profile has."""
+WIDE = 2.0 ** (4 / 3)  # from the lower to the upper edge of a quick window's other bands
+FEWEST = 2  # fewest bands that a profile has
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -341,7 +335,7 @@ class LogBands:
     Band edges do not depend on the sample rate; bands that reach beyond half the rate drop out.
     """
 
-    # As in `Profile`:
+    #: As in `Profile`:
     classes: tuple[str, ...] = CLASSES
     signals: tuple[str, ...] = (NOISE,)
     reference: bool = False
@@ -351,26 +345,26 @@ class LogBands:
     leaves: int = 16
     regularization: float = 10.0
     least_deviation: float = 0.5
+    #: Added to the amplitude of a band, in [rad/s]: about the noise of the best encoders.
     floor: float = 3e-5
-    """Added to the amplitude of a band, in [rad/s]: about the noise of the best encoders."""
-    # In seconds and hertz:
-    frame: float = 0.4  # duration of a frame, in [s]
-    hop: float = 0.1  # time from the start of one frame to the start of the next, in [s]
-    window: float = 0.1  # duration of the window of one Fourier transform, in [s]
-    stride: float = 0.025  # time from one Fourier transform to the next, in [s]
+    #: In seconds and hertz:
+    frame: float = 0.4  #: duration of a frame, in [s]
+    hop: float = 0.1  #: time from the start of one frame to the start of the next, in [s]
+    window: float = 0.1  #: duration of the window of one Fourier transform, in [s]
+    stride: float = 0.025  #: time from one Fourier transform to the next, in [s]
+    #: Lower edge of the first band: below, the mean leaks through a Hann window, in [Hz].
     lowest: float = 15.0
-    """Lower edge of the first band: below, the mean leaks through a Hann window, in [Hz]."""
-    highest: float = 5000.0  # no band reaches beyond, in [Hz]
+    highest: float = 5000.0  #: no band reaches beyond, in [Hz]
+    #: Bands in an octave, where they are wider than what the window resolves.
     per_octave: float = 4.0
-    """Bands in an octave, where they are wider than what the window resolves."""
+    #: Duration of a second, shorter window, in [s]; 0 for none. Its bands are few and wide: it
+    #: resolves time rather than frequency.
     quick: float = 0.0
-    """Duration of a second, shorter window, in [s]; 0 for none. Its bands are few and wide: it
-    resolves time rather than frequency."""
-    quick_stride: float = 0.01  # time from one of its transforms to the next, in [s]
-    speed: bool = False  # whether the first quick band, below all others, is the speed itself
+    quick_stride: float = 0.01  #: time from one of its transforms to the next, in [s]
+    speed: bool = False  #: whether the first quick band, below all others, is the speed itself
+    #: Kernel parameter times the number of features: below 1, frames out of distribution still get
+    #: the class of the nearest training frames.
     softness: float = 0.5
-    """Kernel parameter times the number of features: below 1, frames out of distribution still get
-    the class of the nearest training frames."""
 
     def at(self, rate: float) -> Profile:
         """Profile for a sample rate, in [Hz], durations rounded to the nearest sample, windows up.
@@ -482,6 +476,7 @@ class LogBands:
         return tuple(edges) if len(edges) > 1 else ()
 
 
+# For any rate and whatever signals there are; features relative to a reference beside.
 ANY = LogBands(
     reference=True,
     floor=1e-3,
@@ -492,4 +487,3 @@ ANY = LogBands(
     leaves=16,
     alarm=0.83,
 )
-"""For any rate and whatever signals there are; features relative to a reference beside."""

@@ -24,18 +24,18 @@ from noiseclassifier.signals import NOISE, Array, Index, Mask, Signals, by_joint
 class Block(NamedTuple):
     """An annotated stretch of a recording."""
 
-    start: float  # in [s]
-    stop: float  # in [s]; infinity if it lasts to the end
+    start: float  #: in [s]
+    stop: float  #: in [s]; infinity if it lasts to the end
     label: str
 
 
 class Fault(NamedTuple):
     """A fault that was injected into a recording, whether it is detectable or not."""
 
-    start: float  # of its cause, in [s]
+    start: float  #: of its cause, in [s]
     stop: float
-    label: str  # class of the failure that it leads to
-    felt: bool = True  # whether it has an annotated block
+    label: str  #: class of the failure that it leads to
+    felt: bool = True  #: whether it has an annotated block
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +48,14 @@ class Recording:
     """
 
     name: str
-    signal: Signals  # the noise estimate, shape (samples,), or signals by name
-    rate: float  # in [Hz]
-    blocks: tuple[Block, ...] = ()  # annotations; what overlaps must agree
-    start: float = 0.0  # time of the first sample, in [s]
-    valid: Mask | None = None  # False in gaps, shape (samples,); None if there are none
-    sha256: str = ""  # of where the recording comes from; by default, of its samples
-    events: tuple[Fault, ...] = ()  # all injected faults; empty if none was, or that is not known
-    facts: Mapping[str, str] = field(default_factory=dict)  # robot, scenario and domain, if known
+    signal: Signals  #: the noise estimate, shape (samples,), or signals by name
+    rate: float  #: in [Hz]
+    blocks: tuple[Block, ...] = ()  #: annotations; what overlaps must agree
+    start: float = 0.0  #: time of the first sample, in [s]
+    valid: Mask | None = None  #: False in gaps, shape (samples,); None if there are none
+    sha256: str = ""  #: of where the recording comes from; by default, of its samples
+    events: tuple[Fault, ...] = ()  #: all injected faults; empty if none was, or that is not known
+    facts: Mapping[str, str] = field(default_factory=dict)  #: robot, scenario and domain, if known
 
     def __post_init__(self) -> None:
         """Check everything once, and hash what came without a hash."""
@@ -118,8 +118,7 @@ def _words(block: Block) -> str:
 
 _SAMPLE = re.compile(r"([^/]+)/.+-(\d+)")
 
-SHARE = 0.25
-"""Of all groups, those that are held out for the last measurement."""
+SHARE = 0.25  # of all groups, those that are held out for the last measurement
 
 
 @cache

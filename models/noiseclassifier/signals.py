@@ -19,21 +19,14 @@ Mask: TypeAlias = NDArray[np.bool_]
 Index: TypeAlias = NDArray[np.intp]
 Words: TypeAlias = NDArray[np.str_]
 
+# The one signal of the paper, p_hat = sqrt(|qd|^2 + |qd_desired|^2) (Sec. II-A).
 NOISE = "noise"
-"""The one signal of the paper, p_hat = sqrt(|qd|^2 + |qd_desired|^2) (Sec. II-A)."""
-
-MOTION = ("desired", "measured", "error")
-"""Norms of the velocities of a run with a desired motion."""
-
-JOINTS = tuple(f"{name}_joints" for name in MOTION)
-"""The same, joint by joint."""
-
-EFFORT = "effort_joints"
-"""Joint torques, forces or motor currents, in any unit."""
-
+MOTION = ("desired", "measured", "error")  # norms of the velocities of a run with a desired motion
+JOINTS = tuple(f"{name}_joints" for name in MOTION)  # the same, joint by joint
+EFFORT = "effort_joints"  # joint torques, forces or motor currents, in any unit
+# The noise, shape (samples,), or signals by name: norms of that shape, and what goes joint by
+# joint, shape (joints, samples).
 Signals: TypeAlias = Real | Mapping[str, Real]
-"""The noise, shape (samples,), or signals by name: norms of that shape, and what goes joint by
-joint, shape (joints, samples)."""
 
 
 def named(signals: Signals) -> Mapping[str, Real]:

@@ -32,18 +32,16 @@ Value: TypeAlias = int | float | str
 Point: TypeAlias = Mapping[str, Value]
 Criterion: TypeAlias = Literal["balanced-accuracy", "subset-accuracy"]
 
+# Settings of the features that can be tuned.
 FEATURE_SETTINGS = ("window", "stride", "bands", "floor", "least_deviation")
-"""Settings of the features that can be tuned."""
+# Settings of support vector machines; points that differ in these alone share their features.
 ESTIMATOR_SETTINGS = ("multiclass", "gamma", "regularization")
-"""Settings of support vector machines; points that differ in these alone share their features."""
+# Settings that can be tuned: all that come after framing; the last varies fastest.
 SETTINGS = FEATURE_SETTINGS + ESTIMATOR_SETTINGS
-"""Settings that can be tuned: all that come after framing; the last varies fastest."""
-MOST = 1_000_000
-"""Points that a grid may have."""
+MOST = 1_000_000  # points that a grid may have
+# Training frames up to which a kernel matrix is kept, 200 MB then; above, libsvm has a cache.
 LARGEST = 5000
-"""Training frames up to which a kernel matrix is kept, 200 MB then; above, libsvm has a cache."""
-DIGITS = 9
-"""Decimals of a measure: equal measures stay equal whatever the order of summation."""
+DIGITS = 9  # decimals of a measure: equal measures stay equal whatever the order of summation
 
 
 # --- the grid

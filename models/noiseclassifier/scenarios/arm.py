@@ -31,8 +31,8 @@ from noiseclassifier.scenarios.world import box_changes, configuration, real_wor
 from noisemodel import Robot
 from noisemodel.types import Array
 
+# Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²].
 HIGHEST_ACCELERATION = 30.0
-"""Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²]."""
 MARGIN = 0.1  # distance from the joints' limits, in [rad]
 OVER = 0.08  # how far splines and waves may reach into that margin, in [rad]
 SHORTEST = 0.2  # shortest movement, in [s]
@@ -141,8 +141,8 @@ class Ability:
         )
 
 
+# From a duration, in [s], to positions at its ticks, shape (ticks, joints), in [rad].
 Movement: TypeAlias = Callable[[float], Array]
-"""From a duration, in [s], to positions at its ticks, shape (ticks, joints), in [rad]."""
 Made: TypeAlias = tuple[Movement, float]  # with its highest speed times its duration, in [rad]
 
 
@@ -272,6 +272,7 @@ def _teleoperated(motion: Reach, rng: Rng, ability: Ability, start: Array) -> Ma
     return movement, float(np.abs(np.diff(wander, axis=0)).max()) * fine
 
 
+# Movements by the kind of motion: each with the product of its highest speed and duration.
 KINDS = {
     "minimum-jerk": _straight,
     "trapezoid": _trapezoid,
@@ -279,7 +280,6 @@ KINDS = {
     "sines": _sines,
     "teleoperation": _teleoperated,
 }
-"""Movements by the kind of motion: each with the product of its highest speed and duration."""
 
 
 def _shares(duration: float) -> Array:
@@ -553,8 +553,8 @@ class ToolControl:
         return joints, inverse
 
 
+# Ticks before the recording during which the arm comes to rest under its unknown load.
 SETTLING = 300
-"""Ticks before the recording during which the arm comes to rest under its unknown load."""
 
 
 def plan(arm: Arm, motion: Picks | Reach, rng: Rng, duration: float) -> Plan:

@@ -43,9 +43,9 @@ FORMAT, MANIFEST, FALLEN = "noise-dataset/1", "dataset.json", ".fallen.json"
 FEW = 8  # scenarios in which a robot fell that are named at most
 _NAMES = re.compile(r"([a-z0-9_]+)/(.+)-(\d{3,})")
 
+# All logs; logs to train on; logs of robots and domains that are never trained on; and logs of the
+# other robots and domains, from loggers that are never trained on.
 Side: TypeAlias = Literal["all", "source", "target", "logger"]
-"""All logs; logs to train on; logs of robots and domains that are never trained on; and logs of the
-other robots and domains, from loggers that are never trained on."""
 
 
 @dataclass(frozen=True, order=True)

@@ -30,8 +30,8 @@ TARGET_HOLD = 4  # logs whose samples are held so many times or more are never t
 RESONANCES = 2  # most resonances of one robot
 PRESENT = 0.5  # share of the robots that have a given imperfection of gears at all
 CURRENTS = 0.5  # share of the logs with efforts whose efforts are currents
+# Rates of loggers, in [Hz], each drawn as often as it is listed.
 RATES = (100.0, 125.0, 200.0, 250.0, 500.0, 1000.0, 1000.0, 1000.0, 2000.0, 5000.0, 10_000.0)
-"""Rates of loggers, in [Hz], each drawn as often as it is listed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -319,9 +319,9 @@ def steady(motion: Trot) -> Trot:
     return replace(motion, gait=gait, period=(shortest, longest))
 
 
+# By family: from random numbers, wildness and a robot to a motion.
 MOTIONS: Mapping[str, Callable[..., Any]] = {
     "arm": arm_motion,
     "humanoid": humanoid_motion,
     "quadruped": quadruped_motion,
 }
-"""By family: from random numbers, wildness and a robot to a motion."""

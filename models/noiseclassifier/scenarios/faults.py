@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from noiseclassifier.scenarios.domains import Domain
 
 Integers: TypeAlias = NDArray[np.int64]
+# From times, shape (samples,), targets and rates, shape (samples, joints), to both.
 Command: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
-"""From times, shape (samples,), targets and rates, shape (samples, joints), to both."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -146,8 +146,8 @@ def _advance(robot: Humanoid, motion: Walk, rng: Rng) -> tuple[float, float, flo
 
 
 TOP = 0.45  # time at which a swinging foot is highest, as a share of its swing
+# How early a foot may touch down, as a share of its swing: its height is a few millimetres.
 EARLY = 0.13
-"""How early a foot may touch down, as a share of its swing: its height is a few millimetres."""
 BRIM = 0.01  # distance from the last toe on a platform to its edge, in [m]
 TALL = 0.855  # height of the centre of mass of TALOS, for which periods are given, in [m]
 NO_FOOT = -1  # the foot in the air while both are on the ground

@@ -43,8 +43,8 @@ from noisemodel.types import Array, Mask, Real
 
 Span = tuple[int, int]  # first sample and the one after the last
 CONTRAST = 10 ** (3 / 10)  # least ratio of the power of a fault to the twin's log in a band: 3 dB
+# Frames in which both are compared, as the classifier's (paper, Sec. III-A), in [s].
 FRAME, HOP = 0.4, 0.1
-"""Frames in which both are compared, as the classifier's (paper, Sec. III-A), in [s]."""
 LOWEST = 10.0  # lowest frequency of the bands, in [Hz]; each is a third of an octave wide
 AROUND = 5  # frames of a twin on either side of which the loudest counts, for faults of whole runs
 

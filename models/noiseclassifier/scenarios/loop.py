@@ -31,16 +31,17 @@ from noisemodel.types import Array
 SLOWEST = 0.03  # least speed of an effector that collides, in [m/s]
 PATIENCE = 0.5  # how long an obstacle waits for an effector to be that fast, in [s]
 LOOSE = 0.08  # time in which an obstacle breaks loose, in [s]
+# Share of its force that it resists with from then on: drives that hold it off for long would be
+# saturated, and let the arm fly off at the end.
 SLIDING = 0.25
-"""Share of its force that it resists with from then on: drives that hold it off for long would be
-saturated, and let the arm fly off at the end."""
 RELEASED = 0.2  # least duration of a contact whose end is an event of its own, in [s]
+# Damping of a contact per depth and stiffness, in [s/m] (Hunt and Crossley, Coefficient of
+# restitution interpreted as damping in vibroimpact, J. Applied Mechanics 1975): no force at the
+# moment of the contact, unlike a damper beside a spring.
 DISSIPATION = 1.5
-"""Damping of a contact per depth and stiffness, in [s/m] (Hunt and Crossley, Coefficient of
-restitution interpreted as damping in vibroimpact, J. Applied Mechanics 1975): no force at the
-moment of the contact, unlike a damper beside a spring."""
 FASTEST = 50.0  # A joint that is faster than this has diverged, in [rad/s] or [m/s]
 _S = np.arange(STEPS)[:, None] / STEPS
+# Cubic Hermite polynomials at the samples of a tick: from the values and slopes at its ends.
 _POSITION = np.hstack(
     (
         2 * _S**3 - 3 * _S**2 + 1,
@@ -49,11 +50,10 @@ _POSITION = np.hstack(
         TICK * (_S**3 - _S**2),
     )
 )
-"""Cubic Hermite polynomials at the samples of a tick: from the values and slopes at its ends."""
+# Their slopes.
 _VELOCITY = np.hstack(
     (6 * (_S**2 - _S) / TICK, 6 * (_S - _S**2) / TICK, 3 * _S**2 - 4 * _S + 1, 3 * _S**2 - 2 * _S)
 )
-"""Their slopes."""
 
 
 # Forces from outside.
@@ -63,10 +63,10 @@ _VELOCITY = np.hstack(
 class Force:
     """A force on the robot from outside, other than contact forces."""
 
+    # Add to ``qfrc_applied`` of MuJoCo's data at a time since the recording began, in [s].
     apply: Callable[[Any, float], None]
-    """Add to ``qfrc_applied`` of MuJoCo's data at a time since the recording began, in [s]."""
+    # The events that it was the cause of so far; of payloads and of pushes, which are planned.
     events: Callable[[], tuple[Event, ...]] = tuple
-    """The events that it was the cause of so far; of payloads and of pushes, which are planned."""
 
 
 def force(model: Any, load: Load) -> Force:
@@ -250,16 +250,16 @@ class Scene:
 class Recording:
     """The recorded signals, before rounding; of a fixed base, the last two have no columns."""
 
-    position: Array  # as the drives report it, shape (samples, joints), in [rad]
-    velocity: Array  # as the drives report it, shape (samples, joints), in [rad/s]
-    position_desired: Array  # reference of the drives, shape (samples, joints), in [rad]
-    velocity_desired: Array  # reference of the drives, shape (samples, joints), in [rad/s]
-    planned: Array  # velocities of the plan alone, shape (samples, joints), in [rad/s]
-    commanded: Array  # velocities that the controller demands, shape (samples, joints), in [rad/s]
-    torque: Array  # as the drives measure it, shape (samples, joints), in [N m]
-    contact: Array  # true contact force of each effector, shape (samples, effectors), in [N]
-    base_pose: Array  # place and quaternion (w, x, y, z), shape (samples, 7)
-    base_velocity: Array  # linear in the world's axes, angular in its own, shape (samples, 6)
+    position: Array  #: as the drives report it, shape (samples, joints), in [rad]
+    velocity: Array  #: as the drives report it, shape (samples, joints), in [rad/s]
+    position_desired: Array  #: reference of the drives, shape (samples, joints), in [rad]
+    velocity_desired: Array  #: reference of the drives, shape (samples, joints), in [rad/s]
+    planned: Array  #: velocities of the plan alone, shape (samples, joints), in [rad/s]
+    commanded: Array  #: velocities that the controller demands, shape (samples, joints), in [rad/s]
+    torque: Array  #: as the drives measure it, shape (samples, joints), in [N m]
+    contact: Array  #: true contact force of each effector, shape (samples, effectors), in [N]
+    base_pose: Array  #: place and quaternion (w, x, y, z), shape (samples, 7)
+    base_velocity: Array  #: linear in the world's axes, angular in its own, shape (samples, 6)
 
 
 def _between(before: Reference, after: Reference) -> tuple[Array, Array, Array]:

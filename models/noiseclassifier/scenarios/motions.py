@@ -136,8 +136,8 @@ class Event:
 
     label: str
     cause: str
-    start: float  # when it began, in [s]
-    stop: float  # when its cause ended, in [s]
+    start: float  #: when it began, in [s]
+    stop: float  #: when its cause ended, in [s]
     facts: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -202,8 +202,8 @@ class Picks:
     duration: float = 6.0  # default duration of a run, in [s]
 
 
+# Kinds of joint-space movements.
 REACHES = ("minimum-jerk", "trapezoid", "spline", "sines", "teleoperation")
-"""Kinds of joint-space movements."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -54,14 +54,14 @@ class Gait:
 
 TROT = Gait((0, 1, 1, 0), 0.62, level=True)  # diagonal pairs
 STAND = "stand"  # name of the gait without steps
+# By name: "walk" is the lateral sequence, one foot at a time: rear left, front left, rear right,
+# front right; a "pace" is by sides.
 GAITS = {
     "trot": TROT,
     "walk": Gait((1, 3, 0, 2), 0.8, period=1.8),
     "pace": Gait((0, 1, 0, 1), 0.62, period=0.9),
     STAND: TROT,  # without a step
 }
-"""By name: "walk" is the lateral sequence, one foot at a time: rear left, front left, rear right,
-front right; a "pace" is by sides."""
 
 
 @dataclass(frozen=True)
@@ -119,13 +119,13 @@ def swings(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
     return groups[:, gait.groups]
 
 
+# X and y of a foot, in [m], and the direction of the body, in [rad].
 Foothold: TypeAlias = tuple[float, float, float]
-"""X and y of a foot, in [m], and the direction of the body, in [rad]."""
 TOP = 0.4  # share of a swing after which the foot is highest
 ACROSS = 0.8  # share of a swing after which the foot is over its next foothold
 NEAR = 0.8  # share of a swing after which a contact is planned
+# Speed at which a foot is to touch the ground, in heights of its swing per time of its descent.
 LANDING = 0.1
-"""Speed at which a foot is to touch the ground, in heights of its swing per time of its descent."""
 
 
 def progress_of(share: Array) -> Array:
@@ -234,8 +234,8 @@ def _command(way: str, robot: Quadruped, rng: Rng) -> Array:
 
 
 TILT = (0.15, 0.12)  # largest roll and pitch, in [rad]
+# Largest shift ahead, to the left and up, as a share of the height of the centre of mass.
 SHIFT = (0.08, 0.06, 0.08)
-"""Largest shift ahead, to the left and up, as a share of the height of the centre of mass."""
 FREQUENCY = (0.2, 1.5)  # frequencies of the sines, in [Hz]
 SINES = 3  # sines per axis
 POSE_FADE = 0.8  # time of fading in and out, in [s]
@@ -391,8 +391,8 @@ def turned(yaw: Array, plane: Array) -> Array:
 
 POSITION_GAIN = 1.0  # rate of the correction per distance from the planned path, in [1/s]
 VELOCITY_FILTER = 0.05  # time constant of the low-pass on the measured velocity, in [s]
+# Share of its height below which, and tilt above which, in [rad], the robot has fallen.
 LOWEST, STEEPEST = 0.5, 0.7
-"""Share of its height below which, and tilt above which, in [rad], the robot has fallen."""
 
 
 class StateEstimate:
@@ -433,8 +433,8 @@ class StateEstimate:
 
 
 BALANCE = 0.7  # gain of the foot placement on the offset of the capture point
+# Largest distance of feet from their planned place, as a share of the robot's height.
 FURTHEST = 0.3
-"""Largest distance of feet from their planned place, as a share of the robot's height."""
 FIXED = 0.8  # share of its path after which the place of a foot is fixed
 DESCENDING = 0.5  # share of its path after which a foot may touch down early
 CONTACT = 0.15  # force above which a foot is in contact, as a share of the weight
@@ -505,8 +505,8 @@ class Feet:
         return self._rise
 
 
+# Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²] and [m/s²].
 HIGHEST_ACCELERATION = 1500.0
-"""Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²] and [m/s²]."""
 
 
 class TrotControl:
@@ -584,8 +584,8 @@ class TrotControl:
         return np.asarray((torque - load @ self._body.heights - push @ self._body.planes)[6:])
 
 
+# Slice of the horizontal velocity of the centre of mass in the planned rates.
 _CENTRE = slice(-6, -4)
-"""Slice of the horizontal velocity of the centre of mass in the planned rates."""
 
 
 def _rates(plan: GaitPlan) -> Array:
@@ -596,8 +596,8 @@ def _rates(plan: GaitPlan) -> Array:
     return np.asarray(rates)
 
 
+# Ticks before the recording during which the robot comes to rest under its unknown load.
 SETTLING = 400
-"""Ticks before the recording during which the robot comes to rest under its unknown load."""
 ATTITUDE_NOISE = 1e-4  # standard deviation of the measured attitude per tick, in [rad]
 VELOCITY_NOISE = 5e-3  # standard deviation of the measured velocity per tick, in [m/s]
 

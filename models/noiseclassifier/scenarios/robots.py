@@ -11,11 +11,11 @@ from typing import Any, ClassVar, Self
 from noiseclassifier.scenarios.motions import Effector, Sole, Tip, Units, multiplied
 
 LEGS = 12  # how many of a humanoid's drives, the first ones, are in its legs
+# Drives of an upper body, relative to the legs' drives.
 UPPER = {
     "stiffness": 0.2, "damping": 0.2, "torque": 0.25,
     "armature": 0.2, "friction": 0.2, "viscous": 0.2,
 }  # fmt: skip
-"""Drives of an upper body, relative to the legs' drives."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,12 +316,12 @@ def _read() -> Mapping[str, Simulated]:
 
 
 WIDE = _read()  # all robots of the wide domains, by name
+# The robots of the scenarios, by name.
 ROBOTS: Mapping[str, Simulated] = MappingProxyType(
     {
         name: WIDE[name]
         for name in ("talos", "g1", "go2", "solo12", "anymal", "panda", "ur5", "ur10")
     }
 )
-"""The robots of the scenarios, by name."""
+# Robots that are never trained on, by choice or by licence (docs/robots.md).
 TARGETS = ("xarm7", "tiago_no_hand", "a1", "hyq", "talos")
-"""Robots that are never trained on, by choice or by licence (docs/robots.md)."""

@@ -41,14 +41,12 @@ from noisemodel.types import Array
 if TYPE_CHECKING:
     from noiseclassifier.scenarios.loop import Recording, Scene
 
+# Versions of the simulations; they increase whenever a seed gives another run than before. The
+# third of wide domains only adds faults of whole runs: others are as in the second.
 RECIPE, WIDE_RECIPE, FIRST_WIDE_RECIPE = 3, 3, 2
-"""Versions of the simulations; they increase whenever a seed gives another run than before.
-
-The third of wide domains only adds faults of whole runs: others are as in the second.
-"""
 SHORTEST = 3.0  # least duration of a scenario, in which every defect can act, in [s]
+# Name of a run of wide domains without a fault, the twin of all others of its robot and seed.
 GOOD = "good"
-"""Name of a run of wide domains without a fault, the twin of all others of its robot and seed."""
 FIRST = 10_000  # least seed of wide domains: names of their runs differ from those of the scenarios
 DURATION = 6.0  # of a run of wide domains, in [s]
 SLOW = 2000.0  # rate at which most of these runs are kept, in [Hz]
@@ -57,18 +55,18 @@ LAG = 0.6  # most phase that delay and filters take from a velocity loop at its 
 LOOP_MARGIN = 0.5  # most of the damping that they take from a position loop
 SOFT = 0.5  # scale of the position gains below which a robot moves as one with soft drives
 SAME = 0.1  # contacts of a run and of its twin are the same if they start so close together, in [s]
+# Share of a fault-free motion above ``FAST`` from which on its drives rattle: no good run.
 RATTLE = 0.15
-"""Share of a fault-free motion above ``FAST`` from which on its drives rattle: no good run."""
 FAST, AUDIBLE = 40.0, 0.3  # lowest frequency of rattling, in [Hz], and its least level, in [rad/s]
 
 
 # The table.
 
+# The paper's bands of oscillation, in [Hz].
 BANDS: tuple[tuple[int, int], ...] = (
     (20, 30), (30, 40), (40, 50), (50, 60), (60, 100), (100, 150), (150, 250), (250, 350),
     (900, 1000),
 )  # fmt: skip
-"""The paper's bands of oscillation, in [Hz]."""
 KINDS = {"humanoid": Walk, "quadruped": Trot, "arm": Picks}  # of motions in scenarios, by family
 _EACH = "each-band"
 
@@ -140,16 +138,16 @@ def _scenarios(given: Mapping[str, Any]) -> Iterator[Scenario]:
 
 
 _TABLE = settings("table.toml")
+# All scenarios, by name.
 SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
     {line.name: line for given in _TABLE["scenario"] for line in _scenarios(given)}
 )
-"""All scenarios, by name."""
+# Faults of drives of every family, for a while and from the first sample to the last, by name.
 ON_DRIVES, THROUGHOUT = _defects(_TABLE["drives"]), _defects(_TABLE["throughout"])
-"""Faults of drives of every family, for a while and from the first sample to the last, by name."""
+# Faults of wide domains by family and name: of drives and commands, and the family's own.
 FAULTS: Mapping[str, Mapping[str, Defect]] = MappingProxyType(
     {family: ON_DRIVES | _defects(own) for family, own in _TABLE["wide"].items()}
 )
-"""Faults of wide domains by family and name: of drives and commands, and the family's own."""
 
 
 def suited(family: str, motion: Any) -> tuple[str, ...]:

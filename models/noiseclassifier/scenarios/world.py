@@ -219,6 +219,8 @@ def box_changes(model: Any, boxes: Sequence[Box]) -> dict[int, list[tuple[int, b
     return changes
 
 
+# Sensors of the floating base and of the centre of mass, in the world's axes: positions in [m], the
+# quaternion (w, x, y, z), velocities in [m/s], the angular velocity in [rad/s].
 BASE_SENSORS = {
     "base.place": "FRAMEPOS",
     "base.turn": "FRAMEQUAT",
@@ -227,8 +229,6 @@ BASE_SENSORS = {
     "centre.place": "SUBTREECOM",
     "centre.velocity": "SUBTREELINVEL",
 }
-"""Sensors of the floating base and of the centre of mass, in the world's axes: positions
-in [m], the quaternion (w, x, y, z), velocities in [m/s], the angular velocity in [rad/s]."""
 
 
 def _add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> None:
