@@ -290,16 +290,8 @@ def demo() -> Run:
     """The demo run, with no more arrays than the inspector shows."""
     robot, scenario, seed, seconds = DEMO
     cut = scenarios.simulate(robot, scenario, seed).cut(float("-inf"), seconds)
-    return Run(
-        time=cut.time,
-        velocity=cut.velocity,
-        position=cut.position,
-        velocity_desired=cut.velocity_desired,
-        joint_names=cut.joint_names,
-        robot=cut.robot,
-        blocks=cut.blocks,
-        meta=cut.meta,
-    )
+    kept = ("time", "velocity", "position", "velocity_desired", "joint_names", "robot")
+    return Run(**{name: getattr(cut, name) for name in (*kept, "blocks", "meta")})
 
 
 if __name__ == "__main__":

@@ -33,13 +33,7 @@ class RecordingError(ModelsError):
 
 
 class RateError(ModelsError):
-    """A sample rate that no model takes.
-
-    Args:
-        rate: The rate that was given, in [Hz].
-        known: The rates that there are, in [Hz].
-        advice: What to do about it; empty if the rate is too low for all.
-    """
+    """A sample rate in [Hz] that no model takes; advice is empty if it is too low for all."""
 
     def __init__(self, rate: float, known: Iterable[float], advice: str = "") -> None:
         self.rate, self.known = rate, tuple(sorted(set(known)))

@@ -98,8 +98,7 @@ class Profile:
     #: are, and once more relative to a reference (`features.RunningReference`).
     reference: bool = False
     floor: float = 1e-6  #: added to an amplitude before its logarithm
-    #: Least standard deviation in the standardisation of features by the training set; 0 leaves them
-    #: as they are.
+    #: Least standard deviation by which features are standardised; 0 leaves them as they are.
     least_deviation: float = 0.0
     #: Support vector machines, or trees that first tell failures from `ok` and then name them
     #: (``detector``); networks and other trees are of model files of earlier versions.
