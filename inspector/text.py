@@ -1,8 +1,9 @@
-"""Text: what of files a terminal, a CI's log or a spreadsheet would take for more; progress."""
+"""Text: what a terminal, a CI's log, TOML or a spreadsheet would take for more; progress."""
 
 import re
 import sys
 from collections.abc import Iterable, Iterator
+from datetime import date, time
 from time import monotonic
 from typing import TypeVar
 
@@ -77,3 +78,16 @@ def _lines(items: Iterable[T], what: str, total: int) -> Iterator[T]:
             said = now
             left = (now - begun) / number * (total - number)
             print(f"{what}: {number} of {total}, {left:.0f} s left", file=sys.stderr, flush=True)
+
+
+def toml_shown(value: object) -> str:
+    """A value of a TOML text about as it stands there, for messages."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, date | time):  # of a day with a time, too
+        return str(value)
+    if isinstance(value, list):
+        return f"[{', '.join(map(toml_shown, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key} = {toml_shown(each)}' for key, each in value.items())}}}"
+    return repr(value)

@@ -28,7 +28,8 @@ from inspector.logs.names import (
     without_unit,
 )
 from inspector.logs.plausibility import WrongRobotError, known_limits
-from noiseclassifier.jsontext import from_toml, text_of, toml_shown
+from inspector.text import toml_shown
+from noiseclassifier.jsontext import from_toml, text_of
 from noisemodel import Robot
 from noisemodel.files import replacing
 from noisemodel.types import Array, Mask, Real

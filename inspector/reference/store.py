@@ -37,9 +37,9 @@ from inspector.reference.judging import (
     share_of_motion,
 )
 from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encoded, levels, octaves
-from inspector.text import counted, natural
+from inspector.text import counted, natural, toml_shown
 from noiseclassifier import Event
-from noiseclassifier.jsontext import from_toml, text_of, toml_shown
+from noiseclassifier.jsontext import from_toml, text_of
 from noisemodel import NoiseModelError, OutputError, Run, runfile
 from noisemodel.files import replacing
 

@@ -4,7 +4,6 @@ import json
 import re
 import stat
 import tomllib
-from datetime import date, time
 from pathlib import Path
 from typing import Any
 
@@ -56,19 +55,6 @@ def from_toml(text: str) -> dict[str, Any]:
         elif isinstance(value, int) and abs(value) >= 10**DIGITS:
             raise ValueError(f"an integer of more than {DIGITS} digits")
     return table
-
-
-def toml_shown(value: object) -> str:
-    """A value of a TOML text about as it stands there, for messages."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, date | time):  # of a day with a time, too
-        return str(value)
-    if isinstance(value, list):
-        return f"[{', '.join(map(toml_shown, value))}]"
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{key} = {toml_shown(each)}' for key, each in value.items())}}}"
-    return repr(value)
 
 
 def _check_length(text: str | bytes) -> None:
