@@ -8,11 +8,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
 # `accept` writes nothing where CI is set; the tests of that set it themselves.
 os.environ.pop("CI", None)
+hypothesis.settings.register_profile("untimed", deadline=None)  # machines differ in speed
+hypothesis.settings.load_profile("untimed")
 SHARED = Path(__file__).parents[2] / "shared"
 
 
