@@ -94,11 +94,10 @@ class Noise:
             raise ValueError("no run to check; expected one at least")
         with _readable():
             loaded = [each if isinstance(each, Run) else Run.load(each) for each in given]
+            if reason := self._config.getoption("--noise-accept"):
+                self._accept(loaded, given, scenario, reason)
+                return []
             reference = self._reference()
-        if reason := self._config.getoption("--noise-accept"):
-            with _readable():
-                self._accept(loaded, given, scenario, reference, reason)
-            return []
         verdicts = []
         for run, source in zip(loaded, given, strict=True):
             shown = "the run" if isinstance(source, Run) else str(source)
@@ -140,12 +139,18 @@ class Noise:
 
         return levels(without_placeholder(run)[0], name=scenario, **known)
 
-    def _reference(self) -> "Reference":
-        """What was accepted; nothing if there is no store yet."""
-        from inspector.reference.store import FOLDER, Reference, find
+    def _store(self) -> Path:
+        """The store that is nearest to the test, or one beside it."""
+        from inspector.reference.store import FOLDER, find
 
         folder = Path(self._node.path).parent
-        store = find(folder) or folder / FOLDER
+        return find(folder) or folder / FOLDER
+
+    def _reference(self) -> "Reference":
+        """What was accepted; nothing if there is no store yet."""
+        from inspector.reference.store import Reference
+
+        store = self._store()
         return Reference.load(store) if store.exists() else Reference(store, (), stored=True)
 
     def _accept(
@@ -153,10 +158,9 @@ class Noise:
         runs: "Sequence[Run]",
         given: "Sequence[Run | str | Path]",
         scenario: str,
-        reference: "Reference",
         reason: str,
     ) -> None:
-        """Accept runs as repetitions of a scenario."""
+        """Accept runs as repetitions of a scenario; another test process may do so, too."""
         from inspector.reference.store import accept_into, digest, wanted_in, who
 
         measured, events = [], {}
@@ -165,7 +169,7 @@ class Noise:
             measured.append(self._levels(run, scenario, file=file, sha256=digest(run)))
             events[file] = self._judged(run, scenario)[1].events
         found = wanted_in(measured, events)
-        accept_into(reference.path, measured, wanted=found, reason=reason, by=who(), renames=False)
+        accept_into(self._store(), measured, wanted=found, reason=reason, by=who(), renames=False)
 
     def _allowed(self, allow: "str | Iterable[Allowed]") -> tuple[Allowed, ...]:
         """What may be there, of classes that there are."""
