@@ -184,9 +184,9 @@ def test_obstacles_and_forces_of_a_quadruped_are_in_its_own_units(robot):
     assert len(boxes) == 2
     for box in boxes:
         assert robot.height * 0.3 < box.top < robot.height * 0.8  # lower than feet are lifted
-        assert box.half[0] == pytest.approx(0.2 * plan.size)
+        assert box.half[0] == pytest.approx(0.2 * plan.units.length)
     for event in drawn("force-jump", plan).events:
-        assert 2.0 * plan.weight <= abs(event.facts["size"]) <= 3.5 * plan.weight
+        assert 2.0 * plan.units.force <= abs(event.facts["size"]) <= 3.5 * plan.units.force
 
 
 def test_ground_ends_at_an_edge_where_each_foot_steps_down_once():

@@ -16,7 +16,7 @@ from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import column_signal, time_column
 from inspector.logs.read import read_log
 from inspector.reference import store
-from inspector.text import counted, natural, plain
+from inspector.text import counted, natural, plain, toml_shown
 from inspector.training import tune
 from inspector.verdict import classify_file
 from noiseclassifier import jsontext, noisytest
@@ -143,7 +143,7 @@ def test_a_text_may_be_of_64_mib_and_no_more(monkeypatch, tmp_path):
 def test_values_are_shown_about_as_they_stand_in_toml():
     text = 'a = {b = [true, false], c = 1979-05-27, d = 07:32:00, e = "x", f = 1.5}'
     shown = "{b = [true, false], c = 1979-05-27, d = 07:32:00, e = 'x', f = 1.5}"
-    assert jsontext.toml_shown(jsontext.from_toml(text)["a"]) == shown
+    assert toml_shown(jsontext.from_toml(text)["a"]) == shown
 
 
 @pytest.mark.parametrize("settings", ["[" * 100_000, "[]", "9" * 5000, '{"format": NaN}', "\xff"])
