@@ -282,8 +282,7 @@ def record(
     The overlay is added to the reference of the drives: heights of the effectors and their rates,
     shape (samples, effectors, 2), in [m] and [m/s].
     """
-    model = scene.model
-    data = mujoco.MjData(model)
+    model, data = scene.model, mujoco.MjData(scene.model)
     data.qpos[:] = scene.start
     samples, joints = encoder_error.shape
     base = model.nq - joints
