@@ -119,7 +119,7 @@ Options
 LOGS = "How logs are read (--robot, --rate, --map, ...): `inspector help logs`."
 # Names of options that are written; all other paths are read.
 OUTPUTS = frozenset(
-    ("output", "save", "csv", "picture", "report", "labels_to", "save_mapping", "resume", "train")
+    ("output", "save", "csv", "picture", "report", "save_mapping", "resume", "train")
 )
 # Names of parameters that no file of settings sets.
 UNSET = OUTPUTS | {"overwrite", "write", "in_ci", "help"}

@@ -2,7 +2,6 @@ import csv
 import json
 import sys
 from dataclasses import replace
-from xml.etree import ElementTree
 
 import numpy as np
 import pyarrow.parquet
@@ -28,8 +27,7 @@ def exported(demo, tmp_path_factory):
     """The demo in all formats, and what was to be written."""
     folder = tmp_path_factory.mktemp("export")
     for suffix in ("mcap", "csv", "parquet"):
-        layouts = suffix == "mcap"
-        content = export(demo, folder / f"demo.{suffix}", LIBRARY, layouts=layouts)
+        content = export(demo, folder / f"demo.{suffix}", LIBRARY)
     return folder, content
 
 
@@ -222,58 +220,6 @@ def test_stamps_are_absolute_and_a_run_before_time_0_is_shifted(tmp_path, change
     found = messages(tmp_path / "run.mcap", "/noise")
     assert [stamp for stamp, _ in found[:2]] == stamps
     assert found[0][1]["time"] == run.time[0]
-
-
-# --- layouts
-
-
-def test_every_line_of_the_layouts_is_in_the_file(exported, demo):
-    folder, _ = exported
-    with (folder / "demo.mcap").open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    fields = {
-        f"{channel.topic}.{field}"
-        for channel in summary.channels.values()
-        if channel.message_encoding == "json"
-        for field in json.loads(summary.schemas[channel.schema_id].data)["properties"]
-    }
-    topics = ("/joint_states", "/joint_states/desired")
-    places = {f"{topic}.velocity[{i}]" for topic in topics for i in range(7)}
-    foxglove = json.loads((folder / "demo.foxglove.json").read_text())
-    panels = foxglove["configById"]
-    shown = {path["value"] for panel in panels.values() for path in panel.get("paths", ())}
-    assert shown <= fields | places
-    assert shown >= places | {"/noise.simplified", "/labels.failure", "/class.label"}
-    assert panels["RosOut!findings"]["topicToRender"] == "/log"
-    assert sorted(panels) == sorted(panels_of(foxglove["layout"]))
-    joints = {f"{topic}/{name}/velocity" for topic in topics for name in demo.joint_names}
-    curves = ElementTree.parse(folder / "demo.plotjuggler.xml").iter("curve")
-    names = {curve.get("name") for curve in curves}
-    assert names == joints | {
-        "/noise/simplified",
-        "/level/level",
-        "/labels/failure",
-        "/labels/alarm",
-    }
-
-
-def panels_of(layout):
-    """Names of the panels of a layout of Foxglove."""
-    if isinstance(layout, str):
-        return [layout]
-    return [*panels_of(layout["first"]), *panels_of(layout["second"])]
-
-
-def test_layouts_are_for_mcap_and_replace_nothing_unasked(tmp_path):
-    plain_run().save(tmp_path / "run.npz")
-    status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "a.csv", "--layouts")
-    assert (status, err) == (2, f"inspector: {tmp_path / 'a.csv'}: layouts are for .mcap\n")
-    (tmp_path / "run.foxglove.json").write_text("mine")
-    status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.mcap", "--layouts")
-    assert status == 3
-    assert "run.foxglove.json: exists already" in err
-    assert (tmp_path / "run.foxglove.json").read_text() == "mine"
-    assert not (tmp_path / "run.mcap").exists()
 
 
 # --- bad input

@@ -51,7 +51,6 @@ WRITERS = {
 # Commands that write a folder.
 FOLDERS = {
     "import": ("import", "logs", "-o", "out"),
-    "labels-to": ("classify", "good", "--labels-to", "out"),
     "report": ("classify", "good", "--report", "out"),
     "diff": ("diff", "good", "good", "--report", "out"),
     "accept": ("accept", "good", "--reason", "good", "-o", "out"),

@@ -142,8 +142,8 @@ def test_episodes_are_runs_of_their_own(episodes):
         open_run(episodes, Reading(ReadOptions(rate=100.0), episodes=("demo_7",)))
 
 
-def test_episodes_are_classified_one_by_one(episodes, tmp_path):
-    _, out, err = call("classify", episodes, "--rate", 100, "--labels-to", tmp_path / "out")
+def test_episodes_are_classified_one_by_one(episodes):
+    _, out, err = call("classify", episodes, "--rate", 100)
     assert re.search(r"demo +ok +2 runs", out)  # two repetitions of one scenario are a row
     assert err.count("read as 1 joint") == 1  # once for those that were read alike
     assert "demo_0 and 1 more: read as" in err

@@ -33,7 +33,6 @@ from inspector.commands.shared import (
     written,
 )
 from inspector.errors import EXIT, InspectorError, Status, Unknown
-from inspector.export.labels import label_paths, write_findings
 from inspector.library import Library, load_library
 from inspector.logs.read import left_out, sources
 from inspector.reference import store
@@ -58,8 +57,6 @@ VerdictFormat = Annotated[
 Verbose = Annotated[
     bool, option("All that was assumed, and the runs of scenarios.", "--verbose", "-v")
 ]
-LabelsTo = Annotated[Path | None, option("Write the findings to this folder, one file per run.")]
-LabelsFormat = Annotated[str, option("Format of these files: noisytest, csv or audacity.")]
 RunsReport = Annotated[
     Path | None, option("Write index.html with a picture of each run to this folder.")
 ]
@@ -86,8 +83,6 @@ def classify(
     jobs: NumberOfJobs = 1,
     dask: Dask = "",
     model: ModelFiles = None,
-    labels_to: LabelsTo = None,
-    labels_format: LabelsFormat = "audacity",
     write: Write = None,
     report: RunsReport = None,
     report_url: ReportUrl = "",
@@ -113,7 +108,10 @@ def classify(
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
     formats = FORMATS | {"text": partial(text, verbose=verbose)}
     outputs = outputs_of(write, formats, overwrite=overwrite)
-    outputs |= _folders(shown, labels_to, labels_format, report, overwrite=overwrite)
+    if report:
+        require("a report")
+        prepare(report, html.PAGE, overwrite=overwrite)
+        outputs[report] = partial(html.write_index, folder=report)
 
     classified = classify_files(
         found,
@@ -148,21 +146,6 @@ def _classes(given: Sequence[str], library: Library) -> tuple[str, ...]:
                 param_hint="'--fail-on-class'",
             )
     return tuple(names)
-
-
-def _folders(
-    runs: Sequence[Path], labels: Path | None, form: str, report: Path | None, *, overwrite: bool
-) -> dict[Path, Callable[[Sequence[Verdict]], object]]:
-    """What writes folders of label files, and of a page with pictures; both are made."""
-    outputs: dict[Path, Callable[[Sequence[Verdict]], object]] = {}
-    if labels:
-        targets = label_paths(runs, labels, format_name=form, overwrite=overwrite)
-        outputs[labels] = partial(write_findings, targets=targets, overwrite=overwrite)
-    if report:
-        require("a report")
-        prepare(report, html.PAGE, overwrite=overwrite)
-        outputs[report] = partial(html.write_index, folder=report)
-    return outputs
 
 
 def _judged(

@@ -86,9 +86,6 @@ def export(
     ] = None,
     kind: Annotated[str, option("Extended noise: normal, rms, mean, paper, A, B or C.")] = "normal",
     model: ModelFiles = None,
-    layouts: Annotated[
-        bool, option("Write layouts for Foxglove and PlotJuggler beside .mcap.", "--layouts")
-    ] = False,
     overwrite: Overwrite = False,
 ) -> None:
     """Write noise, labels and scores for other tools.
@@ -107,16 +104,13 @@ def export(
     if labels:
         _labels(recorded, library, labels, output, overwrite=overwrite)
         return
-    from inspector.export.tables import LAYOUTS
     from inspector.export.tables import export as write
 
-    written = write(recorded, output, library, kind=kind, overwrite=overwrite, layouts=layouts)
+    written = write(recorded, output, library, kind=kind, overwrite=overwrite)
     typer.echo(f"{run}: {written.analysis.headline}")
     for remark in written.remarks:
         typer.echo(f"  {remark}")
     typer.echo(f"{output}: {written}")
-    if layouts:
-        typer.echo(f"  layouts: {', '.join(str(output.with_suffix(each)) for each in LAYOUTS)}")
 
 
 def _annotate(run: Run, labels: Path, output: Path, *, overwrite: bool) -> None:

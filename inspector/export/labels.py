@@ -11,21 +11,20 @@ Times are the run's, in [s]; numbers are written with all digits.
 import csv
 import io
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
 from typing import NamedTuple
 
-from inspector.errors import InspectorError, OptionError, Status
+from inspector.errors import InspectorError
 from inspector.text import cell, uncell
-from inspector.verdict import Verdict
 from noiseclassifier import Event
 from noiseclassifier.errors import AnnotationError
 from noiseclassifier.jsontext import text_of
 from noiseclassifier.noisytest import END, parse_annotations
 from noisemodel import Block, Run
-from noisemodel.files import refuse_existing, replacing
+from noisemodel.files import write_whole
 
 COLUMNS = ("start", "stop", "label")
 Span = Block | Event
@@ -33,13 +32,10 @@ Span = Block | Event
 Entry = tuple[Block, str]
 
 
-def write_labels(
-    spans: Sequence[Span], path: Path, *, format_name: str = "", overwrite: bool = False
-) -> None:
-    """Write annotated blocks or findings to a file, in a format by name or by its suffix."""
-    text = format_of(path, format_name).render(spans, path)
-    with replacing(path, overwrite=overwrite) as temporary:
-        temporary.write_bytes(text.encode())
+def write_labels(spans: Sequence[Span], path: Path, *, overwrite: bool = False) -> None:
+    """Write annotated blocks or findings to a file, in the format of its suffix."""
+    text = format_of(path).render(spans, path)
+    write_whole(path, text, overwrite=overwrite)
 
 
 def read_labels(path: Path, run: Run) -> tuple[Block, ...]:
@@ -82,38 +78,6 @@ def _checked(entries: Sequence[Entry], run: Run) -> tuple[Block, ...]:
             )
         blocks.append(block)
     return tuple(sorted(blocks))
-
-
-def label_paths(
-    runs: Sequence[Path], folder: Path, *, format_name: str, overwrite: bool = False
-) -> dict[Path, Path]:
-    """Label files of runs in a folder, which is made, checked before the runs are classified."""
-    suffix = format_of(folder, format_name).suffix
-    targets: dict[Path, Path] = {}
-    for run in dict.fromkeys(runs):
-        target = folder / f"{run.stem}{suffix}"
-        if twin := next((other for other, path in targets.items() if path == target), None):
-            raise InspectorError(f"the labels of {twin} and {run} would both be {target}")
-        targets[run] = target
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InspectorError(f"{folder}: cannot be made a folder ({error.strerror})") from error
-    for target in targets.values():
-        refuse_existing(target, overwrite=overwrite)
-    return targets
-
-
-def write_findings(
-    verdicts: Iterable[Verdict],
-    targets: Mapping[Path, Path],
-    *,
-    overwrite: bool = False,
-) -> None:
-    """Write the findings of each run that was classified; one without has an empty file."""
-    for verdict in verdicts:
-        if verdict.status in (Status.OK, Status.FINDINGS):
-            write_labels(verdict.events, targets[verdict.path], overwrite=overwrite)
 
 
 def _time(text: str, where: str) -> float:
@@ -192,29 +156,24 @@ def _parse_noisytest(text: str) -> Iterator[Entry]:
 
 
 class Format(NamedTuple):
-    """A format of label files: its suffix, what writes labels, and what reads them."""
+    """A format of label files: its name, what writes labels, and what reads them."""
 
-    suffix: str
+    name: str
     render: Callable[[Sequence[Span], Path], str]
     parse: Callable[[str], Iterator[Entry]]
 
 
-# All formats by name.
+# All formats by suffix.
 FORMATS = {
-    "noisytest": Format(".toml", _render_noisytest, _parse_noisytest),
-    "csv": Format(".csv", _render_csv, _parse_csv),
-    "audacity": Format(".txt", _render_audacity, _parse_audacity),
+    ".toml": Format("noisytest", _render_noisytest, _parse_noisytest),
+    ".csv": Format("csv", _render_csv, _parse_csv),
+    ".txt": Format("audacity", _render_audacity, _parse_audacity),
 }
 
 
-def format_of(path: Path, name: str = "") -> Format:
-    """Format of a file, by name, else by its suffix."""
-    if name and name not in FORMATS:
-        raise OptionError(f"no format {name!r} of labels; there are {', '.join(FORMATS)}")
-    if name:
-        return FORMATS[name]
-    for each in FORMATS.values():
-        if path.suffix.lower() == each.suffix:
-            return each
-    known = ", ".join(f"{each.suffix} ({name})" for name, each in FORMATS.items())
+def format_of(path: Path) -> Format:
+    """Format of a file by its suffix."""
+    if found := FORMATS.get(path.suffix.lower()):
+        return found
+    known = ", ".join(f"{suffix} ({each.name})" for suffix, each in FORMATS.items())
     raise InspectorError(f"{path}: no format of labels has this suffix; there are {known}")

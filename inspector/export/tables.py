@@ -1,4 +1,4 @@
-"""Export of a run's noise, labels and scores: MCAP with layouts, CSV and Parquet.
+"""Export of a run's noise, labels and scores: MCAP, CSV and Parquet.
 
 /joint_states and /joint_states/desired of an MCAP are ROS 2 JointStates, a message for each sample,
 which `inspector import` reads as well. The other topics are JSON: /noise for each sample, /level
@@ -6,10 +6,6 @@ each 50 ms, /labels at the middle of each frame, /class where the class changes,
 /annotations at their start, and /log with a line for each finding. Times are the run's,
 added to the first stamp in its ``meta``. MCAP has no negative times: a run that starts before 0 is
 shifted.
-
-The layouts for Foxglove and PlotJuggler show, from top to bottom: the class (in Foxglove), the
-noise, its level above 10 Hz, the probability of a failure with the alarm threshold, and the
-velocities of the joints; in Foxglove the findings are listed at the left.
 """
 
 import csv
@@ -20,14 +16,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import Any, NamedTuple
-from xml.etree import ElementTree
+from typing import Any
 
 import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector import colors
 from inspector.analysis import Analysis, analyse, estimate, robot_known
 from inspector.audit.audit import summary
 from inspector.errors import InspectorError, OptionError
@@ -341,181 +335,28 @@ def _states(
         yield stamp, topic, ros.serialize_cdr(message, JOINT_STATE)
 
 
-# --- layouts
-
-LEVEL_TITLE = "level above 10 Hz [dB re 1 rad/s]"
-LISTED = 12  # a legend with more lines would cover the plot
-
-
-class Line(NamedTuple):
-    """A line of a plot: its message path in Foxglove, its curve in PlotJuggler."""
-
-    path: str
-    curve: str
-    label: str
-    color: str
-
-
-class Plot(NamedTuple):
-    """A plot over time, and its share of the height."""
-
-    title: str
-    share: float
-    lines: list[Line]
-
-
-def _plots(content: Content) -> dict[str, Plot]:
-    """The plots of both layouts, from top to bottom."""
-
-    def line(topic: str, field: str, label: str, color: colors.Color) -> Line:
-        return Line(f"{topic}.{field}", f"{topic}/{field}", label, _hex(color))
-
-    noise = line("/noise", "simplified", "noise, simplified [rad/s]", colors.NOISE)
-    level = line("/level", "level", LEVEL_TITLE, colors.NOISE)
-    plots = {"noise": Plot("Noise", 2.0, [noise]), "level": Plot(LEVEL_TITLE, 1.5, [level])}
-    if content.analysis.labels is not None:
-        name = "probability of a failure"
-        lines = [line("/labels", "failure", name, colors.CLASSES["impact"])]
-        if content.analysis.alarm is not None:
-            lines.append(line("/labels", "alarm", "alarm threshold", colors.THRESHOLD))
-        plots["failure"] = Plot(name.capitalize(), 1.5, lines)
-    for topic, (names, parts) in joint_signals(content).items():
-        if "velocity" in parts:
-            what = "measured" if topic == MEASURED else "desired"
-            lines = [
-                Line(f"{topic}.velocity[{place}]", f"{topic}/{name}/velocity", name, _hex(color))
-                for place, (name, color) in enumerate(
-                    zip(names, colors.of_series(len(names)), strict=True)
-                )
-            ]
-            plots[f"velocities, {what}"] = Plot(f"Velocities, {what} [rad/s]", 2.0, lines)
-    return plots
-
-
-def foxglove(content: Content) -> str:
-    """A layout of Foxglove, to be imported there, as JSON."""
-    panels: dict[str, dict[str, Any]] = {}
-    shares: list[tuple[str, float]] = []
-    if content.analysis.labels is not None:
-        state = {"value": "/class.label", "label": "class", "timestampMethod": "receiveTime"}
-        panels["StateTransitions!class"] = {"paths": [state], "isSynced": True}
-        shares.append(("StateTransitions!class", 1.0))
-    for name, plot in _plots(content).items():
-        panels[f"Plot!{name}"] = _foxglove_plot(plot)
-        shares.append((f"Plot!{name}", plot.share))
-    if "Plot!failure" in panels:
-        panels["Plot!failure"] |= {"minYValue": 0, "maxYValue": 1}
-    layout: Any = _stacked(shares)
-    if content.analysis.findings:
-        panels["RosOut!findings"] = {"topicToRender": "/log", "minLogLevel": 1}
-        parts = {"first": "RosOut!findings", "second": layout, "splitPercentage": 25}
-        layout = {"direction": "row", **parts}
-    whole = {
-        "configById": panels,
-        "globalVariables": {},
-        "userNodes": {},
-        "playbackConfig": {"speed": 1},
-        "layout": layout,
-    }
-    return json.dumps(whole, indent=1) + "\n"
-
-
-def plotjuggler(content: Content) -> str:
-    """A layout of PlotJuggler, to be loaded there after the MCAP, as XML."""
-    plots, element = _plots(content), ElementTree.SubElement
-    root = ElementTree.Element("root")
-    window = element(root, "tabbed_widget", {"parent": "main_window", "name": "Main Window"})
-    tab = element(window, "Tab", containers="1", tab_name="noise-inspector")
-    splitter = element(element(tab, "Container"), "DockSplitter", orientation="-")
-    splitter.set("count", str(len(plots)))
-    splitter.set("sizes", ";".join([f"{1 / len(plots):.6f}"] * len(plots)))
-    for name, each in plots.items():
-        area = element(splitter, "DockArea", name=name)
-        plot = element(area, "plot", mode="TimeSeries", style="Lines", flip_x="false")
-        plot.set("flip_y", "false")
-        for line in each.lines:
-            element(plot, "curve", name=line.curve, color=line.color)
-    element(window, "currentTabIndex", index="0")
-    element(root, "use_relative_time_offset", enabled="1")
-    ElementTree.indent(root, " ")
-    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
-
-
-def _foxglove_plot(plot: Plot) -> dict[str, Any]:
-    shown = {"enabled": True, "showLine": True, "timestampMethod": "receiveTime"}
-    return {
-        "title": plot.title,
-        "foxglovePanelTitle": plot.title,
-        "paths": [
-            {"value": line.path, "label": line.label, "color": line.color, **shown}
-            for line in plot.lines
-        ],
-        "isSynced": True,
-        "showLegend": 1 < len(plot.lines) <= LISTED,
-        "legendDisplay": "floating",
-        "showXAxisLabels": True,
-        "showYAxisLabels": True,
-        "xAxisVal": "timestamp",
-    }
-
-
-def _stacked(panels: list[tuple[str, float]]) -> Any:
-    """Panels above each other, by share of the height."""
-    (first, share), *rest = panels
-    if not rest:
-        return first
-    percent = round(100 * share / sum(each for _, each in panels), 1)
-    parts = {"first": first, "second": _stacked(rest), "splitPercentage": percent}
-    return {"direction": "column", **parts}
-
-
-def _hex(color: colors.Color) -> str:
-    return "#{:02x}{:02x}{:02x}".format(*color)
-
-
 # Writers by suffix.
 WRITERS: dict[str, Callable[[Content, Path], None]] = {
     ".mcap": write_mcap,
     ".csv": write_csv,
     ".parquet": write_parquet,
 }
-# Layouts by the suffix that takes the place of ``.mcap``.
-LAYOUTS: dict[str, Callable[[Content], str]] = {
-    ".foxglove.json": foxglove,
-    ".plotjuggler.xml": plotjuggler,
-}
 
 
 def export(
-    run: nm.Run,
-    path: Path,
-    library: Library,
-    *,
-    kind: str = "normal",
-    overwrite: bool = False,
-    layouts: bool = False,
+    run: nm.Run, path: Path, library: Library, *, kind: str = "normal", overwrite: bool = False
 ) -> Content:
-    """Write noise, labels and scores of a run.
+    """Write noise, labels and scores of a run to a file, ``.mcap``, ``.csv`` or ``.parquet``.
 
     Args:
-        path: The file to write, ``.mcap``, ``.csv`` or ``.parquet``.
         kind: Kind of the extended noise, see ``noisemodel.extended``.
-        layouts: Whether to write layouts for Foxglove and PlotJuggler beside it, see `LAYOUTS`.
     """
     write = WRITERS.get(path.suffix.lower())
     if write is None:
-        raise OptionError(
-            f"{path}: no format of exports has this suffix; there are {', '.join(WRITERS)}"
-        )
-    if layouts and write is not write_mcap:
-        raise OptionError(f"{path}: layouts are for .mcap")
-    others = {path.with_suffix(suffix): make for suffix, make in LAYOUTS.items() if layouts}
-    for each in (path, *others):
-        refuse_existing(each, overwrite=overwrite)
+        known = ", ".join(WRITERS)
+        raise OptionError(f"{path}: no format of exports has this suffix; there are {known}")
+    refuse_existing(path, overwrite=overwrite)
     content = collect(run, library, kind=kind)
     with replacing(path, overwrite=overwrite) as temporary:
         write(content, temporary)
-    for each, make in others.items():
-        with replacing(each, overwrite=overwrite) as temporary:
-            temporary.write_text(make(content), encoding="utf-8")
     return content
