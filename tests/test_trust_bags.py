@@ -72,9 +72,8 @@ def test_frames_of_zstandard_without_a_size_are_counted_too(limit, tmp_path):
 
     compressor = zstandard.ZstdCompressor(write_content_size=False).compressobj()
     data = compressor.compress(bytes(2**25)) + compressor.flush()
-    bags.begin(tmp_path)
     with pytest.raises(ValueError, match="unpacks to"):
-        bags.unpack("zstd", data)
+        bags.Unpacker(tmp_path).chunk("zstd", data)
 
 
 @pytest.mark.parametrize(

@@ -438,7 +438,7 @@ def _read_definition(path: Path) -> None:
     """The definition of a controller's state in a bag, and then a message of it."""
     text = path.read_text(errors="replace")
     for ros1, data in enumerate(_states()):
-        decode = decoder(path, Topic("/state", STATE, text), ros1=bool(ros1))
+        decode = decoder(path, Topic("/state", STATE, text, bool(ros1)))
         decode(data)
 
 

@@ -521,7 +521,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
     if is_matlab:
         return LogReader(
-            "MATLAB 5", ("",), lambda *_: log_of_variables(path, held(path), options), listing
+            "MATLAB 5", ("",), lambda _: log_of_variables(path, held(path), options), listing
         )
     if str(arrays.get("format", "")).startswith(SAMPLE):
         raise LogError(path, SAMPLE_PROBLEM)
@@ -533,7 +533,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     return LogReader(
         "npz",
         tuple(episodes_of(arrays)),
-        lambda episode, progress: _read(path, options, episode),
+        lambda episode: _read(path, options, episode),
         listing,
         run,
     )

@@ -1,26 +1,26 @@
-"""Log of a ROS bag: read by rosbags where it is intact, and else record by record.
+"""Log of a ROS bag: its records one by one, to where the file ends or is damaged.
 
-An MCAP file that was cut off has lost the index at its end; rosbags refuses one with other messages
-than ROS has, as Foxglove writes it. https://mcap.dev/spec
+Neither an index nor a ``metadata.yaml`` is read: a bag that was cut off has lost them, and they may
+state anything.
+MCAP: https://mcap.dev/spec
 A record of ROS 1 is a header of ``name=value`` fields and data, each with its length before it;
 chunks hold records in turn, perhaps compressed. http://wiki.ros.org/Bags/Format/2.0
 Messages are deserialised by the definitions that are known here, never by the one in a bag: that is
-code for a decoder, and may state anything.
+code for a decoder.
 """
 
 import bz2
 import sqlite3
 import struct
 from array import array
-from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache
 from io import BytesIO
 from pathlib import Path
-from types import SimpleNamespace
+from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO, Self, TypeAlias
 
 import numpy as np
@@ -31,10 +31,10 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from inspector.errors import LogError
-from inspector.logs.log import Field, Log, LogReader, Progress, Stamps
+from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import listed
-from inspector.text import counted
+from inspector.text import counted, natural
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 
 # Errors that rosbags lets through on messages that are damaged.
@@ -75,7 +75,10 @@ class Topic:
     name: str
     type: str
     definition: str = ""  # text of the type's definition, if the bag has it
-    count: int = -1  # messages, -1 if unknown
+    ros1: bool = False  # whether messages are serialised in the format of ROS 1
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.type})"
 
 
 # Messages of bytes
@@ -112,15 +115,15 @@ def _fields_in(definition: str) -> list[str]:
     return [each[1] for each in words if len(each) == 2]
 
 
-def decoder(path: Path, topic: Topic, *, ros1: bool) -> Callable[[bytes], Any]:
+def decoder(path: Path, topic: Topic) -> Callable[[bytes], Any]:
     """What deserialises the messages of a topic, by the version of their type that fits."""
     stores: list[Any] = []
 
     def decode(data: bytes) -> Any:
         problem: Exception | None = None
-        stores[:] = stores or _stores(path, topic, ros1=ros1)
+        stores[:] = stores or _stores(path, topic)
         for store in stores:
-            parse = store.deserialize_ros1 if ros1 else store.deserialize_cdr
+            parse = store.deserialize_ros1 if topic.ros1 else store.deserialize_cdr
             try:
                 message = parse(data, topic.type)
             except DAMAGE as error:
@@ -134,7 +137,7 @@ def decoder(path: Path, topic: Topic, *, ros1: bool) -> Callable[[bytes], Any]:
     return decode
 
 
-def _stores(path: Path, topic: Topic, *, ros1: bool) -> list[Any]:
+def _stores(path: Path, topic: Topic) -> list[Any]:
     """What may deserialise messages: several where versions of their type are known."""
     definitions = [""]
     if topic.type in TRANSFORMS:
@@ -145,7 +148,7 @@ def _stores(path: Path, topic: Topic, *, ros1: bool) -> list[Any]:
         if not definitions:
             problem = f"{topic.name}: the definition of {topic.type} is none that is known"
             raise LogError(path, problem)
-    return [_store(topic.type, definition, ros1) for definition in definitions]
+    return [_store(topic.type, definition, topic.ros1) for definition in definitions]
 
 
 @cache  # a store takes 20 ms to make
@@ -304,11 +307,11 @@ class MotionReader:
     Publishers that share a topic, such as an arm's and a gripper's, have a group each.
     """
 
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self._decode = decoder(path, topic, ros1=ros1)
+    def __init__(self, path: Path, topic: Topic) -> None:
+        self._decode = decoder(path, topic)
         self._topic = topic
         self._rows, self._signals = MOTION[topic.type]
-        self._has_layout = topic.type == JOINT_STATE and not ros1
+        self._has_layout = topic.type == JOINT_STATE and not topic.ros1
         if topic.type == JOINT_STATE and any(word in topic.name.lower() for word in COMMANDED):
             self._signals = {name: (f"{name}_desired", 1) for name in ("position", "velocity")}
         self._layout: Layout | None = None
@@ -355,14 +358,19 @@ class MotionReader:
         if self._topic.type in TRANSFORMS:
             groups = sorted(groups, key=lambda group: FRAMES.index(next(iter(group.arrays))))[:1]
         for group in groups:
-            chosen = group.logged if any(group.logged) else group.received
-            remark = RECORDER if chosen is group.received else ""
-            stamps = Stamps.of_nanoseconds(np.frombuffer(chosen, dtype=np.int64), remark=remark)
+            received = np.frombuffer(group.received, dtype=np.int64)
+            order: Any = slice(None)  # no copy of what is in order
+            if (np.diff(received) < 0).any():
+                order = np.argsort(received, kind="stable")
+            logged = np.frombuffer(group.logged, dtype=np.int64)
+            remark = "" if logged.any() else RECORDER
+            chosen = logged if logged.any() else received
+            stamps = Stamps.of_nanoseconds(chosen[order], remark=remark)
             for name, numbers in group.arrays.items():
                 signal, rank = self._signals.get(name, ("", 0))
                 yield Field(
                     f"{self._topic.name}/{name}",
-                    np.frombuffer(numbers).reshape(len(stamps.time), -1),
+                    np.frombuffer(numbers).reshape(len(received), -1)[order],
                     stamps,
                     joints=group.joints,
                     signal=signal,
@@ -374,8 +382,8 @@ class MotionReader:
 class Trajectories:
     """``trajectory_msgs/JointTrajectory``: planned desired motion."""
 
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self._decode = decoder(path, topic, ros1=ros1)
+    def __init__(self, path: Path, topic: Topic) -> None:
+        self._decode = decoder(path, topic)
         self._topic = topic.name
         self._plans: dict[frozenset[str], list[tuple[int, tuple[str, ...], Any]]] = {}
 
@@ -413,8 +421,8 @@ class Trajectories:
 class Descriptions:
     """``std_msgs/String``: the robot's URDF, the last that holds one."""
 
-    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
-        self._decode = decoder(path, topic, ros1=ros1)
+    def __init__(self, path: Path, topic: Topic) -> None:
+        self._decode = decoder(path, topic)
         self.urdf = ""
 
     def add(self, received: int, data: bytes) -> None:
@@ -429,114 +437,88 @@ class Descriptions:
 
 
 TopicReader: TypeAlias = MotionReader | Trajectories | Descriptions
-# Readers by the type of messages.
-TOPIC_READERS: Mapping[str, type[MotionReader] | type[Trajectories]] = {
-    JOINT_STATE: MotionReader,
-    STATE: MotionReader,
-    "trajectory_msgs/msg/JointTrajectory": Trajectories,
-    **dict.fromkeys(("nav_msgs/msg/Odometry", *TRANSFORMS), MotionReader),
-}
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+TYPES = (*MOTION, TRAJECTORY)  # types of messages with motion
 
 
-def topic_reader(path: Path, topic: Topic, *, ros1: bool) -> TopicReader | None:
+def topic_reader(path: Path, topic: Topic) -> TopicReader | None:
     """Reader of a topic; None if its type is not read."""
     if topic.type == "std_msgs/msg/String" and topic.name.endswith(DESCRIPTION):
-        return Descriptions(path, topic, ros1=ros1)
-    kind = TOPIC_READERS.get(topic.type)
-    return kind(path, topic, ros1=ros1) if kind else None
+        return Descriptions(path, topic)
+    if topic.type == TRAJECTORY:
+        return Trajectories(path, topic)
+    return MotionReader(path, topic) if topic.type in MOTION else None
 
+
+# Bags
 
 LATEST = 2**62  # stamps lie before, in [ns]; differences of later ones are no 64-bit integers
-METADATA = 4 * 2**20  # most bytes of a metadata.yaml: it has some hundred for each topic
-MCAP_MAGIC = b"\x89MCAP0\r\n"  # the bytes with which an MCAP file begins and ends
-MESSAGE, CHUNK, CONNECTION = b"\x02", b"\x05", b"\x07"  # kinds of records of ROS 1
-
-Bytes = bytes | bytearray | memoryview
 # Topic, time of reception in [ns], and the serialised message.
 Message: TypeAlias = tuple[str, int, bytes]
+Add: TypeAlias = Callable[[int, bytes], None]
 
 
-class DamagedError(Exception):
-    """A bag that rosbags cannot read; parts of it may be readable."""
-
-
-@dataclass(frozen=True)
+@dataclass
 class Bag:
-    """A bag that is open for reading, independent of its storage."""
+    """What a bag holds, once all of it is read."""
 
-    ros1: bool  # whether messages are serialised in the format of ROS 1
-    topics: dict[str, Topic]
-    messages: Callable[[Collection[str]], Iterator[Message]]  # of some topics
-    close: Callable[[], None] = lambda: None
-    seconds: float = 0.0  # from the first message to the last, 0 if unknown
-    lost: list[str] = field(default_factory=list)  # sentences, complete after the last message
+    topics: dict[str, Topic] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)  # messages, by topic
+    times: list[int] = field(default_factory=list)  # of the first and the last message, in [ns]
+    lost: list[str] = field(default_factory=list)  # a sentence each
 
     def __str__(self) -> str:
-        topics = [f"{topic.name} ({topic.type})" for topic in self.topics.values()]
-        return f"the bag has {listed(topics) or 'no topics'}"
+        return f"the bag has {listed([*map(str, self.topics.values())]) or 'no topics'}"
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of a bag: the folder of a ROS 2 bag, one of its files, or a ROS 1 bag."""
-    return LogReader(
-        "ROS bag", ("",), lambda _, progress: _read(path, options, progress), lambda: _listing(path)
-    )
-
-
-def _read(path: Path, options: ReadOptions, progress: Progress) -> Log:
-    try:
-        try:
-            with closing(_intact(path)) as bag:
-                return _log_of(path, bag, options, progress)
-        except DamagedError as error:  # perhaps after some messages
-            return _log_of(path, _damaged(path, str(error)), options, progress)
-    except ArchiveError as error:
-        raise LogError(path, str(error)) from error
+    return LogReader("ROS bag", ("",), lambda _: _read(path, options), lambda: _listing(path))
 
 
 def _listing(path: Path) -> tuple[str, ...]:
     """Topics with type, count and rate, and whether they are read, a line each."""
-    try:
-        try:
-            bag = _intact(path)
-        except DamagedError as error:
-            bag = _damaged(path, str(error))
-    except ArchiveError as error:
-        raise LogError(path, str(error)) from error
-    rows = []
-    with closing(bag):
-        for topic in sorted(bag.topics.values(), key=lambda each: each.name):
-            count = counted(topic.count, "message") if topic.count >= 0 else "not counted"
-            several = topic.count > 1 and bag.seconds
-            rate = f"{topic.count / bag.seconds:.6g} Hz" if several else ""
-            known = topic.type in TOPIC_READERS or topic.name.endswith(DESCRIPTION)
-            words = (topic.name, topic.type, count, rate, "read" if known else "not read")
-            rows.append("  ".join(filter(None, words)))
+    bag, rows = _scanned(path, lambda topic: None), []
+    seconds = (bag.times[-1] - bag.times[0]) * 1e-9 if bag.times else 0.0
+    for topic in sorted(bag.topics.values(), key=lambda each: each.name):
+        count = bag.counts[topic.name]
+        rate = f"{count / seconds:.6g} Hz" if count > 1 and seconds else ""
+        known = topic.type in TYPES or topic.name.endswith(DESCRIPTION)
+        words = (topic.name, topic.type, counted(count, "message"), rate)
+        rows.append("  ".join(filter(None, (*words, "read" if known else "not read"))))
     return (*rows, *bag.lost)
 
 
-def _log_of(path: Path, bag: Bag, options: ReadOptions, progress: Progress) -> Log:
-    chosen = _chosen(path, bag, options)
-    odd = 0
-    total = sum(max(bag.topics[name].count, 0) for name in chosen)
-    for name, received, data in progress(bag.messages(chosen), total):
-        if isinstance(received, int) and abs(received) < LATEST and isinstance(data, Bytes):
-            chosen[name].add(received, bytes(data))
-        else:
-            odd += 1
-    if odd:
-        bag.lost.append(f"{odd} messages without data, or with stamps after 2116, are left out")
-    fields = [each for reader in chosen.values() for each in reader.fields()]
+def _read(path: Path, options: ReadOptions) -> Log:
+    readers: dict[str, TopicReader] = {}
+
+    def begin(topic: Topic) -> Add | None:
+        wanted = not options.topics or topic.name in options.topics
+        if not (wanted or topic.name.endswith(DESCRIPTION)):
+            return None
+        if reader := topic_reader(path, topic):
+            readers[topic.name] = reader
+        return reader.add if reader else None
+
+    bag = _scanned(path, begin)
+    for name in options.topics:
+        if name not in bag.topics or bag.topics[name].type not in TYPES:
+            problem = f"there is no topic {name!r} of a type that is read ({', '.join(TYPES)})"
+            raise LogError(path, f"{problem}; {bag}")
+    read = {name: reader for name, reader in readers.items() if bag.counts[name]}
+    if not read:
+        raise LogError(path, f"no topic holds joints; {bag}")
+    fields = [each for reader in read.values() for each in reader.fields()]
     if not any(each.signal.startswith(("position", "velocity")) for each in fields):
         raise LogError(path, f"no message holds joints; {bag}")
-    urdfs = [each.urdf for each in chosen.values() if isinstance(each, Descriptions) and each.urdf]
+    urdfs = [each.urdf for each in read.values() if isinstance(each, Descriptions) and each.urdf]
     return Log(
         path,
         tuple(each for each in fields if each.signal),
         not_read=tuple(
-            f"{topic.name} ({topic.type if topic.count else 'no messages'})"
-            for topic in bag.topics.values()
-            if topic.name not in chosen or topic.count == 0
+            str(topic) if bag.counts[name] else f"{name} (no messages)"
+            for name, topic in bag.topics.items()
+            if name not in read
         ),
         remarks=tuple(bag.lost),
         urdf=urdfs[-1] if urdfs else "",
@@ -544,147 +526,42 @@ def _log_of(path: Path, bag: Bag, options: ReadOptions, progress: Progress) -> L
     )
 
 
-def _chosen(path: Path, bag: Bag, options: ReadOptions) -> dict[str, TopicReader]:
-    """Readers of the topics that are read, by their names."""
-    for name in options.topics:
-        if name not in bag.topics or bag.topics[name].type not in TOPIC_READERS:
-            types = ", ".join(TOPIC_READERS)
-            raise LogError(
-                path, f"there is no topic {name!r} of a type that is read ({types}); {bag}"
-            )
-    found = {}
-    for name, topic in bag.topics.items():
-        wanted = not options.topics or name in options.topics or name.endswith(DESCRIPTION)
-        if wanted and topic.count and (reader := topic_reader(path, topic, ros1=bag.ros1)):
-            found[name] = reader
-    if not found:
-        raise LogError(path, f"no topic holds joints; {bag}")
-    return found
-
-
-# By rosbags
-
-
-def _intact(path: Path) -> Bag:
-    """Bag that is open for reading by rosbags."""
-    from rosbags.rosbag1 import Reader as Reader1
-    from rosbags.rosbag2 import Reader as Reader2
-
-    _bound_rosbags()
-    begin(path)
-    about = (path if path.is_dir() else path.parent) / "metadata.yaml"
-    if about.is_file() and about.stat().st_size > METADATA:
-        raise DamagedError(f"metadata.yaml has more than {METADATA} bytes")
-    ros1 = path.is_file() and _records_of(path) is _ros1
+def _scanned(path: Path, begin: Callable[[Topic], Add | None]) -> Bag:
+    """Contents of a bag whose messages are passed to what ``begin`` gives for their topic."""
+    bag, unpack = Bag(), Unpacker(path)
+    adds: dict[str, Add | None] = {}
+    taken = odd = 0
     try:
-        reader: Any = (Reader1 if ros1 else Reader2)(path)
-        reader.open()
-    except ArchiveError:
-        raise
-    except Exception as error:  # rosbags lets struct's, SQLite's and its own errors through
-        raise DamagedError(one_line(error).rstrip(".")) from error
-    if problem := _problem(reader):
-        reader.close()
-        raise DamagedError(problem)
-    topics: dict[str, Topic] = {}
-    for each in reader.connections:
-        before = topics.get(each.topic)
-        count = each.msgcount + (before.count if before else 0)
-        topics[each.topic] = Topic(each.topic, each.msgtype, each.msgdef.data, count)
-    seconds = reader.duration * 1e-9 if any(topic.count for topic in topics.values()) else 0.0
-    return Bag(ros1, topics, partial(_messages, path, reader), reader.close, seconds)
-
-
-def _problem(reader: Any) -> str:
-    """What is wrong with what rosbags has taken unchecked from a bag; empty if nothing is."""
-    counts = (reader.duration, *(each.msgcount for each in reader.connections))
-    if not all(isinstance(count, int) and abs(count) < 2**64 for count in counts):
-        return "the duration or the messages of a topic are no whole number of 64 bits"
-    texts = (text for each in reader.connections for text in (each.topic, each.msgtype))
-    if not all(isinstance(text, str) for text in texts):
-        return "a topic has no name or no type"
-    storages = filter(None, (*getattr(reader, "storages", ()), getattr(reader, "storage", None)))
-    indexes = [[each.chunk_start_offset for each in getattr(s, "chunks", ())] for s in storages]
-    of_ros1 = getattr(reader, "indexes", {}).values()
-    indexes += [[(each.chunk_pos, each.offset) for each in index] for index in of_ros1]
-    twice = any(len(set(index)) < len(index) for index in indexes)
-    return "its index lists a chunk or a message several times" if twice else ""
-
-
-def _messages(path: Path, reader: Any, names: Collection[str]) -> Iterator[Message]:
-    """Messages to the end, or to where the bag is damaged."""
-    wanted = [each for each in reader.connections if each.topic in names]
-    expected, count = sum(each.msgcount for each in wanted), 0
-    begin(path)
-    try:
-        if wanted:
-            for connection, received, data in reader.messages(wanted):
-                yield connection.topic, received, data
-                count += 1
-    except ArchiveError:
-        raise
-    except Exception as error:
-        raise DamagedError(
-            f"{count} of {expected} messages can be read ({one_line(error).rstrip('.')})"
-        ) from error
-
-
-def _bound_rosbags() -> None:
-    """Let rosbags unpack within the limit: its own functions have none."""
-    from rosbags.rosbag1 import reader as reader1
-    from rosbags.rosbag2 import reader as reader2
-    from rosbags.rosbag2 import storage_mcap
-
-    own: Any = (reader1.decompressors, storage_mcap.DECOMPRESSORS)
-    for method in ("bz2", "lz4"):
-        own[0][method] = partial(unpack, method)
-    for method in ("lz4", "zstd"):
-        own[1][method] = lambda data, _, method=method: unpack(method, data)
-    zstd = SimpleNamespace(
-        open=lambda stream, _: Unpacking("zstd", stream), decompress=partial(unpack, "zstd")
-    )
-    vars(reader2)["zstd"] = zstd
+        for each in _records(path, bag.lost, unpack):
+            if isinstance(each, Topic):
+                if each.name not in bag.topics:
+                    bag.topics[each.name], adds[each.name] = each, begin(each)
+                continue
+            name, received, data = each
+            bag.counts[name] += 1
+            if abs(received) < LATEST:
+                known = (received, *bag.times)
+                bag.times[:] = min(known), max(known)
+            if add := adds.get(name):
+                if data.startswith(ZSTD) and not bag.topics[name].ros1:
+                    data = unpack.message(data)
+                if data and abs(received) < LATEST:
+                    add(received, data)
+                    taken += 1
+                else:
+                    odd += 1
+    except ArchiveError as error:
+        raise LogError(path, str(error)) from error
+    if not bag.topics:
+        why = f": {bag.lost[0]}" if bag.lost else ""
+        raise LogError(path, f"no topic of the bag can be read{why}")
+    bag.lost += [f"{taken} messages were recovered"] if bag.lost and taken else []
+    if odd:
+        bag.lost.append(f"{odd} messages without data, or with stamps after 2116, are left out")
+    return bag
 
 
 # Chunks, unpacked piece by piece
-
-# Bytes of the bag, and bytes that were unpacked of it.
-_budget: ContextVar[list[int]] = ContextVar("budget")
-
-
-def begin(path: Path) -> None:
-    """Begin to read a bag, a file or a folder: what has been unpacked is counted from here."""
-    files = [each for each in path.iterdir() if each.is_file()] if path.is_dir() else [path]
-    _budget.set([sum(each.stat().st_size for each in files), 0])
-
-
-def unpack(method: str, data: bytes) -> bytes:
-    """Unpack a chunk, within the limit on all of the bag."""
-    if method not in METHODS:
-        return data
-    with Unpacking(method, BytesIO(data)) as stream:
-        return b"".join(iter(lambda: stream.read(PIECE), b""))
-
-
-class Unpacking:
-    """A stream that is unpacked, by one of ``METHODS``, while it is read."""
-
-    def __init__(self, method: str, stream: BinaryIO) -> None:
-        self._stream = METHODS[method](stream)
-
-    def read(self, size: int) -> bytes:
-        """Read up to so many bytes, within the limit of `unpack`."""
-        piece: bytes = self._stream.read(min(size, PIECE))
-        budget = _budget.get()
-        budget[1] += len(piece)
-        check_unpacked(budget[1], budget[0])
-        return piece
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stream.close()
 
 
 def _lz4(stream: BinaryIO) -> Any:
@@ -701,67 +578,84 @@ def _zstd(stream: BinaryIO) -> Any:
 
 # What opens a compressed stream, by the name that bags have for it.
 METHODS: dict[str, Callable[[BinaryIO], Any]] = {"bz2": bz2.open, "lz4": _lz4, "zstd": _zstd}
+ZSTD = b"\x28\xb5\x2f\xfd"  # the first bytes of a file or a message that was compressed whole
+
+
+class Unpacker:
+    """Unpacks chunks, messages and files of a bag, within the limit on all of it."""
+
+    def __init__(self, path: Path) -> None:
+        files = [each for each in path.iterdir() if each.is_file()] if path.is_dir() else [path]
+        self._packed, self._unpacked = sum(each.stat().st_size for each in files), 0
+
+    def pieces(self, method: str, stream: BinaryIO) -> Iterator[bytes]:
+        """What a stream unpacks to, by one of ``METHODS``; damage raises an error of its own."""
+        with METHODS[method](stream) as unpacked:
+            while piece := unpacked.read(PIECE):
+                self._unpacked += len(piece)
+                check_unpacked(self._unpacked, self._packed)
+                yield piece
+
+    def chunk(self, method: str, data: bytes) -> bytes:
+        """Unpack a chunk."""
+        return b"".join(self.pieces(method, BytesIO(data))) if method in METHODS else data
+
+    def message(self, data: bytes) -> bytes:
+        """Unpack a message; nothing is left of one that is damaged."""
+        try:
+            return self.chunk("zstd", data)
+        except ArchiveError:
+            raise
+        except Exception:  # each compressor has errors of its own
+            return b""
 
 
 # Record by record
 
 
-def _damaged(path: Path, problem: str) -> Bag:
-    """Bag with the intact records of one that rosbags cannot open, or not read to its end."""
-    files = (
-        sorted(each for each in path.iterdir() if _records_of(each)) if path.is_dir() else [path]
-    )
-    storages = {_records_of(file) for file in files}
-    records = storages.pop() if len(storages) == 1 else None
-    if records is None:
-        raise LogError(path, f"not a bag that can be read: {problem}")
-    whole = records is mcap_records and all(map(_ends_as_mcap, files))
-    lost = [] if whole else [f"the bag is damaged or cut off ({problem})"]
-    every = (each for file in files for each in records(file, [], True))
-    topics = {each.name: each for each in every if isinstance(each, Topic)}
-    if not topics:
-        raise LogError(path, f"no topic of the bag can be read: {problem}")
-
-    def messages(names: Collection[str]) -> Iterator[Message]:
-        count = 0
-        for each in (each for file in files for each in records(file, lost, False)):
-            if not isinstance(each, Topic) and each[0] in names:
-                yield each
-                count += 1
-        if not whole:
-            lost.append(f"{count} messages were recovered")
-
-    return Bag(records is _ros1, topics, messages, lost=lost)
+def _records(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Message]:
+    """Topics and messages of a bag's files, in their order; appends what was lost."""
+    every = sorted(path.iterdir(), key=lambda file: natural(file.name)) if path.is_dir() else [path]
+    with TemporaryDirectory() as folder:
+        files = [(file, _head(file)) for file in every]
+        for place, (file, head) in enumerate(files):
+            if head.startswith(ZSTD):
+                target = Path(folder) / file.stem
+                try:
+                    with file.open("rb") as packed, target.open("wb") as stream:
+                        stream.writelines(unpack.pieces("zstd", packed))
+                except ArchiveError:
+                    raise
+                except Exception as error:  # of the compressor
+                    lost.append(f"the bag is damaged or cut off ({one_line(error)})")
+                files[place] = target, _head(target)
+        known = [
+            (file, magic) for file, head in files for magic in RECORDS if head.startswith(magic)
+        ]
+        if len({magic for _, magic in known}) > 1:
+            raise LogError(path, "holds files of several kinds of bags; name one of them")
+        for file, magic in known:
+            yield from RECORDS[magic](file, lost, unpack)
 
 
-def _records_of(path: Path) -> "Records | None":
-    """What reads the records of a file, by its first bytes; None if it is not a bag."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(16)
-    except OSError:
-        return None
-    return next((records for magic, records in RECORDS.items() if head.startswith(magic)), None)
+def _head(path: Path) -> bytes:
+    """The first bytes of a file; none if it cannot be read, or is no file."""
+    with suppress(OSError):
+        if path.is_file():
+            with path.open("rb") as stream:
+                return stream.read(16)
+    return b""
 
 
-def _ends_as_mcap(path: Path) -> bool:
-    """Whether an MCAP file was written to its end."""
-    with path.open("rb") as stream:
-        stream.seek(max(0, path.stat().st_size - len(MCAP_MAGIC)))
-        return stream.read() == MCAP_MAGIC
-
-
-def mcap_records(path: Path, lost: list[str], _alone: bool = False) -> Iterator[Topic | Message]:
-    """Topics and messages of intact records, to where the file ends or is damaged."""
+def _mcap(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Message]:
     schemas: dict[int, Schema] = {}
     channels: dict[int, str] = {}
-    begin(path)
     size, place = path.stat().st_size, 0  # no record is longer than its file
     with path.open("rb") as stream:
         reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=size)
         try:
             for record in reader.records:
-                for each in _unchunked(record, lost):
+                for each in _unchunked(record, lost, unpack):
                     if isinstance(each, Schema):
                         schemas[each.id] = each
                     elif isinstance(each, Channel):
@@ -777,15 +671,19 @@ def mcap_records(path: Path, lost: list[str], _alone: bool = False) -> Iterator[
         except CRCValidationError as error:  # all messages have been read by then
             lost.append(f"some of what was read is damaged ({error})")
         except Exception as error:  # the library lets errors of struct and of text through
-            lost.append(f"from byte {place} on the file is damaged or cut off ({one_line(error)})")
+            lost.append(_from(place, error))
 
 
-def _unchunked(record: McapRecord, lost: list[str]) -> list[McapRecord]:
+def _from(place: int, error: Exception) -> str:
+    return f"the bag is damaged or cut off from byte {place} on ({one_line(error)})"
+
+
+def _unchunked(record: McapRecord, lost: list[str], unpack: Unpacker) -> list[McapRecord]:
     """The records of a chunk, or the record itself."""
     if not isinstance(record, Chunk):
         return [record]
     try:
-        raw = unpack(record.compression, record.data)
+        raw = unpack.chunk(record.compression, record.data)
         return breakup_chunk(replace(record, compression="", data=raw), validate_crc=True)
     except ArchiveError:
         raise
@@ -794,56 +692,53 @@ def _unchunked(record: McapRecord, lost: list[str]) -> list[McapRecord]:
         return []
 
 
-def _sqlite(path: Path, lost: list[str], topics_alone: bool) -> Iterator[Topic | Message]:
+def _sqlite(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Message]:
     """Topics, then messages in the order of their rows, to where a page is missing.
 
     The last page may be cut off, and SQLite reads zeros for the rest of it: messages are held
     back until a page of data follows them.
     """
-    database = sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)
-    with closing(database):
-        database.execute("PRAGMA writable_schema = ON")  # else SQLite refuses a file cut short
+    held: deque[Message] = deque()
+    with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as database:
         try:
+            try:
+                database.execute("SELECT name FROM sqlite_master").fetchone()
+            except sqlite3.DatabaseError as error:
+                lost.append(f"the bag is damaged or cut off ({one_line(error)})")
+            (page,) = database.execute("PRAGMA page_size").fetchone()
+            database.execute("PRAGMA writable_schema = ON")  # else SQLite refuses such a file
             tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
             definitions = {}
             if "message_definitions" in tables:
                 rows = "SELECT topic_type, encoded_message_definition FROM message_definitions"
                 definitions = dict(database.execute(rows))
-            for name, kind in database.execute("SELECT name, type FROM topics"):
+            names = {}
+            for place, name, kind in database.execute("SELECT id, name, type FROM topics"):
                 if isinstance(name, str) and isinstance(kind, str):
                     definition = definitions.get(kind)
+                    names[place] = name
                     yield Topic(name, kind, definition if isinstance(definition, str) else "")
-        except sqlite3.DatabaseError as error:
-            raise LogError(path, f"no topic of the bag can be read: {one_line(error)}") from error
-        if topics_alone:
-            return
-        held: deque[Message] = deque()
-        try:
-            (page,) = database.execute("PRAGMA page_size").fetchone()
-            names = dict(database.execute("SELECT id, name FROM topics"))
             size = 0
-            for topic, received, data in database.execute(
-                "SELECT topic_id, timestamp, data FROM messages"
-            ):
-                if not (isinstance(received, int) and isinstance(data, bytes)):
-                    continue  # a row that is damaged itself
-                held.append((names.get(topic, ""), received, data))
-                size += len(data)
-                while size - len(held[0][2]) > page:
+            messages = "SELECT topic_id, timestamp, data FROM messages"
+            for topic, received, data in database.execute(messages):
+                if topic in names:
+                    when = received if isinstance(received, int) else LATEST
+                    held.append((names[topic], when, data if isinstance(data, bytes) else b""))
+                    size += len(held[-1][2])
+                while held and size - len(held[0][2]) > page:
                     size -= len(held[0][2])
                     yield held.popleft()
         except sqlite3.DatabaseError as error:
-            lost.append(f"{path.name} ends here, {len(held)} messages may be cut ({error})")
+            lost.append(f"the bag ends here, {len(held)} messages may be cut ({one_line(error)})")
             held.clear()
-        yield from held
+    yield from held
 
 
-def _ros1(path: Path, lost: list[str], _alone: bool) -> Iterator[Topic | Message]:
-    """Topics and messages, including those in chunks, to where the file ends or is damaged."""
+def _ros1(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Message]:
+    """Topics and messages, including those in chunks."""
     names: dict[bytes, str] = {}
-    begin(path)
     with path.open("rb") as stream:
-        for header, data in _ros1_records(stream, lost):
+        for header, data in _ros1_records(stream, lost, unpack):
             number, time = header.get("conn", b""), header.get("time", b"")
             if header.get("op") == CONNECTION and "topic" in header:
                 name = header["topic"].decode(errors="replace")
@@ -853,13 +748,19 @@ def _ros1(path: Path, lost: list[str], _alone: bool) -> Iterator[Topic | Message
                     fields = _fields(data)
                     package, _, kind = fields["type"].decode(errors="replace").partition("/")
                     definition = fields["message_definition"].decode(errors="replace")
-                    yield Topic(name, f"{package}/msg/{kind}", definition)
+                    yield Topic(name, f"{package}/msg/{kind}", definition, ros1=True)
             elif header.get("op") == MESSAGE and number in names and len(time) == 8:
                 seconds, fraction = struct.unpack("<II", time)
                 yield names[number], seconds * 10**9 + fraction, data
 
 
-def _ros1_records(stream: BinaryIO, lost: list[str]) -> Iterator[tuple[dict[str, bytes], bytes]]:
+# Kinds of records of ROS 1.
+MESSAGE, BEGIN, CHUNK, CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
+
+
+def _ros1_records(
+    stream: BinaryIO, lost: list[str], unpack: Unpacker
+) -> Iterator[tuple[dict[str, bytes], bytes]]:
     size = stream.seek(0, 2)
     stream.seek(0)
     stream.readline()
@@ -867,15 +768,17 @@ def _ros1_records(stream: BinaryIO, lost: list[str]) -> Iterator[tuple[dict[str,
         try:
             header, data = _fields(_sized(stream)), _sized(stream)
             records = [(header, data)]
+            if header["op"] == BEGIN and header["index_pos"] == bytes(8):
+                lost.append("the bag is damaged or cut off: it has no index")
             if header["op"] == CHUNK:
-                chunk = unpack(header["compression"].decode(), data)
+                chunk = unpack.chunk(header["compression"].decode(), data)
                 inner, records = BytesIO(chunk), []
                 while inner.tell() < len(chunk):
                     records.append((_fields(_sized(inner)), _sized(inner)))
         except ArchiveError:
             raise
         except Exception as error:  # each compressor has errors of its own
-            lost.append(f"from byte {place} on the file is damaged or cut off ({one_line(error)})")
+            lost.append(_from(place, error))
             return
         yield from records
 
@@ -898,11 +801,11 @@ def _fields(header: bytes) -> dict[str, bytes]:
     return fields
 
 
-# Reads topics and messages, or topics alone; appends what was lost, a sentence each.
-Records: TypeAlias = Callable[[Path, list[str], bool], Iterator[Topic | Message]]
+# Reads topics and messages to where the file ends or is damaged; appends what was lost.
+Records: TypeAlias = Callable[[Path, list[str], Unpacker], Iterator[Topic | Message]]
 # What reads the records of a file, by its first bytes.
 RECORDS: dict[bytes, Records] = {
-    MCAP_MAGIC: mcap_records,
+    b"\x89MCAP0\r\n": _mcap,
     b"SQLite format 3\x00": _sqlite,
     b"#ROSBAG V2.0": _ros1,
 }

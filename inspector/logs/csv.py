@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
-from functools import partial
 from io import StringIO
 from itertools import islice
 from operator import itemgetter
@@ -20,7 +19,7 @@ import numpy as np
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, gathered
 from inspector.logs.clocks import counting, is_counter, stamps_since
-from inspector.logs.log import Field, Log, LogReader, Progress, Stamps
+from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions, no_motion
 from inspector.logs.names import (
     JOINT_SIGNALS,
@@ -72,10 +71,7 @@ class Layout(NamedTuple):
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of a CSV log."""
-    read = partial(_read, path, options)
-    return LogReader(
-        "CSV", ("",), lambda _, progress: read(progress), partial(_listing, path, options)
-    )
+    return LogReader("CSV", ("",), lambda _: _read(path, options), lambda: _listing(path, options))
 
 
 def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
@@ -97,18 +93,18 @@ def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
     return (f"{rows} rows", *(f"{name}  {held(name)}" for name in layout.header if name))
 
 
-def _read(path: Path, options: ReadOptions, progress: Progress) -> Log:
+def _read(path: Path, options: ReadOptions) -> Log:
     """Log with the columns whose signal is known."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            return _log_of(path, stream, options, progress)
+            return _log_of(path, stream, options)
     except OSError as error:
         raise LogError(path, f"cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise LogError(path, "not a CSV log: not text in UTF-8") from error
 
 
-def _log_of(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) -> Log:
+def _log_of(path: Path, stream: TextIO, options: ReadOptions) -> Log:
     layout = _layout(path, stream, options)
     header = layout.header
     time, rest = _times(header, options)
@@ -118,7 +114,7 @@ def _log_of(path: Path, stream: TextIO, options: ReadOptions, progress: Progress
     named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
     counter = None if time is not None else _counter(path, stream, layout, wanted)
     times = (time if counter is None else counter, rest)
-    rows, values, cells, joints = _table(path, stream, layout, wanted, times, [*named], progress)
+    rows, values, cells, joints = _table(path, stream, layout, wanted, times, [*named])
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
     if counter is not None and _counts(cells):
@@ -387,7 +383,6 @@ def _table(
     wanted: Sequence[int],
     time: tuple[int | None, int | None],
     named: Sequence[int],
-    progress: Progress,
 ) -> tuple["array[int]", Array, list[str], set[tuple[str, ...]]]:
     """Line numbers, numbers, stamps and the sets of joints' names of all rows."""
     rows, table, stamps, joints = array("q"), array("d"), list[str](), set[tuple[str, ...]]()
@@ -406,7 +401,7 @@ def _table(
             rows.extend(range(first + 1, first + 1 + lines))
             stamps += found[1]
         else:
-            for row, cells in progress(_rows(path, text, first, layout), 0):
+            for row, cells in _rows(path, text, first, layout):
                 picked = pick(cells)[:-1]
                 try:
                     table.extend(list(map(float, picked)))

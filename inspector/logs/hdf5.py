@@ -81,7 +81,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     return LogReader(
         "MATLAB 7.3" if is_matlab else "HDF5",
         episodes,
-        lambda episode, progress: _read(path, options, home, episode, about, is_matlab=is_matlab),
+        lambda episode: _read(path, options, home, episode, about, is_matlab=is_matlab),
         lambda: _listing(path, home, episodes),
     )
 

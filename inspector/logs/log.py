@@ -1,13 +1,13 @@
 """A log as it was written: arrays with stamps; and the signals that they hold."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,21 +198,12 @@ class Log:
     in_degrees: tuple[str, ...] = ()  # "position" and "velocity" if found to be in degrees
 
 
-# Wraps what is read, to show how much is done; of so many items, 0 if that is not known.
-Progress: TypeAlias = Callable[[Iterable[Any], int], Iterable[Any]]
-
-
-def without_progress(items: Iterable[Any], total: int) -> Iterable[Any]:
-    """Pass items on without showing progress."""
-    return items
-
-
 @dataclass(frozen=True)
 class LogReader:
     """A log of a known format: its episodes, and functions that read it."""
 
     kind: str  # name of the format
     episodes: tuple[str, ...]  # each becomes a run; a single "" for a log without episodes
-    read: Callable[[str, Progress], Log]  # one episode, by its name
+    read: Callable[[str], Log]  # one episode, by its name
     listing: Callable[[], tuple[str, ...]]  # the contents, without reading all, a line each
     run: Callable[[], Run] | None = None  # of a run file

@@ -64,7 +64,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     return LogReader(
         "Parquet",
         _episodes(path),
-        lambda episode, progress: _read(path, options, episode),
+        lambda episode: _read(path, options, episode),
         lambda: (
             f"{pyarrow.parquet.read_metadata(path).num_rows} rows",
             *(f"{each.name}  {each.type}" for each in _schema(path)),
@@ -288,7 +288,7 @@ def _data_set(path: Path, folder: Path, options: ReadOptions) -> LogReader:
     return LogReader(
         f"LeRobot {info.get('codebase_version', '')}".strip(),
         tuple(sorted(places, key=int)),
-        lambda episode, progress: _episode(path, info, places[episode], episode, options),
+        lambda episode: _episode(path, info, places[episode], episode, options),
         lambda: (
             f"{counted(len(places), 'episode')} at {info.get('fps', 'unknown')} Hz",
             *(

@@ -8,7 +8,7 @@ import hashlib
 import os
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from inspector.errors import InspectorError, LogError
-from inspector.logs.log import LogReader, Progress, without_progress
+from inspector.logs.log import LogReader
 from inspector.logs.mapping import ReadOptions, read_options
 from inspector.logs.motion import Imported, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
@@ -165,18 +165,13 @@ def read_logs(
     *,
     desired: str | Path | None = None,
     episodes: Sequence[str] | None = None,
-    progress: Progress = without_progress,
 ) -> Iterator[Imported]:
-    """Runs of a log, an episode each, read one after the other; arguments and errors of `read_log`.
-
-    ``progress`` wraps what is read, to show how much is done.
-    """
+    """Runs of a log, an episode each, read one by one; arguments and errors of `read_log`."""
     readers = readers_of(
         Path(path),
         options or ReadOptions(),
         desired=Path(desired) if desired else None,
         episodes=episodes,
-        progress=progress,
     )
     for read in readers.values():
         yield read()
@@ -188,7 +183,6 @@ def readers_of(
     *,
     desired: Path | None = None,
     episodes: Sequence[str] | None = None,
-    progress: Progress = without_progress,
 ) -> dict[str, Callable[[], Imported]]:
     """What reads each run of a log, by its episode; arguments and errors as for `read_logs`.
 
@@ -205,7 +199,7 @@ def readers_of(
             known = listed(opened.episodes) or "no episodes"
             raise LogError(path, f"there is no episode {episode!r}; it has {known}")
     return {
-        episode: partial(_read_episode, path, opened, other, episode, options, robot, progress)
+        episode: partial(_read_episode, path, opened, other, episode, options, robot)
         for episode in episodes or opened.episodes
     }
 
@@ -227,7 +221,6 @@ def _read_episode(
     episode: str,
     options: ReadOptions,
     robot: Robot | None,
-    progress: Progress,
 ) -> Imported:
     """Run of an episode: its signals prepared, with the desired ones of another log."""
     name = _name(path, episode)
@@ -235,7 +228,7 @@ def _read_episode(
         run = opened.run()
         robot_name = options.robot or run.robot
         return Imported(replace(run, robot=robot_name), ("a run file, unchanged",), name)
-    log = opened.read(episode, progress)
+    log = opened.read(episode)
     problem = ""
     if robot is None and log.urdf:
         robot, problem = _robot_of(log.urdf)
@@ -245,7 +238,7 @@ def _read_episode(
         same_episode = episode if episode in desired.episodes else desired.episodes[0]
         if len(logs[0].in_degrees) == 2:  # of one robot, in one unit
             options = replace(options, units="degrees")
-        logs.append(prepared(desired.read(same_episode, progress), options, robot))
+        logs.append(prepared(desired.read(same_episode), options, robot))
     imported = run_of(logs, options, robot, name)
     unchecked = [f"{problem}; joints are not checked"] if problem else []
     return replace(imported, remarks=(*imported.remarks, *unchecked))
@@ -305,9 +298,7 @@ class Opened:
             return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def open_run(
-    path: str | Path, reading: Reading | None = None, *, progress: Progress = without_progress
-) -> Opened:
+def open_run(path: str | Path, reading: Reading | None = None) -> Opened:
     """Open a run file, a log that is a single run, or a folder with one of them."""
     reading = reading or Reading()
     found, _ = sources([Path(path)], reading)
@@ -315,12 +306,10 @@ def open_run(
         names = listed([each.episode or each.path.name for each in found])
         how = "choose one (--episode)" if found[0].episode else f"name one, such as {found[0].path}"
         raise LogError(Path(path), f"holds {len(found)} runs ({names}); {how}")
-    return open_source(found[0], reading, progress=progress)
+    return open_source(found[0], reading)
 
 
-def open_source(
-    source: Source, reading: Reading | None = None, *, progress: Progress = without_progress
-) -> Opened:
+def open_source(source: Source, reading: Reading | None = None) -> Opened:
     """Open what `sources` found."""
     reading = reading or Reading()
     if printable(str(source.path)) != str(source.path):
@@ -332,7 +321,6 @@ def open_source(
             reading.options,
             desired=reading.desired,
             episodes=[source.episode] if source.episode else None,
-            progress=progress,
         )
         return Opened(imported.run, assumed(imported, source.path), source)
     robot = reading.options.robot
@@ -500,7 +488,7 @@ def import_logs(
     desired: Path | None = None,
     episodes: Sequence[str] = (),
     overwrite: bool = False,
-    progress: Progress,
+    progress: Callable[[Iterable[Any], int], Iterable[Any]],
 ) -> Iterator[Written]:
     """Write a run file for each run of some logs; one that cannot be read alone raises."""
     logs = [log for path in logs for log in logs_in(path)[0]]
@@ -509,12 +497,9 @@ def import_logs(
     if desired and several:
         raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
     jobs: list[tuple[str, Callable[[], Imported]]] = []
-    inner = without_progress if several else progress  # there is one bar at a time
     for log in logs:
         try:
-            found = readers_of(
-                log, options, desired=desired, episodes=episodes or None, progress=inner
-            )
+            found = readers_of(log, options, desired=desired, episodes=episodes or None)
             jobs += ((_name(log, episode), read) for episode, read in found.items())
         except (InspectorError, NoiseModelError) as error:
             if not several:
