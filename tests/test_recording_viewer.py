@@ -152,8 +152,8 @@ def listening_on(pid):
 
 def test_a_recording_is_served_on_loopback_to_those_who_ask_for_this_host_only(recording):
     """A page whose name was made to point here after it was loaded reads nothing."""
-    with viewer.serving(recording) as served:
-        page, data = served.url.split("/?url=")
+    with viewer.serving(recording) as (url, server):
+        page, data = url.split("/?url=")
         port = int(page.removeprefix("http://127.0.0.1:"))
         assert data.startswith(f"http%3A%2F%2F127.0.0.1%3A{port}")
 
@@ -176,7 +176,7 @@ def test_a_recording_is_served_on_loopback_to_those_who_ask_for_this_host_only(r
         assert got(f"127.0.0.1:{port}", method="POST")[0] == 501
         if shutil.which("ss") and shutil.which("pgrep"):
             # What rerun itself serves, on other ports, holds no recording.
-            addresses = listening_on(served.server.process.pid)
+            addresses = listening_on(server.process.pid)
             assert len(addresses) == 2
             assert all(address.startswith("127.0.0.1:") for address in addresses)
             assert f"127.0.0.1:{port}" not in addresses
@@ -205,10 +205,10 @@ def test_a_server_that_ends_at_once_is_an_error_with_the_reason(monkeypatch, rec
 
 
 def test_a_server_that_ends_later_is_an_error(recording):
-    with viewer.serving(recording) as served:
-        os.killpg(served.server.process.pid, signal.SIGKILL)
+    with viewer.serving(recording) as (_, server):
+        os.killpg(server.process.pid, signal.SIGKILL)
         with pytest.raises(ViewerError, match="the viewer ended with status -9"):
-            served.wait()
+            server.wait()
 
 
 @pytest.mark.parametrize(
@@ -236,8 +236,8 @@ def test_serving_ends_with_the_program_and_leaves_no_server(recording, stop):
 
 @pytest.mark.slow
 def test_a_browser_draws_the_recording(recording, tmp_path):
-    with browser.page() as page, viewer.serving(recording) as served:
-        page.goto(f"{served.url}&renderer=webgl")
+    with browser.page() as page, viewer.serving(recording) as (url, _):
+        page.goto(f"{url}&renderer=webgl")
         until = time.monotonic() + 240
         sizes = [0]
         # The page grows from a spinner to the views, and then stays as it is.
@@ -256,31 +256,12 @@ def folder(tmp_path, monkeypatch):
     return viewer.scratch_path(Path("first.npz")).parent
 
 
-def recorded(folder, count, *, size=1):
-    """Write recordings, each younger than the one before."""
-    paths = [folder / f"run{number}.rrd" for number in range(count)]
+def test_only_the_newest_recordings_stay_and_what_is_none_is_left_alone(folder):
+    paths = [folder / f"run{number}.rrd" for number in range(30)]
     for age, path in enumerate(reversed(paths)):
-        path.write_bytes(bytes(size))
+        path.write_bytes(b"x")
         os.utime(path, (1e9 - age, 1e9 - age))
-    return paths
-
-
-def test_only_the_newest_recordings_stay(folder):
-    paths = recorded(folder, 30)
+    (folder / "notes.txt").write_text("mine")
     viewer.scratch_path(Path("next.npz"))
     newest = viewer.MAX_SCRATCH_FILES - 1  # and one to come
-    assert sorted(folder.iterdir()) == sorted(paths[-newest:])
-
-
-def test_recordings_take_no_more_than_their_limit(folder, monkeypatch):
-    monkeypatch.setattr(viewer, "MAX_SCRATCH_BYTES", 1000)
-    paths = recorded(folder, 5, size=400)
-    viewer.scratch_path(Path("next.npz"))
-    assert sorted(folder.iterdir()) == sorted(paths[-2:])
-
-
-def test_what_is_no_recording_is_left_alone(folder):
-    (folder / "notes.txt").write_text("mine")
-    recorded(folder, 30)
-    viewer.scratch_path(Path("next.npz"))
-    assert (folder / "notes.txt").exists()
+    assert sorted(folder.iterdir()) == sorted([folder / "notes.txt", *paths[-newest:]])

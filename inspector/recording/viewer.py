@@ -24,7 +24,7 @@ from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
 from threading import Thread
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 from urllib.parse import quote
 
 import noisemodel as nm
@@ -44,7 +44,7 @@ HOST = "127.0.0.1"
 # no option for it; ``rerun analytics disable`` would change the user's own settings.
 NO_ANALYTICS = {"CI": "true"}
 MAX_SCRATCH_FILES = 20  # recordings without a name that are kept, the newest
-MAX_SCRATCH_BYTES = 1_000_000_000  # what they may take together
+T = TypeVar("T")
 
 
 class ViewerError(InspectorError):
@@ -71,6 +71,14 @@ def listens(host: str, port: int) -> bool:
     return True
 
 
+def until(holds: Callable[[], T], seconds: float, step: float = 0.1) -> T:
+    """Ask every so often until something holds or time is over, both in [s]; the last answer."""
+    end = time.monotonic() + seconds
+    while not (found := holds()) and time.monotonic() < end:
+        time.sleep(step)
+    return found
+
+
 def scratch_path(run: Path) -> Path:
     """The file for a recording without a name: the same run replaces its own."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -80,24 +88,16 @@ def scratch_path(run: Path) -> Path:
     except OSError as error:
         why = f"{folder}: cannot be made a folder ({error.strerror})"
         raise nm.OutputError(f"{why}; name the recording with -o FILE.rrd") from error
-    _make_room(folder)
-    key = hashlib.sha256(str(run.resolve()).encode()).hexdigest()[:8]
-    return folder / f"{run.stem}-{key}.rrd"
-
-
-def _make_room(folder: Path) -> None:
-    """Delete recordings beyond the newest, leaving a place for one more."""
     found = {}
     for path in folder.glob("*.rrd"):
         with suppress(OSError):  # another process may have been quicker
-            found[path] = path.stat()
-    newest = sorted(found, key=lambda path: found[path].st_mtime, reverse=True)
-    taken = 0
-    for place, path in enumerate(newest, start=1):
-        taken += found[path].st_size
-        if place >= MAX_SCRATCH_FILES or taken > MAX_SCRATCH_BYTES:
-            with suppress(OSError):
-                path.unlink()
+            found[path] = path.stat().st_mtime
+    newest = sorted(found, key=lambda path: found[path], reverse=True)
+    for path in newest[MAX_SCRATCH_FILES - 1 :]:  # there is one to come
+        with suppress(OSError):
+            path.unlink()
+    key = hashlib.sha256(str(run.resolve()).encode()).hexdigest()[:8]
+    return folder / f"{run.stem}-{key}.rrd"
 
 
 def command(*arguments: str) -> list[str]:
@@ -129,12 +129,13 @@ class Process:
 
     def listens(self, port: int, seconds: float) -> bool:
         """Wait until a program listens on a port, unless this one ends or it takes too long."""
-        until = time.monotonic() + seconds
-        while self.process.poll() is None and time.monotonic() < until:
-            if listens(HOST, port):
-                return True
-            time.sleep(0.05)
+        until(lambda: self.process.poll() is not None or listens(HOST, port), seconds, 0.05)
         return listens(HOST, port)
+
+    def wait(self) -> None:
+        """Wait until it ends, which a server does not do by itself."""
+        self.process.wait()
+        raise ViewerError(self.ended())
 
     def kill(self) -> None:
         """End it with all its children."""
@@ -143,11 +144,8 @@ class Process:
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
         # The viewer itself is no child of ours to wait for; its ports are free once it is gone.
-        until = time.monotonic() + SETTLE
         with suppress(ProcessLookupError):
-            while time.monotonic() < until:
-                os.killpg(self.process.pid, 0)
-                time.sleep(0.02)
+            until(lambda: os.killpg(self.process.pid, 0), SETTLE, 0.02)
 
 
 @contextmanager
@@ -171,26 +169,22 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
 
 def open_window(recording: Path, seconds: float | None = None) -> str:
     """Show a recording in the viewer that runs, or a new one; why no window opened, if none did."""
-    if not launch(PORT, str(recording)):
-        if seconds is not None:
-            _put_cursor(f"rerun+http://{HOST}:{PORT}/proxy", seconds)
-        return ""
-    return launch("auto", str(recording))  # another program listens where viewers do
-
-
-def _put_cursor(address: str, seconds: float) -> None:
-    """Put the time cursor of a viewer somewhere, once it has a recording; else leave it."""
     from inspector.recording import unstable
 
-    until = time.monotonic() + SETTLE
-    while time.monotonic() < until:
+    def cursor_put() -> bool:
         with suppress(Exception):  # the client raises what it likes until the viewer is up
-            client = unstable.client(address)
+            client = unstable.client(f"rerun+http://{HOST}:{PORT}/proxy")
             state = client.get_state()
             if state.recordings and not state.loading:
-                client.set_time("time", duration=seconds)
-                return
-        time.sleep(0.1)
+                client.set_time("time", duration=seconds or 0.0)
+                return True
+        return False
+
+    if launch(PORT, str(recording)):
+        return launch("auto", str(recording))  # another program listens where viewers do
+    if seconds is not None:
+        until(cursor_put, SETTLE)
+    return ""
 
 
 def launch(port: str, *arguments: str) -> str:
@@ -222,33 +216,20 @@ def how_to_open(recording: Path) -> str:
 SERVE_TIMEOUT = 30.0  # time within which a server has to respond, in [s]
 
 
-@dataclass(frozen=True)
-class Served:
-    """A recording that browsers on this machine can open at an address."""
-
-    url: str
-    server: Process
-
-    def wait(self) -> None:
-        """Wait until the server ends, which it does not do by itself."""
-        self.server.process.wait()
-        raise ViewerError(self.server.ended())
-
-
 def serve(recording: Path, announce: Callable[[str], None], *, port: int = 0) -> None:
     """Serve a recording on loopback, and open it, until the program is stopped."""
     for stop in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(stop, signal.default_int_handler)  # else the server would outlive us
-    with suppress(KeyboardInterrupt), serving(recording, port=port) as served:
-        announce(served.url)
+    with suppress(KeyboardInterrupt), serving(recording, port=port) as (url, server):
+        announce(url)
         if has_display():
-            webbrowser.open(served.url)
-        served.wait()
+            webbrowser.open(url)
+        server.wait()
 
 
 @contextmanager
-def serving(recording: Path, *, port: int = 0) -> Iterator[Served]:
-    """Serve a recording on loopback, for as long as the block lasts.
+def serving(recording: Path, *, port: int = 0) -> Iterator[tuple[str, Process]]:
+    """Serve a recording on loopback for as long as the block lasts; its address, and the server.
 
     Rerun's own server answers whatever host a browser asks for. A page from elsewhere whose name is
     made to point to this machine (DNS rebinding) could read a recording from it. So rerun serves
@@ -276,7 +257,7 @@ def serving(recording: Path, *, port: int = 0) -> Iterator[Served]:
                 Thread(target=server.serve_forever, daemon=True).start()
                 address = f"http://{HOST}:{taken}"
                 try:
-                    yield Served(f"{address}/?url={quote(address + RECORDING, safe='')}", viewer)
+                    yield f"{address}/?url={quote(address + RECORDING, safe='')}", viewer
                 finally:
                     server.shutdown()
             finally:
@@ -421,19 +402,20 @@ def headless_viewer(size: tuple[int, int] = WINDOW) -> "Iterator[ViewerClient]":
         tempfile.TemporaryDirectory() as folder,
         started(*start, *window, env=_environment(folder)) as process,
     ):
+
+        def connected() -> "ViewerClient | None":
+            if problem := process.ended():
+                raise ViewerError(problem)
+            with suppress(Exception):  # the client raises what it likes until the viewer is up
+                client = unstable.client(f"rerun+http://{HOST}:{port}/proxy")
+                client.get_state()
+                return client
+            return None
+
         try:
-            until = time.monotonic() + TIMEOUT
-            while True:
-                if problem := process.ended():
-                    raise ViewerError(problem)
-                try:
-                    client = unstable.client(f"rerun+http://{HOST}:{port}/proxy")
-                    client.get_state()
-                    break
-                except Exception as error:  # the client raises what it likes until the viewer is up
-                    if time.monotonic() > until:
-                        raise ViewerError(f"the viewer does not respond ({error})") from error
-                    time.sleep(0.1)
+            client = until(connected, TIMEOUT)
+            if client is None:
+                raise ViewerError(f"the viewer does not respond within {TIMEOUT:g} s")
             yield client
         finally:
             process.kill()
@@ -442,32 +424,27 @@ def headless_viewer(size: tuple[int, int] = WINDOW) -> "Iterator[ViewerClient]":
 def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
     """Open a recording at a time, in [s], and wait until nothing moves any more."""
     client.open(str(recording.resolve()))
-    until = time.monotonic() + TIMEOUT
-    while client.get_state().loading and time.monotonic() < until:
-        time.sleep(0.1)
+    end = time.monotonic() + TIMEOUT
+    until(lambda: not client.get_state().loading, TIMEOUT)
     client.set_time("time", duration=seconds)
     frames: list[bytes] = []
-    problem = ""
-    # The first frames lack what is still arriving: a picture is done when it stays the same.
-    while time.monotonic() < until and not (len(frames) > 2 and frames[-1] == frames[-3]):
-        time.sleep(0.3)
-        try:
+
+    def unchanged() -> bool:
+        with suppress(Exception):  # a viewer under load misses its own deadlines: try again
             frames.append(client.take_screenshot())
-        except Exception as error:  # a viewer under load misses its own deadlines: try again
-            problem = str(error).partition("\n")[0]
+        return len(frames) > 2 and frames[-1] == frames[-3]
+
+    # The first frames lack what is still arriving: a picture is done when it stays the same.
+    until(unchanged, end - time.monotonic(), 0.3)
     if not frames:
-        raise ViewerError(f"the viewer draws nothing within {TIMEOUT:g} s ({problem})")
+        raise ViewerError(f"the viewer draws nothing within {TIMEOUT:g} s")
     return frames[-1]
 
 
 def final_state(client: "ViewerClient") -> Any:
     """The viewer's state once its views report nothing, or after 20 s what they report then."""
-    until = time.monotonic() + REPORTS_TIMEOUT
-    while True:
-        state = client.get_state()
-        if time.monotonic() > until or not any(view.reports for view in state.views):
-            return state
-        time.sleep(0.5)
+    until(lambda: not any(view.reports for view in client.get_state().views), REPORTS_TIMEOUT, 0.5)
+    return client.get_state()
 
 
 def _environment(folder: str) -> dict[str, str]:
@@ -522,17 +499,28 @@ def show(
         InspectorError: If the robot's shape cannot be had.
         NoiseModelError: If the run cannot be read, or its robot.
     """
+    from inspector.analysis import analyse_file
+    from inspector.export.sound import of_recording
+    from inspector.library import load_library
+    from inspector.recording.run import write
+
     inside = in_notebook()
     if inside and find_spec("rerun_notebook") is None:
         raise ViewerError(
             'a notebook takes rerun\'s widget; `pip install "rerun-sdk[notebook]"` brings it'
         )
-    if inside:
-        with tempfile.TemporaryDirectory() as folder:
-            show_recording(_recorded(run, Path(folder) / "run.rrd", robot=robot, kind=kind), size)
-        return
-    recording = scratch_path(Path("shown.npz") if isinstance(run, nm.Run) else Path(run))
-    _recorded(run, recording, robot=robot, kind=kind)
+    with tempfile.TemporaryDirectory() as folder:
+        if isinstance(run, nm.Run):
+            path, name = Path(folder) / "run.npz", Path("shown.npz")
+            run.save(path)
+        else:
+            path = name = Path(run)
+        recording = Path(folder) / "run.rrd" if inside else scratch_path(name)
+        found = analyse_file(path, load_library(), links=robot, kind=kind)
+        write(found, recording, overwrite=True, sound=of_recording(found))
+        if inside:
+            _show_in_cell(recording, size)
+            return
     if not has_display():
         raise ViewerError(
             f"there is no display; the recording is in {recording},"
@@ -549,38 +537,16 @@ def in_notebook() -> bool:
     return loaded is not None and hasattr(loaded.get_ipython(), "kernel")
 
 
-def show_recording(recording: Path, size: tuple[int | str, int]) -> None:
-    """Show a recording below the cell that runs."""
-    width, height = size
-    widget = widget_class()(width=width, height=height)
-    import_module("IPython.display").display(widget)
-    widget.send_rrd(recording.read_bytes())
-
-
-def widget_class() -> Any:
-    """The class of a widget whose data all come from this machine."""
+def _show_in_cell(recording: Path, size: tuple[int | str, int]) -> None:
+    """Show a recording below the cell that runs, by a widget whose data come from this machine."""
     # Otherwise the widget fetches its code from app.rerun.io.
     os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "inline")
     with redirect_stdout(StringIO()):  # it prints that it does so
         rerun = import_module("rerun_notebook")
-    code = str(rerun.ESM_MOD)
-    if code.startswith(("http://", "https://")):
-        return rerun.Viewer
-    sent = import_module("traitlets").Unicode(code).tag(sync=True)
-    return type("Viewer", (rerun.Viewer,), {"_esm": LOADER, "_code": sent})
-
-
-def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:
-    from inspector.analysis import analyse_file
-    from inspector.export.sound import of_recording
-    from inspector.library import load_library
-    from inspector.recording.run import write
-
-    library = load_library()
-    with tempfile.TemporaryDirectory() as folder:
-        path = run if not isinstance(run, nm.Run) else Path(folder) / "run.npz"
-        if isinstance(run, nm.Run):
-            run.save(path)
-        found = analyse_file(Path(path), library, links=robot, kind=kind)
-        write(found, recording, overwrite=True, sound=of_recording(found))
-    return recording
+    kind, code = rerun.Viewer, str(rerun.ESM_MOD)
+    if not code.startswith(("http://", "https://")):
+        sent = import_module("traitlets").Unicode(code).tag(sync=True)
+        kind = type("Viewer", (kind,), {"_esm": LOADER, "_code": sent})
+    widget = kind(width=size[0], height=size[1])
+    import_module("IPython.display").display(widget)
+    widget.send_rrd(recording.read_bytes())
