@@ -313,7 +313,6 @@ Compare = Annotated[
 Robots = Annotated[str, _model_option("Compare them on robots that move: talos,go2 or all.")]
 Geometry = Annotated[Geometries, _model_option("Shapes: visual, collision, hull or auto.")]
 Seed = Annotated[int, _model_option("Random seed of the generated motion.", min=0)]
-PictureCompared = Annotated[Path | None, _model_option("Write a PNG (needs the extra `report`).")]
 
 
 def noise(
@@ -325,7 +324,6 @@ def noise(
     robots: Robots = "",
     geometry: Geometry = "auto",
     seed: Seed = 0,
-    picture: PictureCompared = None,
     jobs: NumberOfJobs = 1,
     overwrite: Overwrite = False,
 ) -> None:
@@ -337,20 +335,16 @@ def noise(
     if not compare and not robots:
         if len(runs or ()) != 1:
             raise typer.BadParameter("name one run; --compare takes several")
-        if picture:
-            raise typer.BadParameter("--picture takes --compare")
         _print_levels((runs or [])[0], ctx.obj, kinds, csv, overwrite=overwrite)
         return
-    from inspector.compare.models import draw, write_csv
+    from inspector.compare.models import write_csv
 
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
     sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
     if not sources:
         raise typer.BadParameter("name run files, or robots with --robots")
-    for path in filter(None, (csv, picture)):  # before long work is done for them
-        refuse_existing(path, overwrite=overwrite)
-    if picture:
-        require()
+    if csv:  # before long work is done for it
+        refuse_existing(csv, overwrite=overwrite)
     found = nm.compare(
         sources,
         kinds=kinds or COMPARED,
@@ -365,8 +359,6 @@ def noise(
         raise typer.Exit(3)
     if csv:
         write_csv(found, csv, overwrite=overwrite)
-    if picture:
-        draw(found, picture, overwrite=overwrite)
     typer.echo(found)
 
 
