@@ -6,7 +6,7 @@ together: it is there in every run, and does not need joints of the same names.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -14,9 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-import noisemodel as nm
 from inspector.analysis import Analysis, analyse, robot_known, with_links, worst_signal
 from inspector.errors import InspectorError
 from inspector.levels import FLOOR_DB, STEP, Spectrogram, link_levels, spectrogram
@@ -24,6 +22,7 @@ from inspector.library import Library
 from inspector.logs.read import Opened, open_run
 from inspector.report.findings import spoken
 from noiseclassifier import Event
+from noiseclassifier.matching import spans_of, union
 from noisemodel import Block, Run, decimated
 from noisemodel import robot as robots
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
@@ -32,8 +31,6 @@ from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
 
 CORRELATION = 0.6  # correlation of the envelopes below which an alignment is refused
-# Correlation of envelopes from which two runs are of one motion: less is a motion like it.
-ALIKE = 0.9
 RIVAL = 0.95  # share of it that the next best lag may reach: steps and strokes resemble each other
 STILL = 1e-9  # share of its size by which a motion has to change, to be more than rounding
 SHARE = 0.5  # share of the shorter run that has to lie within the longer one
@@ -56,12 +53,11 @@ class Alignment:
     seconds: float  # the same
     correlation: float = float("nan")  # of the envelopes of their motions; NaN if not computed
     rival: float = float("nan")  # that at the next best lag
-    refused: bool = False  # whether the motions determine no lag
 
     @property
-    def alike(self) -> bool:
-        """Whether both runs are known to be of one motion."""
-        return self.how is Align.AUTO and self.correlation >= ALIKE
+    def refused(self) -> bool:
+        """Whether the motions determine no lag."""
+        return self.how is Align.START and not np.isnan(self.correlation)
 
     def __str__(self) -> str:
         measured = f"correlation {self.correlation:.2f}, next best {self.rival:.2f}"
@@ -84,7 +80,7 @@ def align(before: Run, after: Run, how: Align = Align.AUTO) -> Alignment:
         return Alignment(how, lag, lag / rate)
     lag, correlation, rival = _search(before, after)
     if correlation < CORRELATION or rival > RIVAL * correlation:
-        return Alignment(Align.START, 0, 0.0, correlation, rival, refused=True)
+        return Alignment(Align.START, 0, 0.0, correlation, rival)
     return Alignment(how, lag, lag / rate, correlation, rival)
 
 
@@ -103,31 +99,27 @@ def envelope(run: Run) -> Array:
 
 def _search(before: Run, after: Run) -> tuple[int, float, float]:
     """Find the lag of the highest correlation, that, and the next best."""
-    from scipy import fft
+    from scipy.signal import correlate
 
-    lags = np.arange(1 - len(after.time), len(before.time))
-    length = fft.next_fast_len(len(lags), real=True)
-    first, second = (_powers(run, length) for run in (before, after))
+    first, second = _powers(before), _powers(after)
 
     def crossed(power: int, other: int) -> Array:
         """Sum after[k]**other before[k + lag]**power over the k that both have, at each lag."""
-        return np.asarray(fft.irfft(first[power] * np.conj(second[other]), length)[lags])
+        return np.asarray(correlate(first[power], second[other], method="fft"))
 
     count = np.maximum(np.round(crossed(0, 0)), 1.0)
-    energies = [crossed(2, 0), crossed(0, 2)]
-    least = [STILL * float(energy.max()) for energy in energies]
-    spreads = [
-        np.maximum(energy - total**2 / count, floor)
-        for energy, total, floor in zip(
-            energies, (crossed(1, 0), crossed(0, 1)), least, strict=True
-        )
-    ]
+    totals, energies = (crossed(1, 0), crossed(0, 1)), (crossed(2, 0), crossed(0, 2))
+    spread, other_spread = (
+        np.maximum(energy - total**2 / count, STILL * float(energy.max()))
+        for total, energy in zip(totals, energies, strict=True)
+    )
     # Pearson's correlation over what both have at each lag, gaps left out (Padfield, CVPR 2010).
-    product = crossed(1, 1) - crossed(1, 0) * crossed(0, 1) / count
-    scale = np.maximum(np.sqrt(spreads[0] * spreads[1]), np.finfo(np.float64).tiny)
+    product = crossed(1, 1) - totals[0] * totals[1] / count
+    scale = np.maximum(np.sqrt(spread * other_spread), np.finfo(np.float64).tiny)
     known = min(int(run.mask.sum()) for run in (before, after))
     enough = count >= min(SHARE * known, count.max())
-    lags, correlation = lags[enough], (product / scale)[enough]
+    lags = np.arange(1 - len(after.time), len(before.time))[enough]
+    correlation = (product / scale)[enough]
     best = int(np.argmax(correlation))
     below = np.flatnonzero(correlation < 0.5 * correlation[best])
     left = below[below < best].max(initial=-1)
@@ -138,16 +130,14 @@ def _search(before: Run, after: Run) -> tuple[int, float, float]:
     return int(lags[best]), float(correlation[best]), float(rival)
 
 
-def _powers(run: Run, length: int) -> list[NDArray[np.complex128]]:
-    """Transform what is known of a run, its envelope, and the square of that."""
-    from scipy import fft
-
+def _powers(run: Run) -> tuple[Array, Array, Array]:
+    """What is known of a run, its envelope less its mean, and the square of that."""
     speed, mask = envelope(run), run.mask
     size = float(np.sqrt(np.mean(speed[mask] ** 2))) if mask.any() else 0.0
     mean = float(speed[mask].mean()) if mask.any() else 0.0
     level = (speed - mean) * mask
     level[np.abs(level) < STILL * size] = 0.0  # rounding is no motion
-    return [fft.rfft(signal, length) for signal in (mask.astype(np.float64), level, level**2)]
+    return mask.astype(np.float64), level, level**2
 
 
 SAME_RATE = 1e-3  # rates that differ by less are one
@@ -183,7 +173,7 @@ def together(before: Run, after: Run, alignment: Alignment) -> tuple[Run, Run, t
     first = max(0, alignment.lag)
     stop = min(len(before.time), len(after.time) + alignment.lag)
     if stop - first < 2:
-        raise PairError(
+        raise InspectorError(
             f"before lasts {before.duration:.2f} s, and after starts"
             f" {alignment.seconds:+.2f} s from it: they share no time; `--align start` lays their"
             " starts beside each other"
@@ -224,10 +214,6 @@ def _cut(run: Run, first: int, stop: int, time: Array) -> Run:
     ]
     blocks = tuple(block for block in moved if block.start < block.stop)
     return part(run, first, stop, time=time, blocks=blocks)
-
-
-class PairError(InspectorError):
-    """Two runs that cannot be laid beside each other."""
 
 
 SIDES = ("before", "after")
@@ -303,7 +289,7 @@ def compare(
     told: dict[str, str] = {}
     for name, side in zip(("Before", "After"), sides, strict=True):
         told |= {remark: "Both" if remark in told else name for remark in side.remarks}
-    timed = not alignment.alike and any(side.findings for side in sides)
+    timed = alignment.how is not Align.AUTO and any(side.findings for side in sides)
     return Pair(
         before=sides[0],
         after=sides[1],
@@ -318,26 +304,20 @@ def compare(
     )
 
 
-def _no_links(before: nm.Run, after: nm.Run) -> str:
+def _no_links(before: Run, after: Run) -> str:
     """Why the links of two runs cannot be compared; empty if they can."""
     for which, run in zip(SIDES, (before, after), strict=True):
-        if not robot_known(run):
-            named = "names no robot" if run.robot is None else f"names {run.robot!r}, not known"
-            return f"Links are not compared: the run {which} {named}."
-        if run.position is None:
-            return f"Links are not compared: the run {which} has no positions."
-    assert before.robot is not None
-    assert after.robot is not None
-    if before.robot != after.robot and (
-        robots.locate(before.robot).read_bytes() != robots.locate(after.robot).read_bytes()
-    ):
+        if not robot_known(run) or run.position is None:
+            lacking = "positions" if robot_known(run) else "robot that is known"
+            return f"Links are not compared: the run {which} has no {lacking}."
+    files = [robots.locate(run.robot).read_bytes() for run in (before, after) if run.robot]
+    if before.robot != after.robot and files[0] != files[1]:
         return f"Links are not compared: {before.robot} and {after.robot} are two robots."
     return ""
 
 
 # Links that are quieter than the loudest peak by more than this have no difference.
 LINK_RANGE_DB = 40.0
-LOWEST_BAND = 16.0  # centre of the lowest octave, in [Hz]
 
 
 @dataclass(frozen=True)
@@ -379,30 +359,16 @@ def steps(pair: Pair) -> tuple[Array, Array]:
 
 def within(pair: Pair, start: float, stop: float, name: str = "") -> Level:
     """The level of both noises, above 10 Hz, in a stretch of time, in [dB re 1 rad/s]."""
-    first, last = _samples(pair, np.array([start, stop])).tolist()
-    inside = slice(first, last)
-    count = max(int(pair.valid[inside].sum()), 1)
-    before, after = (_noise_level(float(np.sum(f[inside] ** 2)) / count) for f in pair.vibration)
+    first, last = (max(0, round((each - pair.time[0]) * pair.rate)) for each in (start, stop))
+    count = max(int(pair.valid[first:last].sum()), 1)
+    power = [np.sum(fast[first:last] ** 2) / count for fast in pair.vibration]
+    before, after = np.maximum(decibel(np.array(power)), FLOOR_DB).tolist()
     return Level(name, before, after)
 
 
 def whole(pair: Pair) -> Level:
     """The level of both noises, above 10 Hz, in all of the time that they share."""
     return within(pair, float(pair.time[0]), float(pair.time[-1]) + 1 / pair.rate, "whole")
-
-
-def by_band(pair: Pair) -> tuple[Level, ...]:
-    """The level of both noises in octaves from 16 Hz, in [dB re 1 rad/s]."""
-    both, found, centre = spectra(pair), [], LOWEST_BAND
-    frequency, measured = both[0].frequency, len(both[0].time) > 0
-    while centre < pair.rate / 2:
-        inside = (frequency >= centre / np.sqrt(2)) & (frequency < centre * np.sqrt(2))
-        if inside.any() and measured:
-            power = [np.mean(np.sum(each.amplitude[inside] ** 2, axis=0)) / 2 for each in both]
-            before, after = (_noise_level(float(each)) for each in power)
-            found.append(Level(f"{centre:.4g} Hz", before, after))
-        centre *= 2
-    return tuple(found)
 
 
 def by_link(pair: Pair) -> tuple[Level, ...]:
@@ -440,19 +406,14 @@ def shared_links(pair: Pair) -> tuple[str, ...]:
     return tuple(name for name in pair.links[0].links if name in pair.links[1].links)
 
 
-def _samples(pair: Pair, time: Array) -> NDArray[np.intp]:
-    """The samples nearest to times; the end is one too."""
-    nearest = np.round((time - pair.time[0]) * pair.rate).astype(np.intp)
-    clipped: NDArray[np.intp] = np.clip(nearest, 0, len(pair.time))
-    return clipped
-
-
-def _noise_level(power: float) -> float:
-    return max(float(decibel(np.array(power))), FLOOR_DB)
-
-
-NEW, LOUDER, UNCHANGED, QUIETER, RESOLVED = "new", "louder", "unchanged", "quieter", "resolved"
-KINDS = (NEW, LOUDER, RESOLVED, QUIETER, UNCHANGED)  # in the order in which they matter
+# In the order in which they matter.
+KINDS = NEW, LOUDER, RESOLVED, QUIETER, UNCHANGED = (
+    "new",
+    "louder",
+    "resolved",
+    "quieter",
+    "unchanged",
+)
 LOUDER_DB = 3.0  # a failure in both runs whose level changed by as much is louder or quieter
 
 
@@ -476,29 +437,22 @@ class Change:
 def changes(pair: Pair) -> tuple[Change, ...]:
     """Match the failures of two runs.
 
-    Findings of one class that overlap in time, whichever run they are of, are one failure. If both
+    Findings of one class that overlap or touch, whichever run they are of, are one failure. If both
     runs have a part in it, it is louder or quieter by 3 dB or more, or else unchanged; otherwise it
     is new or resolved.
     """
-    sides = [(name, failures(pair, side)) for name, side in pair.sides]
-    every = [(f.label, f.start, f.stop, side) for side, own in sides for f in own]
-    groups: list[list[tuple[str, float, float, str]]] = []
-    for each in sorted(every):
-        stop = max(last for _, _, last, _ in groups[-1]) if groups else 0.0
-        if groups and each[0] == groups[-1][0][0] and each[1] < stop:
-            groups[-1].append(each)
-        else:
-            groups.append([each])
+    both = [failures(pair, side) for _, side in pair.sides]
     found = []
-    for group in groups:
-        label, start, _, _ = group[0]
-        stop = max(last for _, _, last, _ in group)
-        level, kind = within(pair, start, stop), UNCHANGED
-        if len({side for *_, side in group}) == 1:
-            kind = RESOLVED if group[0][3] == SIDES[0] else NEW
-        elif abs(level.change) >= LOUDER_DB:
-            kind = LOUDER if level.change > 0.0 else QUIETER
-        found.append(Change(kind, label, start, stop, level))
+    for label in sorted({each.label for side in both for each in side}):
+        own = [spans_of(each for each in side if each.label == label) for side in both]
+        for start, stop in union(np.concatenate(own)).tolist():
+            level, kind = within(pair, start, stop), UNCHANGED
+            before, after = (((side[:, 0] >= start) & (side[:, 1] <= stop)).any() for side in own)
+            if not (before and after):
+                kind = RESOLVED if before else NEW
+            elif abs(level.change) >= LOUDER_DB:
+                kind = LOUDER if level.change > 0.0 else QUIETER
+            found.append(Change(kind, label, start, stop, level))
     return tuple(sorted(found, key=lambda change: (change.start, change.stop, change.label)))
 
 
@@ -538,11 +492,6 @@ def labelled(pair: Pair) -> bool:
 SHOWN_LINKS = 10
 
 
-def report(pair: Pair) -> str:
-    """Write the report of two runs."""
-    return "\n\n".join(_parts(pair)) + "\n"
-
-
 def verdict(pair: Pair) -> tuple[str, str]:
     """A key of ``colors.VERDICTS``, and whether the run after is worse, in a line."""
     found = changes(pair)
@@ -566,9 +515,9 @@ def _counts(found: Sequence[Change]) -> str:
     return ", ".join(f"{count[kind]} {kind}" for kind in KINDS if count[kind])
 
 
-def _parts(pair: Pair) -> Iterator[str]:
-    yield f"### {pair.before.name} → {pair.after.name}"
-    yield f"**{summary(pair)}**"
+def report(pair: Pair) -> str:
+    """The report of two runs, in Markdown."""
+    parts = [f"### {pair.before.name} → {pair.after.name}", f"**{summary(pair)}**"]
     found = sorted(changes(pair), key=lambda change: (KINDS.index(change.kind), change.start))
     if found:
         events = [
@@ -576,19 +525,15 @@ def _parts(pair: Pair) -> Iterator[str]:
             for c in found
         ]
         title = "finding" if labelled(pair) else "annotated"
-        yield _table(("", title, "time [s]", "before [dB]", "after [dB]", "change"), events)
-    yield _largest(pair)
-    yield f"Aligned {pair.alignment}. Changes in dB; positive is louder after."
-    yield "#### Bands"
-    yield _levels("octave", by_band(pair))
-    yield "Levels of the noise in dB re 1 rad/s; of events, above 10 Hz."
-    if links := by_link(pair):
-        yield "#### Links"
-        yield _levels("link", links[:SHOWN_LINKS])
-        yield "Sound power of the vibration above 10 Hz, in dB re 1 pW; the largest changes first."
+        parts += [_table(("", title, "time [s]", "before [dB]", "after [dB]", "change"), events)]
+    parts += [_largest(pair), f"Aligned {pair.alignment}. Levels above 10 Hz in dB re 1 rad/s."]
+    if links := by_link(pair)[:SHOWN_LINKS]:
+        rows = [(link.name, *_numbers(link)) for link in links]
+        parts += ["#### Links", _table(("link", "before", "after", "change"), rows)]
+        parts += ["Sound power above 10 Hz, in dB re 1 pW; the largest changes first."]
     if pair.remarks:
-        yield "#### Remarks"
-        yield "\n".join(f"- {remark}" for remark in pair.remarks)
+        parts += ["#### Remarks", "\n".join(f"- {remark}" for remark in pair.remarks)]
+    return "\n\n".join(parts) + "\n"
 
 
 def _largest(pair: Pair) -> str:
@@ -598,20 +543,7 @@ def _largest(pair: Pair) -> str:
     place = int(np.abs(change).argmax())
     if change[place] == 0.0:
         return "The level is the same at all times."
-    links = ""
-    if pair.links is not None:
-        names = shared_links(pair)
-        starts, changed = link_steps(pair, names)
-        column = max(int(np.searchsorted(starts, time[place], side="right")) - 1, 0)
-        by_name = dict(zip(names, changed[column].tolist(), strict=True))
-        most = max(by_name, key=lambda name: abs(by_name[name]), default="")
-        if most and by_name[most] != 0.0:
-            links = f"; {most} {by_name[most]:+.0f} dB"
-    return f"Largest change of level: **{change[place]:+.0f} dB at {time[place]:.2f} s**{links}."
-
-
-def _levels(head: str, rows: Sequence[Level]) -> str:
-    return _table((head, "before", "after", "change"), [(r.name, *_numbers(r)) for r in rows])
+    return f"Largest change of level: **{change[place]:+.0f} dB at {time[place]:.2f} s**."
 
 
 def _numbers(level: Level) -> tuple[str, str, str]:
