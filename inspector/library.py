@@ -78,23 +78,6 @@ def load_library(chosen: Sequence[str | Path] | None = None) -> Library:
     return {path.stem: nc.load(path) for path in model_files(chosen)}
 
 
-def for_robot(library: Library, robot: str | None) -> Library:
-    """Leave out models of one rate that go joint by joint and know other robots alone.
-
-    Signals of single joints generalise to new robots less than norms. A model whose runs name no
-    robot stays, and so do all if none would be left.
-    """
-
-    def fits(model: nc.Model) -> bool:
-        if isinstance(model, nc.General) or model.profile.reference:
-            return True
-        robots = {nc.recording.robot_of(name) for name in model.runs} - {""}
-        by_joint = any(map(nc.signals.by_joint, model.profile.signals))
-        return not by_joint or not robots or robot in robots
-
-    return {name: model for name, model in library.items() if fits(model)} or library
-
-
 def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) -> Labelled:
     """Label a run by the model of the nearest rate at or below its own whose signals it has.
 
@@ -103,8 +86,7 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
     """
     slower = without_hold(run) if slower is None else slower
     try:
-        own = for_robot(library, run.robot)
-        name, classifier = nearest(own, slower.rate, signal_names(slower), logged=run.rate)
+        name, classifier = nearest(library, slower.rate, signal_names(slower), logged=run.rate)
     except nc.ModelsError as error:
         held = "" if slower is run else "measured values are held: "
         raise CannotTellError(f"{held}{error}") from error

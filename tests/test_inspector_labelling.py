@@ -8,7 +8,6 @@ from generalmodel import fixed
 
 from inspector.library import (
     CannotTellError,
-    for_robot,
     label_noise,
     label_run,
     load_library,
@@ -87,9 +86,9 @@ def test_the_model_with_most_of_the_signals_of_a_run_is_taken():
     assert label_run(run_of(noisy, 1000.0), of_panda()).model == "noise"  # desired is measured
     time, names = np.arange(3000) / 1000.0, ("a", "b", "c")
     followed = Run(time=time, velocity=noisy, velocity_desired=0 * noisy + 0.1, joint_names=names)
-    assert label_run(followed, of_panda()).model == "norms"
-    known = replace(followed, robot="panda")
-    assert label_run(known, of_panda()).model == "joints"
+    assert label_run(followed, of_panda()).model == "joints"
+    alone = {name: of_panda()[name] for name in ("noise", "norms")}
+    assert label_run(followed, alone).model == "norms"
     apart = replace(followed, desired_joint_names=("tool", "wrist", "base"))
     assert label_run(apart, of_panda()).model == "noise"  # no joint that is both
     measured = Run(time=time, velocity=noisy, joint_names=names)
@@ -120,21 +119,6 @@ def test_a_run_without_the_signals_of_a_model_is_not_classified_and_the_error_ha
     run = Run(time=np.arange(3000) / 1000.0, velocity=np.ones((3000, 1)), joint_names=("a",))
     with pytest.raises(CannotTellError, match="no signal desired, error; there is noise, measured"):
         label_run(run, alone)
-
-
-def test_joints_are_classified_of_robots_in_the_training_set_and_norms_of_all_others():
-    both = {name: of_panda()[name] for name in ("norms", "joints")}
-    assert for_robot(both, "panda") == both
-    for robot in (None, "xarm7", "my.urdf"):
-        assert list(for_robot(both, robot)) == ["norms"]
-    alone = {"joints": of_panda()["joints"]}
-    assert for_robot(alone, "xarm7") == alone  # who names one model means it
-
-
-def test_a_model_whose_runs_name_no_robot_classifies_the_joints_of_any():
-    own = replace(of_panda()["joints"], runs={"monday": "", "tuesday": ""})
-    library = {"norms": of_panda()["norms"], "own": own}
-    assert for_robot(library, "xarm7") == library
 
 
 @pytest.mark.parametrize("rate", [91.0, 1000.0, 5000.0])

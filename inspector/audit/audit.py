@@ -29,7 +29,7 @@ import numpy as np
 import noiseclassifier as nc
 from inspector.audit.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.errors import InspectorError, without_path
-from inspector.library import Library, for_robot, nearest, signals_of
+from inspector.library import Library, nearest, signals_of
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.plausibility import check_joints, limit_warnings
 from inspector.logs.read import Reading, left_out, open_source, sources
@@ -248,7 +248,7 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
         classes=observable_classes(
             reach,
             run.mask,
-            for_robot(library, run.robot),
+            library,
             signals_of(part),
             rate=(slower or without_hold(run)).rate,
         ),

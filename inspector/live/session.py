@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from inspector.analysis import headline, status_of
 from inspector.errors import Status
-from inspector.library import Library, for_robot, load_library
+from inspector.library import Library, load_library
 from inspector.live.drawing import Drawing, Sink
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
 from inspector.live.samples import (
@@ -271,7 +271,7 @@ class LiveSession:
             self._stream = LevelStream(names, self._rate, named, self._on_levels)
         self._noisy = [name for name in NOISY if name in widths]
         self._clock = Clock(self._rate, self._warnings)
-        self._labeller = Labeller(for_robot(self._library, robot), self._rate, widths)
+        self._labeller = Labeller(self._library, self._rate, widths)
         self._findings = Findings()
         self._news = News(self._tell, self._labeller.length + SETTLED * self._labeller.hop)
         self._watch = LimitWatch(names, robot) if robot else None
