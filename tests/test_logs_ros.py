@@ -4,13 +4,10 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.bags import Layout, stamp
 from noisemodel import Robot
 
 TALK, OLD = Talk(), Talk(ros1=True)
@@ -371,46 +368,3 @@ def test_some_of_a_robots_joints_are_enough_including_mimic_joints(tmp_path):
     assert run.joint_names == tuple(names)
     q, _ = Robot.load("panda", mimic=True).configuration(run)
     assert np.array_equal(q[:, [6, 7, 1]], position[:, [1, 2, 3]])
-
-
-FLOATS = st.lists(st.floats(width=64), max_size=5)
-
-
-@given(
-    st.lists(st.text(st.characters(codec="utf-8", exclude_characters="\0")), max_size=4),
-    FLOATS,
-    FLOATS,
-    FLOATS,
-    st.text(st.characters(codec="ascii", exclude_characters="\0"), max_size=9),
-)
-@settings(max_examples=100, deadline=None)
-def test_a_layout_gives_the_numbers_of_rosbags(names, position, velocity, effort, frame):
-    message = TALK.joint_state(1_700_000_000_123_456_789, names, position, velocity, effort)
-    message.header.frame_id = frame
-    data = bytes(TALK.raw(message))
-    layout = Layout.of(data)
-    assert layout.fits(data)
-    assert list(layout.names) == names
-    assert stamp(data) == 1_700_000_000_123_456_789
-    parsed = TALK.store.deserialize_cdr(data, "sensor_msgs/msg/JointState")
-    for (start, stop), name in zip(layout.arrays, ("position", "velocity", "effort"), strict=True):
-        assert data[start:stop] == getattr(parsed, name).tobytes()
-
-
-def test_another_layout_does_not_fit():
-    one, other, longer = (
-        bytes(TALK.raw(TALK.joint_state(0, names, values, values)))
-        for names, values in ((["ab"], [1.0]), (["ac"], [2.0]), (["ab", "c"], [1.0, 2.0]))
-    )
-    layout = Layout.of(one)
-    assert layout.fits(bytes(TALK.raw(TALK.joint_state(5, ["ab"], [3.0], [4.0]))))
-    assert not layout.fits(other)
-    assert not layout.fits(longer)
-
-
-def test_what_is_no_joint_state_has_no_layout():
-    data = bytes(TALK.raw(TALK.joint_state(0, ["a"], np.ones(1), np.ones(1))))
-    assert Layout.of(b"\x00\x00" + data[2:]) is None  # big-endian
-    for length in range(len(data)):
-        assert Layout.of(data[:length]) is None
-    assert Layout.of(data[:12] + b"\xff" * 40) is None

@@ -21,7 +21,7 @@ from functools import cache
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, BinaryIO, Self, TypeAlias
+from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
 from mcap.records import Channel, Chunk, McapRecord, Schema
@@ -164,73 +164,6 @@ def _nanoseconds(time: Any) -> int:
     return int(time.sec) * 10**9 + int(time.nanosec)
 
 
-LITTLE = b"\x00\x01"  # CDR, little-endian; other encodings are deserialised by rosbags
-STAMP, COUNT = struct.Struct("<iI"), struct.Struct("<I")
-BODY = 12  # offset of the bytes after the stamp
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Byte offsets of the numbers of a JointState, by which they are copied without parsing.
-
-    CDR aligns a number to a multiple of its size, counted from the end of the four bytes of the
-    encapsulation header. Messages of one publisher have one layout: the bytes between their
-    numbers are equal. A bag is read in a third of the time that rosbags takes.
-    """
-
-    names: tuple[str, ...]
-    size: int  # of the message, in bytes
-    arrays: tuple[tuple[int, int], ...]  # start and stop of positions, velocities and efforts
-    between: tuple[tuple[int, int, bytes], ...]  # start, stop, and bytes that messages share
-
-    @classmethod
-    def of(cls, data: bytes) -> Self | None:
-        """Layout of a message; None if it is not a JointState in little-endian CDR."""
-        place = BODY
-
-        def count() -> int:
-            nonlocal place
-            place += -place % 4 + 4
-            return int(COUNT.unpack_from(data, place - 4)[0])
-
-        def text() -> str:
-            nonlocal place
-            length = count()
-            place += length
-            return data[place - length : place].rstrip(b"\x00").decode()
-
-        try:
-            text()
-            names = tuple(text() for _ in range(count()))
-            arrays, between, start = [], [], BODY
-            for _ in range(3):
-                if numbers := count():
-                    place += -(place - 4) % 8
-                between.append((start, place, data[start:place]))
-                start, place = place, place + 8 * numbers
-                arrays.append((start, place))
-                start = place
-        except (struct.error, UnicodeDecodeError):
-            return None
-        if data[:2] != LITTLE or place > len(data):
-            return None
-        return cls(names, len(data), tuple(arrays), tuple(between))
-
-    def fits(self, data: bytes) -> bool:
-        """Whether a message has this layout."""
-        return (
-            len(data) == self.size
-            and data[:2] == LITTLE
-            and all(data[start:stop] == same for start, stop, same in self.between)
-        )
-
-
-def stamp(data: bytes) -> int:
-    """Stamp of a message that has a layout, in [ns]."""
-    seconds, fraction = STAMP.unpack_from(data, 4)
-    return int(seconds) * 10**9 + int(fraction)
-
-
 # Rows of messages
 
 # What a message tells at one time: joints, stamp in [ns], and numbers by the array's name.
@@ -311,46 +244,29 @@ class MotionReader:
         self._decode = decoder(path, topic)
         self._topic = topic
         self._rows, self._signals = MOTION[topic.type]
-        self._has_layout = topic.type == JOINT_STATE and not topic.ros1
         if topic.type == JOINT_STATE and any(word in topic.name.lower() for word in COMMANDED):
             self._signals = {name: (f"{name}_desired", 1) for name in ("position", "velocity")}
-        self._layout: Layout | None = None
         self._groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
 
     def add(self, received: int, data: bytes) -> None:
         """Add a message that was received at a time in [ns]."""
-        if self._has_layout and not (self._layout and self._layout.fits(data)):
-            self._layout = Layout.of(data)
-        if self._layout:
-            numbers = (data[start:stop] for start, stop in self._layout.arrays)
-            parts = dict(zip(ARRAYS, numbers, strict=True))
-            self._add(self._layout.names, stamp(data), received, parts)
-            return
         for joints, logged, found in self._rows(self._decode(data)):
-            parts = {n: np.asarray(each, dtype=np.float64).tobytes() for n, each in found.items()}
-            self._add(joints, logged, received, parts)
-
-    def _add(
-        self, joints: tuple[str, ...], logged: int, received: int, parts: Mapping[str, bytes]
-    ) -> None:
-        """Append a row; arrays with another length than the joints are ignored."""
-        present = tuple(
-            name
-            for name, numbers in parts.items()
-            if len(numbers) // 8 == BASE_WIDTHS.get(name, len(joints)) > 0
-        )
-        group = self._groups.get((frozenset(joints), present))
-        if group is None:
-            group = Group(joints, {name: array("d") for name in present})
-            self._groups[frozenset(joints), present] = group
-        group.logged.append(logged)
-        group.received.append(received)
-        for name in present:
-            numbers = parts[name]
-            if joints != group.joints:
-                order = [joints.index(joint) for joint in group.joints]
-                numbers = np.frombuffer(numbers)[order].tobytes()
-            group.arrays[name].frombytes(numbers)
+            # Arrays with another length than the joints are ignored.
+            rows = {
+                name: np.asarray(numbers, dtype=np.float64)
+                for name, numbers in found.items()
+                if len(numbers) == BASE_WIDTHS.get(name, len(joints)) > 0
+            }
+            key = frozenset(joints), tuple(rows)
+            if key not in self._groups:
+                self._groups[key] = Group(joints, {name: array("d") for name in rows})
+            group = self._groups[key]
+            group.logged.append(logged)
+            group.received.append(received)
+            for name, row in rows.items():
+                if joints != group.joints:
+                    row = row[[joints.index(joint) for joint in group.joints]]
+                group.arrays[name].frombytes(row.tobytes())
 
     def fields(self) -> Iterator[Field]:
         """Fields of the messages; of several transforms, the one with the smoothest fixed frame."""
