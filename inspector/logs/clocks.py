@@ -24,7 +24,7 @@ from inspector.logs.names import TIME_UNITS, time_column, without_unit
 from inspector.text import counted
 from noisemodel import Run
 from noisemodel.run import SAMPLED, continuous_quaternions, resample
-from noisemodel.runfile import OnDemand, pieces
+from noisemodel.runfile import either_way, pieces
 from noisemodel.types import Array, Indices, Mask, Real
 
 # The units that stamps may have, in [s].
@@ -391,15 +391,15 @@ def _estimated(
 
     Clocks that do not overlap (``apart`` says so) have to be moved.
     """
-    found = _estimate(
+    pair = _common_tracks(
         {track.signal: track for track in reversed(tracks) if not track.is_desired},
         {track.quantity: track for track in reversed(tracks) if track.stamps in own},
     )
     unknown = "no joint moves in both"
-    if found is None and not apart:
+    if pair is None and not apart:
         return 0.0, 0.0, ""
-    if found is not None:
-        seconds, drift, correlation, next_best = found
+    if pair is not None:
+        seconds, drift, correlation, next_best = _estimate(*pair)
         said = (
             f"offset {seconds:+.4f} s{f', drift {drift * 1e6:+.0f} ppm' if drift else ''}"
             f" (correlation {correlation:.2f}, next best {next_best:.2f})"
@@ -425,19 +425,11 @@ def no_overlap(desired: Stamps, measured: Stamps) -> str:
     return f"{span(desired)} do not overlap with {span(measured)}"
 
 
-def _estimate(
-    measured: Mapping[str, Track], desired: Mapping[str, Track]
-) -> tuple[float, float, float, float] | None:
-    """Offset in [s] and drift in [s/s] of the desired clock, and the correlations there and next.
-
-    These are normalised; None if no joint moves in both.
-    """
-    pair = _common_tracks(measured, desired)
-    if pair is None:
-        return None
-    rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in pair))
-    joints = [joint for joint in pair[0].joints if joint in pair[1].joints]
-    one, other = (_velocities(track, joints) for track in pair)
+def _estimate(measured: Track, desired: Track) -> tuple[float, float, float, float]:
+    """Offset in [s] and drift in [s/s] of the desired clock; the correlations there and next."""
+    rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in (measured, desired)))
+    joints = [joint for joint in measured.joints if joint in desired.joints]
+    one, other = (_velocities(track, joints) for track in (measured, desired))
     seconds, correlation, next_best = _search(one, other, min(rate, COARSE_RATE))
     drift = 0.0
     for _ in range(3):
@@ -484,44 +476,49 @@ def _at(motion: Track, instants: Array) -> Array:
 
 def _search(measured: Track, desired: Track, rate: float) -> tuple[float, float, float]:
     """Best offset in [s], its correlation, and the next best's correlation."""
-    from scipy import fft
-
     times = measured.stamps.time, desired.stamps.time
-    one, other = (
-        _at(motion, np.arange(time[0], time[-1], 1 / rate))
-        for motion, time in zip((measured, desired), times, strict=True)
+    one, other = _moving(
+        *(
+            _at(motion, np.arange(time[0], time[-1], 1 / rate))
+            for motion, time in zip((measured, desired), times, strict=True)
+        )
     )
-    scale = np.sqrt((one**2).mean(axis=0) * (other**2).mean(axis=0))
-    moving = scale > 0
-    one, other = one[:, moving], other[:, moving] / scale[moving]
-    length = fft.next_fast_len(len(one) + len(other), real=True)
-    weight = 1 / scale[moving]
-    ones = np.ones((len(one), 1)), np.ones((len(other), 1))
-    energy = _crossed((one**2 * weight).sum(axis=1, keepdims=True), ones[1], length)
-    energy = energy * _crossed(ones[0], (other**2 / weight).sum(axis=1, keepdims=True), length)
-    overlap = _crossed(*ones, length)
-    least = SHARE * min(len(one), len(other))
-    correlation = _crossed(one, other, length) / np.sqrt(np.maximum(energy, 1e-9 * energy.max()))
-    correlation = np.where(overlap >= least - 0.5, correlation, -1.0)
+    correlation = _correlation(one, other, int(SHARE * min(len(one), len(other))))
     best = int(np.argmax(correlation))
+    distance = np.abs(np.arange(len(correlation)) - best)
     # The peak reaches to where the correlation falls below half of it.
-    around = np.roll(correlation, length // 2 - best)
-    below = np.abs(np.flatnonzero(around < 0.5 * around[length // 2]) - length // 2)
-    edge = int(below.min(initial=length))
-    lags = np.arange(length)
-    distance = np.minimum((lags - best) % length, (best - lags) % length)
+    edge = distance[correlation < 0.5 * correlation[best]].min(initial=len(correlation))
     next_best = float(correlation[distance > edge].max(initial=-1.0))
-    lag = best if best < len(one) else best - length
-    seconds = lag / rate + float(times[0][0] - times[1][0])
+    seconds = (best - len(other) + 1) / rate + float(times[0][0] - times[1][0])
     return seconds, float(correlation[best]), next_best
 
 
-def _crossed(one: Array, other: Array, length: int) -> Array:
-    """Sum of the products of all columns at each lag, of one behind the other first."""
+def _moving(one: Array, other: Array) -> tuple[Array, Array]:
+    """Joints that move in both motions, scaled to have equal weight, fast or slow."""
+    scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
+    moving = scale > 0
+    weight = np.sqrt(1 / scale[moving])
+    return one[:, moving] * weight, other[:, moving] * weight
+
+
+def _correlation(one: Array, other: Array, least: int) -> Array:
+    """Normalised correlation at each lag of one behind the other, from 1 - len(other) on.
+
+    It is -1 where fewer samples than ``least`` overlap.
+    """
     from scipy import fft
 
+    length = fft.next_fast_len(len(one) + len(other), real=True)
     product = fft.rfft(one, length, axis=0) * np.conj(fft.rfft(other, length, axis=0))
-    return np.asarray(fft.irfft(product.sum(axis=1), length))
+    lags = np.arange(1 - len(other), len(one))
+    crossed = fft.irfft(product.sum(axis=1), length)[lags]
+    start, stop = np.maximum(lags, 0), np.minimum(lags + len(other), len(one))
+    sums = (np.cumsum((each**2).sum(axis=1)) for each in (one, other))
+    of_one, of_other = (np.concatenate(([0.0], each)) for each in sums)
+    energy = (of_one[stop] - of_one[start]) * (of_other[stop - lags] - of_other[start - lags])
+    tiny = np.finfo(np.float64).tiny
+    found = crossed / np.sqrt(np.maximum(energy, max(1e-9 * energy.max(), tiny)))
+    return np.where(stop - start >= least, found, -1.0)
 
 
 def _residuals(measured: Track, desired: Track, seconds: float, drift: float, rate: float) -> Array:
@@ -547,26 +544,17 @@ def _residuals(measured: Track, desired: Track, seconds: float, drift: float, ra
 
 def _match(segment: Array, longer: Array, rate: float) -> tuple[float, float]:
     """Offset in [s] of a segment within a longer one, and the correlation there."""
-    from scipy import fft
-
-    scale = np.sqrt((segment**2).sum(axis=0) * (longer**2).sum(axis=0))
-    moving = scale > 0
-    if not moving.any():
+    longer, segment = _moving(longer, segment)
+    if not segment.size:
         return 0.0, 0.0
-    weight = np.sqrt(1 / scale[moving])  # joints have equal weight, fast or slow
-    segment, longer = segment[:, moving] * weight, longer[:, moving] * weight
-    reach = (len(longer) - len(segment)) // 2
-    length = fft.next_fast_len(len(longer), real=True)
-    crossed = _crossed(longer, segment, length)[: 2 * reach + 1]
-    energy = np.concatenate(([0.0], np.cumsum((longer**2).sum(axis=1))))
-    energy = (energy[len(segment) :] - energy[: -len(segment)])[: 2 * reach + 1]
-    near = crossed / np.sqrt(np.maximum((segment**2).sum() * energy, np.finfo(np.float64).tiny))
+    near = _correlation(longer, segment, len(segment))[len(segment) - 1 :]
     peak = int(np.argmax(near))
     found = longer[peak : peak + len(segment)]
     gain = (segment * found).sum(axis=0) / np.maximum((found**2).sum(axis=0), 1e-300)
     slope = np.gradient(found * gain, 1 / rate, axis=0)
     # piece(t) = found(t - rest), to first order
     rest = ((found * gain - segment) * slope).sum() / (slope**2).sum()
+    reach = (len(longer) - len(segment)) // 2
     return (reach - peak) / rate + float(rest), float(near[peak])
 
 
@@ -631,16 +619,13 @@ def without_hold(run: Run) -> Run:
     def every(signal: Any) -> Any:
         if signal is None:
             return None
-        if not isinstance(signal, OnDemand):
-            return np.ascontiguousarray(signal[first::count])
-        rows = range(first, len(signal), count)
-        kept = OnDemand(
-            (len(rows), *signal.shape[1:]),
-            signal.dtype,
-            lambda start, stop: signal[first + count * start : first + count * stop : count],
-        )
-        kept.checked = signal.checked
-        return kept
+        shape = (len(range(first, len(signal), count)), *signal.shape[1:])
+
+        def read(start: int, stop: int) -> Any:
+            rows = signal[first + count * start : first + count * stop : count]
+            return np.ascontiguousarray(rows)
+
+        return either_way([signal], shape, read, signal.dtype)
 
     fields: dict[str, Any] = {name: every(getattr(run, name)) for name in SAMPLED}
     return replace(run, **fields, stages={name: every(each) for name, each in run.stages.items()})
