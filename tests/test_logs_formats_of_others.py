@@ -437,17 +437,3 @@ def test_what_is_no_joints_motion_is_not_read(tmp_path, column):
     path = tmp_path / "log.csv"
     path.write_text(table(f"time,elbow.velocity,{column}", (V,)))
     assert read_log(path).remarks == (f"log.csv: 1 column not read: {column}",)
-
-
-def test_columns_that_no_name_tells_get_a_line_that_works(tmp_path):
-    rows = "\n".join(f"{0.01 * n},{0.01 * n},{0.02 * n}" for n in range(22))
-    (tmp_path / "log.csv").write_text(f"time,a,b\n{rows}")
-    with pytest.raises(LogError, match="such as --columns time,q1,q2; columns are time, a, b"):
-        read_log(tmp_path / "log.csv")
-    run = read_log(tmp_path / "log.csv", columns=("time", "q1", "q2")).run
-    assert run.position is not None
-
-
-if __name__ == "__main__":
-    print("| log | header | typed | said | imported |\n|---|---|---|---|---|")
-    print("\n".join(each.row for each in FORMATS))

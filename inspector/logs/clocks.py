@@ -183,9 +183,9 @@ def rate_of(position: Real, velocity: Real) -> float | None:
     step = np.diff(position, axis=0)
     simpson = (velocity[2:] + 4 * velocity[1:-1] + velocity[:-2]) / 6
     correlation, rate = max(
-        _slope((position[2:] - position[:-2]) / 2, simpson),
-        _slope(step, velocity[1:]),  # of simulators, whose velocity comes first,
-        _slope(step, velocity[:-1]),  # or whose position does
+        slope((position[2:] - position[:-2]) / 2, simpson),
+        slope(step, velocity[1:]),  # of simulators, whose velocity comes first,
+        slope(step, velocity[:-1]),  # or whose position does
     )
     if correlation < FITS:
         return None
@@ -196,7 +196,7 @@ def rate_of(position: Real, velocity: Real) -> float | None:
     return float(f"{rate:.3g}")
 
 
-def _slope(steps: Real, speed: Real) -> tuple[float, float]:
+def slope(steps: Real, speed: Real) -> tuple[float, float]:
     """Correlation of steps and velocities, and their ratio by least squares."""
     usable = np.isfinite(steps) & np.isfinite(speed) & (np.abs(steps) < LARGEST_STEP)
     steps, speed = steps[usable], speed[usable]

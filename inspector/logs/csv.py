@@ -4,7 +4,7 @@ import csv
 import re
 from array import array
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
@@ -18,19 +18,17 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, gathered
-from inspector.logs.clocks import counting, is_counter, stamps_since
+from inspector.logs.clocks import counting, is_counter, slope, stamps_since
 from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions, no_motion
 from inspector.logs.names import (
     JOINT_SIGNALS,
     TIME_UNITS,
-    UNLIKELY,
     Naming,
     array_signal,
     column_signal,
     says_twice,
     time_column,
-    without_unit,
 )
 from inspector.logs.names import UNITS as SIGNAL_UNITS
 from inspector.text import counted
@@ -75,7 +73,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 
 def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
-    with path.open(newline="", encoding="utf-8-sig", errors="replace") as stream:
+    with _opened(path) as stream:
         layout = _layout(path, stream, options)
         rows = sum(1 for _ in islice(_lines(path, stream), layout.skip, None))
     time = options.time or time_column(layout.header)
@@ -93,28 +91,32 @@ def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
     return (f"{rows} rows", *(f"{name}  {held(name)}" for name in layout.header if name))
 
 
-def _read(path: Path, options: ReadOptions) -> Log:
-    """Log with the columns whose signal is known."""
+@contextmanager
+def _opened(path: Path) -> Iterator[TextIO]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            return _log_of(path, stream, options)
+            yield stream
     except OSError as error:
         raise LogError(path, f"cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise LogError(path, "not a CSV log: not text in UTF-8") from error
+    except csv.Error as error:
+        raise LogError(path, f"not a CSV log ({error})") from error
 
 
-def _log_of(path: Path, stream: TextIO, options: ReadOptions) -> Log:
-    layout = _layout(path, stream, options)
-    header = layout.header
-    time, rest = _times(header, options)
-    names = [name for place, name in enumerate(header) if name and place not in (time, rest)]
-    options = options.for_columns(path, names)
-    wanted = _wanted(path, layout, time, rest, options)
-    named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
-    counter = None if time is not None else _counter(path, stream, layout, wanted)
-    times = (time if counter is None else counter, rest)
-    rows, values, cells, joints = _table(path, stream, layout, wanted, times, [*named])
+def _read(path: Path, options: ReadOptions) -> Log:
+    """Log with the columns whose signal is known."""
+    with _opened(path) as stream:
+        layout = _layout(path, stream, options)
+        header = layout.header
+        time, rest = _times(header, options)
+        names = [name for place, name in enumerate(header) if name and place not in (time, rest)]
+        options = options.for_columns(path, names)
+        wanted = _wanted(path, layout, time, rest, options)
+        named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
+        counter = None if time is not None else _counter(path, stream, layout, wanted)
+        times = (time if counter is None else counter, rest)
+        rows, values, cells, joints = _table(path, stream, layout, wanted, times, [*named])
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
     if counter is not None and _counts(cells):
@@ -165,20 +167,10 @@ def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
     stream.seek(0)
     if not any(line.strip() for line in lines):
         raise LogError(path, "the log is empty; expected a header, then a row per sample")
-    try:
-        delimiter, first = _first_data(lines)
-        if first is None and not options.columns:  # the first line names, rows tell what is wrong
-            rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
-            return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
-        return _layout_of(path, lines, delimiter, first, options)
-    except csv.Error as error:
-        raise LogError(path, f"not a CSV log ({error})") from error
-
-
-def _layout_of(
-    path: Path, lines: Sequence[str], delimiter: str, first: int | None, options: ReadOptions
-) -> Layout:
-    """Layout of a file by the lines before its first row of numbers."""
+    delimiter, first = _first_data(lines)
+    if first is None and not options.columns:  # the first line names, rows tell what is wrong
+        rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+        return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
     before = {
         number: _split(line, delimiter)
         for number, line in enumerate(lines[:first], start=1)
@@ -271,31 +263,21 @@ def _suggested(table: Array) -> tuple[list[str], str]:
     left = columns.shape[1]
     best, names = CLEAR, [f"q{number}" for number in range(1, left + 1)]
     for count in range(1, left // 2 + 1):
-        quantities = ("q", "dq", "tau")[: 2 if left == 2 * count else 3]
-        pairs = [(quantity, number) for quantity in quantities for number in range(1, count + 1)]
+        kinds = ("q", "dq", "tau")[: 2 if left == 2 * count else 3]
+        pairs = [(kind, number) for kind in kinds for number in range(1, count + 1)]
         for order in (pairs, sorted(pairs, key=lambda pair: pair[1])):  # by quantity, by joint
-            named = [*(f"{quantity}{number}" for quantity, number in order), *[""] * left][:left]
+            named = [*(f"{kind}{number}" for kind, number in order), *[""] * left][:left]
             position, velocity = (
-                columns[:, [name.startswith(quantity) for name in named]]
-                for quantity in ("q", "dq")
+                columns[:, [name.startswith(kind) for name in named]] for kind in ("q", "dq")
             )
-            fit = _fit(position, velocity)
-            if fit > best + 0.01:
-                best, names = fit, named
+            if position.shape == velocity.shape:
+                fit, _ = slope((position[2:] - position[:-2]) / 2, velocity[1:-1])
+                if fit > best + 0.01:
+                    best, names = fit, named
     names = ["time", *names] if even else names
     if even and not is_counter(steps, float(table[0, 0])):
         return names, " (without stamps: no time, but --rate HZ)"
     return names, "" if best > CLEAR else " --rate HZ (the log's samples per second)"
-
-
-def _fit(position: Array, velocity: Array) -> float:
-    """Correlation of columns with the slopes of others; 0 if a column has no other."""
-    if position.shape != velocity.shape or len(position) < 3:
-        return 0.0
-    slopes = (position[2:] - position[:-2]) / 2
-    speed = velocity[1:-1]
-    size = float(np.sum(slopes**2) * np.sum(speed**2))
-    return float(np.sum(slopes * speed)) / size**0.5 if size > 0 and np.isfinite(size) else 0.0
 
 
 def _times(header: Sequence[str], options: ReadOptions) -> tuple[int | None, int | None]:
@@ -361,15 +343,7 @@ def _wanted(
         if header.count(header[place]) > 1:
             raise LogError(path, f"two columns are named {header[place]!r}", row)
     if not wanted:
-        joints = iter(range(1, len(header) + 1))
-        names = ",".join(
-            "time"
-            if place == time
-            else ("" if UNLIKELY.fullmatch(without_unit(name)[0]) else f"q{next(joints)}")
-            for place, name in enumerate(header)
-        )
-        example = f", or name all in their order, such as --columns {names}"
-        raise no_motion(path, header, example if next(joints, 0) > 1 else "")
+        raise no_motion(path, header)
     return wanted
 
 

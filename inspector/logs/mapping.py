@@ -292,12 +292,12 @@ def _without_units(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[
     return replace(log, fields=tuple(fields)), found
 
 
-def no_motion(path: Path, names: Sequence[str], instead: str = "") -> LogError:
+def no_motion(path: Path, names: Sequence[str]) -> LogError:
     """Error of a log of which no column is known: what to type, and the columns that it has."""
     example = pattern_for(names)
     how = f"no position or velocity of a joint; map columns, such as {example}"
     columns = listed([name for name in names if name])
-    return LogError(path, f"{how if example else NO_MOTION + instead}; columns are {columns}")
+    return LogError(path, f"{how if example else NO_MOTION}; columns are {columns}")
 
 
 def _is_column(field: Field) -> bool:
