@@ -4,6 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_bag
 
 from inspector import read_log
@@ -50,17 +51,27 @@ def test_every_value_of_a_bag_is_read_bit_for_bit(tmp_path, talk, how):
         assert run.meta["topics"] == ["/joint_states"]
 
 
-def test_the_stamps_are_those_of_the_messages_not_of_the_recorder(tmp_path):
+def test_the_stamps_are_those_of_the_messages_and_without_any_those_of_the_recorder(tmp_path):
     late = TIMES + np.random.default_rng(3).integers(0, 4_000_000, len(TIMES))
     run = read_log(bag(tmp_path, {"/joint_states": states(received=late)})).run
     assert np.array_equal(run.position, POSITION)
-
-
-def test_messages_without_stamps_have_those_of_the_recorder(tmp_path):
     messages = states(times=np.zeros(len(TIMES), dtype=int), received=TIMES)
-    imported = read_log(bag(tmp_path, {"/joint_states": messages}))
+    imported = read_log(bag(tmp_path, {"/joint_states": messages}, name="bare"))
     assert np.array_equal(imported.run.position, POSITION)
-    assert "bag: the messages have no stamps, those of the recorder are used" in imported.remarks
+    assert "bare: the messages have no stamps, those of the recorder are used" in imported.remarks
+
+
+def test_messages_are_in_the_order_in_which_they_were_received(tmp_path):
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
+        topic = writer.register_channel("/joint_states", "cdr", schema)
+        for at, message in sorted(states(), key=lambda each: int(each[0]) // 10_000_000 % 7):
+            writer.add_message(topic, int(at), bytes(TALK.raw(message)), int(at))
+        writer.finish()
+    assert np.array_equal(read_log(path).run.position, POSITION)
 
 
 def test_the_order_of_the_joints_may_change_from_message_to_message(tmp_path):

@@ -37,6 +37,7 @@ from inspector.logs.names import listed
 from inspector.text import counted, natural
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 
+SQL_ERRORS = (sqlite3.Error, UnicodeError)  # its words may quote bytes that are no text
 # Errors that rosbags lets through on messages that are damaged.
 DAMAGE = (
     *(ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, RecursionError),
@@ -371,7 +372,6 @@ def topic_reader(path: Path, topic: Topic) -> TopicReader | None:
 LATEST = 2**62  # stamps lie before, in [ns]; differences of later ones are no 64-bit integers
 # Topic, time of reception in [ns], and the serialised message.
 Message: TypeAlias = tuple[str, int, bytes]
-Add: TypeAlias = Callable[[int, bytes], None]
 
 
 @dataclass
@@ -382,6 +382,7 @@ class Bag:
     counts: Counter[str] = field(default_factory=Counter)  # messages, by topic
     times: list[int] = field(default_factory=list)  # of the first and the last message, in [ns]
     lost: list[str] = field(default_factory=list)  # a sentence each
+    readers: dict[str, TopicReader] = field(default_factory=dict)  # of topics that are read
 
     def __str__(self) -> str:
         return f"the bag has {listed([*map(str, self.topics.values())]) or 'no topics'}"
@@ -394,7 +395,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 def _listing(path: Path) -> tuple[str, ...]:
     """Topics with type, count and rate, and whether they are read, a line each."""
-    bag, rows = _scanned(path, lambda topic: None), []
+    bag, rows = _scanned(path, lambda name: False), []
     seconds = (bag.times[-1] - bag.times[0]) * 1e-9 if bag.times else 0.0
     for topic in sorted(bag.topics.values(), key=lambda each: each.name):
         count = bag.counts[topic.name]
@@ -406,22 +407,13 @@ def _listing(path: Path) -> tuple[str, ...]:
 
 
 def _read(path: Path, options: ReadOptions) -> Log:
-    readers: dict[str, TopicReader] = {}
-
-    def begin(topic: Topic) -> Add | None:
-        wanted = not options.topics or topic.name in options.topics
-        if not (wanted or topic.name.endswith(DESCRIPTION)):
-            return None
-        if reader := topic_reader(path, topic):
-            readers[topic.name] = reader
-        return reader.add if reader else None
-
-    bag = _scanned(path, begin)
+    chosen = options.topics
+    bag = _scanned(path, lambda name: not chosen or name in chosen or name.endswith(DESCRIPTION))
     for name in options.topics:
         if name not in bag.topics or bag.topics[name].type not in TYPES:
             problem = f"there is no topic {name!r} of a type that is read ({', '.join(TYPES)})"
             raise LogError(path, f"{problem}; {bag}")
-    read = {name: reader for name, reader in readers.items() if bag.counts[name]}
+    read = {name: reader for name, reader in bag.readers.items() if bag.counts[name]}
     if not read:
         raise LogError(path, f"no topic holds joints; {bag}")
     fields = [each for reader in read.values() for each in reader.fields()]
@@ -442,27 +434,28 @@ def _read(path: Path, options: ReadOptions) -> Log:
     )
 
 
-def _scanned(path: Path, begin: Callable[[Topic], Add | None]) -> Bag:
-    """Contents of a bag whose messages are passed to what ``begin`` gives for their topic."""
+def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
+    """Contents of a bag, read through; readers have the messages of topics with wanted names."""
     bag, unpack = Bag(), Unpacker(path)
-    adds: dict[str, Add | None] = {}
     taken = odd = 0
     try:
         for each in _records(path, bag.lost, unpack):
             if isinstance(each, Topic):
                 if each.name not in bag.topics:
-                    bag.topics[each.name], adds[each.name] = each, begin(each)
+                    bag.topics[each.name] = each
+                    if wanted(each.name) and (reader := topic_reader(path, each)):
+                        bag.readers[each.name] = reader
                 continue
             name, received, data = each
             bag.counts[name] += 1
             if abs(received) < LATEST:
                 known = (received, *bag.times)
                 bag.times[:] = min(known), max(known)
-            if add := adds.get(name):
+            if name in bag.readers:
                 if data.startswith(ZSTD) and not bag.topics[name].ros1:
                     data = unpack.message(data)
                 if data and abs(received) < LATEST:
-                    add(received, data)
+                    bag.readers[name].add(received, data)
                     taken += 1
                 else:
                     odd += 1
@@ -619,7 +612,7 @@ def _sqlite(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | M
         try:
             try:
                 database.execute("SELECT name FROM sqlite_master").fetchone()
-            except sqlite3.DatabaseError as error:
+            except SQL_ERRORS as error:
                 lost.append(f"the bag is damaged or cut off ({one_line(error)})")
             (page,) = database.execute("PRAGMA page_size").fetchone()
             database.execute("PRAGMA writable_schema = ON")  # else SQLite refuses such a file
@@ -644,7 +637,7 @@ def _sqlite(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | M
                 while held and size - len(held[0][2]) > page:
                     size -= len(held[0][2])
                     yield held.popleft()
-        except sqlite3.DatabaseError as error:
+        except SQL_ERRORS as error:
             lost.append(f"the bag ends here, {len(held)} messages may be cut ({one_line(error)})")
             held.clear()
     yield from held
