@@ -1,6 +1,6 @@
 """All speed benchmarks side by side, as a table in Markdown: `make bench`.
 
-python -m benchmarks [twists extended …] [--before CHECKOUT]
+python -m benchmarks [extended stream …] [--before CHECKOUT]
 """
 
 import argparse
@@ -12,7 +12,7 @@ from pathlib import Path
 from benchmarks.table import HEAD
 
 # Modules with a function `rows`, which takes an older checkout, or None, and yields rows.
-SPEED = ("twists", "extended", "stream", "live", "logs", "commands")
+SPEED = ("extended", "stream", "live", "logs", "commands")
 
 
 def main() -> None:

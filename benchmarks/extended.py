@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.table import Row, in_turns, used
-from benchmarks.twists import LOOP, states
 from noisemodel import Robot, Surface, extended
 from noisemodel.types import Array
 
 SAMPLES = 20_000
 REPEATS = 3
+LOOP = "loop over Pinocchio"
 MOST = {"normal": 0.35, "paper": 1.5}  # most CPU time of 100,000 states, in [s]
 MEMORY = 300.0  # most memory above the inputs of 100,000 states, in [MB]
 IMPEDANCE = 1.204 * 343.2
@@ -46,6 +46,14 @@ def rows(_: object) -> Iterator[Row]:
         peak = tracemalloc.get_traced_memory()[1] / 1e6
         tracemalloc.stop()
         yield Row(f"`{kind}`, 100,000 states: memory", peak, most=MEMORY, unit="MB")
+
+
+def states(robot: Robot, samples: int) -> tuple[Array, Array]:
+    """Random configurations, shape (samples, nq), and velocities, shape (samples, nv)."""
+    random = np.random.default_rng(0)
+    q = random.uniform(-1.0, 1.0, (samples, robot.nq))
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+    return q, random.standard_normal((samples, robot.nv))
 
 
 def loop(robot: Robot, surface: Surface, q: Array, v: Array) -> Array:

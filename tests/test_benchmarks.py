@@ -57,7 +57,7 @@ def test_an_unknown_benchmark_is_refused():
     command = [sys.executable, "-m", "benchmarks", "nothing"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "no benchmark nothing; there are twists, extended" in done.stderr
+    assert "no benchmark nothing; there are extended, stream" in done.stderr
 
 
 def test_our_twists_are_those_of_the_loop_that_they_are_timed_with(bench):

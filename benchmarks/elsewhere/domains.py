@@ -9,14 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.elsewhere import (
-    bulletarm,
-    bulletlegs,
-    drakearm,
-    faults,
-    references,
-    sensing,
-)
+from benchmarks.elsewhere import bulletarm, bulletlegs, drakearm, faults, references, sensing
 from benchmarks.elsewhere.faults import Control, Sizes
 from benchmarks.elsewhere.recorded import Recorded
 from benchmarks.elsewhere.references import Reference
@@ -109,11 +102,7 @@ def _drake_arm(arm: drakearm.DrakeArm) -> Callable[..., Scene]:
         )
         loop = drakearm.Loop.draw(rng)
         sizes = Sizes(
-            force=(80.0, 300.0),
-            ball=None,
-            delay=(0.02, 0.05),
-            jump=(0.05, 0.2),
-            offset=(0.1, 0.25),
+            force=(80.0, 300.0), ball=None, delay=(0.02, 0.05), jump=(0.05, 0.2), offset=(0.1, 0.25)
         )
         return Scene(reference, loop, f"Drake's {arm.controller}", sizes, arm.links,
                      lambda control: drakearm.simulate(arm, loop, control, rate))  # fmt: skip
@@ -278,10 +267,7 @@ def masked(
         for block in set(blocks) - set(kept)
         if start <= block.start < stop and block.label == event["label"]
     )
-    return event | {
-        "masked": lost > 0,
-        "labelled": round(max(0.0, event["labelled"] - lost), 6),
-    }
+    return event | {"masked": lost > 0, "labelled": round(max(0.0, event["labelled"] - lost), 6)}
 
 
 def visible(

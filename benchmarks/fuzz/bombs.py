@@ -650,13 +650,7 @@ def _mjcf(data: bytes) -> Iterator[Bomb]:
     mesh = MJCF.replace(
         "<default>", '<asset><mesh name="m" file="FILE"/></asset><default>'
     ).replace('type="capsule" size="0.05 0.4"', 'type="mesh" mesh="m"')
-    yield from _robots(
-        text.replace("</worldbody></mujoco>", "</mujoco>").replace(
-            "</mujoco>", "</worldbody></mujoco>"
-        ),
-        joint,
-        mesh,
-    )
+    yield from _robots(text, joint, mesh)
     body = "<worldbody>"
     for name, there, instead in (
         (

@@ -173,32 +173,9 @@ def _jumping(step: float = 100.0) -> Array:
 
 
 # Names of columns as logs have them.
-NAMES = (
-    *(
-        "timestamp",
-        "time [s]",
-        "q1",
-        "q_d[2]",
-        "dq1 [deg/s]",
-        "Joint1",
-        "FR_0_target",
-        "FR_0_actual",
-    ),
-    *(
-        "left_shoulder_pitch",
-        "PositionCmptd1",
-        "Target Pos",
-        "robot0_joint_pos",
-        "/state/error/q[0]",
-    ),
-    *(
-        "elbow.velocity_desired",
-        "Angular Velocity [dps]",
-        "actual_TCP_pose_5",
-        "rrrrrrrr",
-        "l_arm_joint_1",
-    ),
-)
+NAMES = """timestamp;time [s];q1;q_d[2];dq1 [deg/s];Joint1;FR_0_target;FR_0_actual
+left_shoulder_pitch;PositionCmptd1;Target Pos;robot0_joint_pos;/state/error/q[0]
+elbow.velocity_desired;Angular Velocity [dps];actual_TCP_pose_5;rrrrrrrr;l_arm_joint_1"""
 
 
 def _rows(separator: str = ",", names: str = COLUMNS, *, jump: float = 0.0) -> str:
@@ -588,10 +565,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
             ("import", "{folder}/log.csv", "--mapping", "{}", "-o", OUT),
         ),
         "reference.toml": Reader(
-            "text",
-            _accepted,
-            Reference.load,
-            ("classify", "{folder}/run.npz", "--reference", "{}"),
+            "text", _accepted, Reference.load, ("classify", "{folder}/run.npz", "--reference", "{}")
         ),
         "resume state": Reader(
             "text",
@@ -670,7 +644,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         "timestamps": Reader(
             "bytes", _written("stamps", np.sort(_jumping())[::5].tobytes()), _read_stamps, ()
         ),
-        "names": Reader("text", _written("names", "\n".join(NAMES)), _read_names, ()),
+        "names": Reader("text", _written("names", NAMES.replace(";", "\n")), _read_names, ()),
         "ROS definition": Reader("text", _written("state.msg", STATES[3]), _read_definition, ()),
         "NoisyTest log": Reader(
             "text",
@@ -679,10 +653,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
             EVALUATE,
         ),
         "NoisyTest labels": Reader(
-            "text",
-            _noisytest,
-            lambda path: [*noisytest.read_folder(path.parent)],
-            EVALUATE,
+            "text", _noisytest, lambda path: [*noisytest.read_folder(path.parent)], EVALUATE
         ),
         "NoisyTest, two columns": Reader(
             "text", lambda folder: _noisytest(folder).with_suffix(".log"), nc.read_log, CLASSIFY
