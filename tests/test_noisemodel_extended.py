@@ -17,13 +17,7 @@ from noisemodel import (
     UnknownKindError,
     extended,
 )
-from noisemodel.noise import (
-    by_moments,
-    by_samples,
-    link_noise,
-    second_moments,
-    vibrating,
-)
+from noisemodel.noise import by_moments, by_samples, link_noise, second_moments, vibrating
 
 IMPEDANCE = 1.204 * 343.2
 
@@ -264,7 +258,7 @@ def test_motions_that_cannot_be_are_refused(panda, q, v, message):
         extended(*panda, q, v)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["paper", "normal"])
 def test_motions_are_estimated_in_chunks_as_whole(solo, kind, monkeypatch):
     robot, surface = solo
     q, v = motion(robot)
@@ -294,8 +288,7 @@ def arm_run(rattling=None, *, rate=1000.0, seconds=4.0, **changes):
 
 
 def test_bins_hold_the_mean_power_of_the_extended_noise():
-    run = arm_run()
-    robot = Robot.load("ur5")
+    run, robot = arm_run(seconds=1.0), Robot.load("ur5")
     noise = extended(robot, Surface.of(robot, "auto"), *robot.configuration(run), "normal")
     found = link_noise(run)
     # Within a bin the robot is taken to stand still: 1e-3 is 0.004 dB.

@@ -152,15 +152,6 @@ def test_a_node_of_a_dae_may_stand_in_several_places(tmp_path):
     assert np.array_equal(triangles, np.concatenate((TRIANGLE, TRIANGLE + np.array([0, 0, 9]))))
 
 
-def test_a_broken_material_removes_no_geometry(tmp_path):
-    effect = """<library_effects><effect id="e"><profile_COMMON><newparam sid="s"><sampler2D>
-      <source>gone</source></sampler2D></newparam></profile_COMMON></effect></library_effects>"""
-    node = """<node><instance_geometry url="#g"><bind_material><technique_common>
-      <instance_material symbol="m" target="#gone"/></technique_common></bind_material>
-      </instance_geometry></node>"""
-    assert np.array_equal(read(tmp_path, "a.dae", dae(geometry(BRICK), node, extra=effect)), BRICK)
-
-
 PENTAGON = np.array([[0, 0, 0], [2, 0, 0], [3, 1, 0], [2, 2, 0], [0, 2, 0]], dtype=float)
 INPUTS = """<input semantic="NORMAL" source="#none" offset="0"/>
   <input semantic="VERTEX" source="#g-v" offset="1"/>"""

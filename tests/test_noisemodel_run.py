@@ -50,11 +50,6 @@ def test_the_rate_is_the_nominal_one(rate):
     assert run(time=np.arange(100) / rate).rate == pytest.approx(rate, rel=1e-9)
 
 
-def test_stamps_of_a_day_in_unix_time_are_uniform():
-    """Their own spacing is 2.4e-7 s, which is coarser than a thousandth of 0.1 ms."""
-    assert run(time=1.8e9 + np.arange(100) / 10_000).rate == pytest.approx(10_000, rel=3e-3)
-
-
 def test_a_run_sorts_its_blocks_and_cannot_be_changed_in_place():
     late, early = Block(0.05, 0.1, "impact"), Block(0.0, 0.05, "ok")
     assert run(blocks=(late, early)).blocks == (early, late)
@@ -64,22 +59,13 @@ def test_a_run_sorts_its_blocks_and_cannot_be_changed_in_place():
         run().meta["seed"] = 1
 
 
-def spoilt(value, row=3, column=1):
-    velocity = np.ones((100, 2))
-    velocity[row, column] = value
-    return velocity
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"time": TIME[:1], "velocity": np.ones((1, 2))}, "with at least 2 samples"),
         ({"time": TIME[:, None]}, r"time: shape \(100, 1\), expected \(samples,\)"),
-        ({"time": TIME.astype(np.float32) + np.float32(1e3)}, "float32 is too coarse"),
-        ({"velocity": np.ones((100, 3))}, r"velocity: shape \(100, 3\), expected \(100, 2\)"),
-        ({"velocity": spoilt(np.nan)}, "velocity: nan in row 3, column 1; mark gaps with valid"),
+        ({"velocity": np.full((100, 2), np.nan)}, "velocity: nan in row 0, column 0; mark gaps"),
         ({"position": np.ones((100, 1))}, r"position: shape \(100, 1\), expected \(100, 2\)"),
-        ({"effort": spoilt(np.nan)}, "effort: nan in row 3, column 1"),
         ({"velocity_desired": np.ones((100, 1))}, r"velocity_desired: shape \(100, 1\)"),
         ({"stages": {"planner": np.ones((9, 2))}}, r"stage_planner: shape \(9, 2\)"),
         ({"stages": {"a\nb": np.ones((100, 2))}}, r"stages: 'a\\nb' is no name"),
@@ -92,7 +78,6 @@ def spoilt(value, row=3, column=1):
         ({"joint_names": ("a", "a")}, "joint_names: a named twice"),
         ({"joint_names": ("a", "")}, "joint_names: '' is no name"),
         ({"desired_joint_names": ("c", "c")}, "desired_joint_names: c named twice"),
-        ({"blocks": (Block(0.05, 0.02, "ok"),)}, "block 'ok': starts at 0.05 s, stops at 0.02 s"),
     ],
 )
 def test_signals_that_do_not_fit_are_refused(changes, message):
@@ -313,19 +298,9 @@ def test_names_that_repeat_are_all_named(monkeypatch):
         check_names("joint_names", ["a", "b", "c", "d"])
 
 
-@pytest.mark.parametrize(
-    ("shape", "turned"),
-    [
-        ((2, 5), True),
-        ((2, 4), False),
-        ((5, 3), False),
-        ((5,), False),
-        ((2, 2, 5), False),
-        ((2, 5, 2), False),
-    ],
-)
-def test_signals_of_another_shape_are_refused_and_samples_that_come_last_are_named(shape, turned):
-    hint = "; samples come first, is it transposed?" if turned else ""
+@pytest.mark.parametrize("shape", [(2, 5), (2, 4), (5, 3), (5,), (2, 2, 5), (2, 5, 2)])
+def test_signals_of_another_shape_are_refused_and_samples_that_come_last_are_named(shape):
+    hint = "; samples come first, is it transposed?" if shape == (2, 5) else ""
     with refused(f"effort: shape {shape}, expected (5, 2){hint}"):
         check_signal("effort", np.zeros(shape), (5, 2))
 
@@ -374,10 +349,7 @@ def test_a_signal_on_demand_is_read_for_its_check_once_and_its_shape_always(cut)
     ("blocks", "message"),
     [
         ([(9.5, 13.0, "ok")], ""),
-        (
-            [(9.49, 11.0, "ok")],
-            "block 'ok': 9.49 s to 11 s lies outside of the run, 10 s to 12 s",
-        ),
+        ([(9.49, 11.0, "ok")], "block 'ok': 9.49 s to 11 s lies outside of the run, 10 s to 12 s"),
         (
             [(11.0, 11.5, "ok"), (11.5, 13.01, "late")],
             "block 'late': 11.5 s to 13.01 s lies outside of the run, 10 s to 12 s",
@@ -527,14 +499,10 @@ def test_nothing_is_differentiated_across_a_gap():
     assert np.abs(found - velocity)[valid].max() < 1e-3 * np.abs(velocity).max()
 
 
-def test_a_tumbling_base_has_its_body_velocity():
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_tumbling_base_has_its_body_velocity_though_quaternions_flip_their_sign(sign):
     pose, twist = tumble(LONG)
-    assert np.allclose(base_velocity(LONG, pose), twist, rtol=0, atol=1e-6)
-
-
-def test_quaternions_that_flip_their_sign_give_no_spike():
-    pose, twist = tumble(LONG)
-    pose[700:1300, 3:] *= -1
+    pose[700:1300, 3:] *= sign
     assert np.allclose(base_velocity(LONG, pose), twist, rtol=0, atol=1e-6)
 
 

@@ -32,8 +32,7 @@ NEEDED = "expected 'time', and 'velocity' or 'position'"
 OBJECT = "meta: expected a JSON object, and one as differentiated"
 NAMES = st.text(st.characters(categories=("L", "M", "N", "P", "S")), min_size=1, max_size=8)
 IN_PLACE = settings(
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )
 
 
@@ -83,7 +82,7 @@ def runs(draw):
     )
 
 
-@settings(IN_PLACE, max_examples=50)
+@settings(IN_PLACE, max_examples=25)
 @given(run=runs())
 def test_what_is_saved_is_loaded_bit_for_bit(tmp_path, run):
     run.save(tmp_path / "run.npz", overwrite=True)
@@ -135,14 +134,6 @@ def test_a_urdf_is_found_from_the_file_wherever_that_is_read_or_copied(tmp_path,
     assert urdf.samefile(Run.load("b/copy.npz").robot)
 
 
-@pytest.mark.parametrize("name", ["robot", "stage_x"])
-def test_an_array_that_is_none_is_refused(tmp_path, name):
-    np.savez(tmp_path / "run.npz", **BASE, **{name: None})
-    text = f"run.npz: not a run file: {name} holds a Python object, such as None; leave it out, or"
-    with pytest.raises(RunFileError, match=f"{text} save plain numbers or text$"):
-        Run.load(tmp_path / "run.npz")
-
-
 def test_object_arrays_are_never_unpickled(tmp_path):
     ran = []
 
@@ -172,7 +163,7 @@ def test_a_truncated_file_is_refused(tmp_path):
             Run.load(path)
 
 
-@settings(IN_PLACE, max_examples=300)
+@settings(IN_PLACE, max_examples=200)
 @given(data=st.data())
 def test_a_damaged_file_is_a_run_or_one_error(tmp_path, data):
     path = tmp_path / "run.npz"
@@ -427,7 +418,8 @@ def test_headers_of_version_one_and_two_are_read_and_no_others(tmp_path):
     with refused("a is no array ((3, 0))"):
         runfile.read_npz(packed(tmp_path / "a.npz", a=content(CUBE, (3, 0))))
     objects = stated("(1,)", "|O", bytes(8))
-    with pytest.raises(ArchiveError, match="^a holds a Python object") as caught:
+    text = "a holds a Python object, such as None; leave it out, or save plain numbers or text"
+    with pytest.raises(ArchiveError, match=f"^{text}$") as caught:
         runfile.read_npz(packed(tmp_path / "a.npz", a=objects))
     assert isinstance(caught.value, runfile.ObjectArrayError)
     assert caught.value.name == "a"
@@ -568,11 +560,7 @@ def test_rows_at_once_take_so_many_bytes_and_are_one_at_least(monkeypatch, shape
 
 @pytest.mark.parametrize(
     ("multiple", "parts"),
-    [
-        (1, [(0, 9), (9, 18), (18, 20)]),
-        (2, [(0, 8), (8, 16), (16, 20)]),
-        (10, [(0, 10), (10, 20)]),
-    ],
+    [(1, [(0, 9), (9, 18), (18, 20)]), (2, [(0, 8), (8, 16), (16, 20)]), (10, [(0, 10), (10, 20)])],
 )
 def test_pieces_have_a_multiple_of_rows_and_end_where_the_array_does(monkeypatch, multiple, parts):
     monkeypatch.setattr(runfile, "AT_ONCE", 110)
