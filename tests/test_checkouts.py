@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 import tarfile
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -60,11 +59,6 @@ def checkouts(benchmarks):
 @pytest.fixture(scope="module")
 def probe(benchmarks):
     return importlib.import_module("benchmarks.checkoutsprobe")
-
-
-@pytest.fixture(scope="module")
-def commands(benchmarks):
-    return importlib.import_module("benchmarks.commands")
 
 
 @pytest.fixture(scope="module")
@@ -236,35 +230,3 @@ def test_each_public_name_of_the_first_version_exists_or_is_listed(checkouts, pr
             except AttributeError:
                 lost.append(name)
     assert lost == []
-
-
-def checkout_of(checkouts, folder, script):
-    """A checkout whose `inspector` is a script."""
-    (folder / "inspector").mkdir(parents=True)
-    (folder / "inspector" / "__init__.py").touch()
-    (folder / "inspector" / "__main__.py").write_text(script)
-    return checkouts.Checkout.of(folder, Path(sys.executable), folder / "scratch")
-
-
-def test_checkouts_are_timed_in_turns_after_a_warm_up(checkouts, commands, tmp_path):
-    record = tmp_path / "calls.txt"
-    script = f"import sys; open({str(record)!r}, 'a').write(' '.join(sys.argv[1:]) + '\\n')"
-    sides = {side: checkout_of(checkouts, tmp_path / side, script) for side in ("old", "new")}
-    work = {side: partial(commands.measure, each, [side, "run"]) for side, each in sides.items()}
-    found = commands.in_turns(work, 2, warm=1)
-    assert record.read_text().splitlines() == ["old run", "new run"] * 3
-    assert found.keys() == sides.keys()
-    assert all(spent > 0.0 for spent in found.values())
-
-
-@pytest.mark.parametrize(
-    ("script", "text"), [("import nothing_there", "No module named"), ("exit(3)", "exit 3")]
-)
-def test_a_command_that_fails_is_not_timed_and_one_with_findings_is(
-    checkouts, commands, tmp_path, script, text
-):
-    broken = checkout_of(checkouts, tmp_path / "broken", script)
-    with pytest.raises(SystemExit, match=text):
-        commands.measure(broken, ["classify", "run.npz"])
-    found = checkout_of(checkouts, tmp_path / "found", "print('impact'); raise SystemExit(1)")
-    assert commands.measure(found, ["classify"]) > 0.0

@@ -1,7 +1,5 @@
 """Domains are drawn by seed, within the distribution and what a family bears."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -19,11 +17,6 @@ def loggers(count=200):
         Logger.draw(np.random.default_rng(seed), domain, most=10_000.0)
         for seed, domain in enumerate(domains(count))
     ]
-
-
-def test_equal_seeds_draw_equal_domains():
-    assert domains(5) == domains(5)
-    assert loggers(5) == loggers(5)
 
 
 def test_values_lie_between_the_ends():
@@ -61,16 +54,6 @@ def test_some_logs_have_efforts_and_of_these_half_are_currents():
         assert (log.current > 0) == (log.effort == "current")
         assert 9 <= log.effort_bits <= 16
         assert 0.0003 <= log.effort_noise <= 0.01
-
-
-def test_what_is_drawn_of_efforts_changes_nothing_else(monkeypatch):
-    ours = {"effort": "missing", "current": 0.0, "effort_noise": 0.0, "effort_bits": 16}
-    drawn = loggers(50)
-    for name, ends in (("effort_share", (1.0, 1.0)), ("current", (5.0, 6.0))):
-        monkeypatch.setitem(SETTINGS, name, {**SETTINGS[name], "ends": ends})
-    for before, after in zip(drawn, loggers(50), strict=True):
-        assert after.effort != "missing"
-        assert replace(before, **ours) == replace(after, **ours)
 
 
 def test_what_a_family_does_not_bear_is_not_drawn():

@@ -15,13 +15,7 @@ from noiseclassifier.scenarios.faults import Imperfections
 from noiseclassifier.scenarios.logs import logged, visible
 from noiseclassifier.scenarios.motions import PUSH, DatasetError
 from noiseclassifier.scenarios.robots import WIDE
-from noiseclassifier.scenarios.simulation import (
-    FAULTS,
-    GOOD,
-    WIDE_RECIPE,
-    Start,
-    _setup,
-)
+from noiseclassifier.scenarios.simulation import FAULTS, GOOD, WIDE_RECIPE, Start, _setup
 from noiseclassifier.scenarios.world import configuration, real_model, reduced_model
 from noisemodel import Run
 

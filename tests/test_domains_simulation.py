@@ -151,11 +151,6 @@ def test_tasks_are_drawn_by_seed_and_share_their_twin():
         assert task.scenario == GOOD or task.scenario in faults_of(task.robot, task.seed)
 
 
-def test_unknown_robots_are_refused():
-    with pytest.raises(scenarios.ScenarioError, match=r"did you mean 'panda'"):
-        wide_tasks(["pandda"])
-
-
 def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypatch, tmp_path):
     def fall(robot, fault, seed, **_):
         if fault == GOOD and seed == 10_001:

@@ -1,7 +1,5 @@
 """Runs of other simulators; those that simulate need the extra `elsewhere`."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -34,14 +32,6 @@ def test_the_labels_of_a_run_hold_its_fault(domains, name, module):
     assert event["start"] - 0.05 < block.start < event["stop"]
     assert run.rate == 1000
     assert run.meta["simulator"].split()[0] == name.split("-")[0]
-
-
-def test_equal_seeds_give_equal_runs(domains):
-    pytest.importorskip("pydrake", reason="needs the extra elsewhere")
-    one = faulty(domains, "drake-ur5", "jump", 1)
-    domains._twin.cache_clear()
-    other = faulty(domains, "drake-ur5", "jump", 1)
-    np.testing.assert_array_equal(one.velocity, other.velocity)
 
 
 def test_a_foot_is_where_inverse_kinematics_puts_it(domains):
@@ -79,33 +69,6 @@ def test_a_fault_below_the_sensor_s_noise_loses_its_label(domains):
     assert domains.visible(blocks, 0.05 * tone, noise, 1000.0) == blocks
     assert domains.visible(blocks, 0.0005 * tone, noise, 1000.0) == blocks[:1]
     assert domains.visible(blocks, 0.0005 * tone, 0 * noise, 1000.0) == blocks
-
-
-def test_without_the_simulators_one_line_says_what_to_install(tmp_path):
-    code = (
-        "import sys; sys.argv[1:] = ['out']; from benchmarks.elsewhere import __main__ as script;"
-        " script.installed = lambda: {'drake'}; script.main()"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 1
-    assert done.stderr == (
-        "pybullet not installed; run `pip install 'noise-inspector[elsewhere]'`\n"
-    )
-    assert not (ROOT / "out").exists()
-
-
-def test_an_unknown_domain_is_answered_with_those_there_are():
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.elsewhere", "out", "--domains", "gazebo"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert "no domain 'gazebo'; there are pybullet-panda, " in done.stderr
 
 
 def test_a_run_that_is_dropped_is_named_and_not_tried_again(domains, monkeypatch, tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""Commands that write: on a disk that is full or read-only, killed, with a clock that jumps.
+"""Commands that write: on a disk that is full or read-only, or killed.
 
 A file either appears whole under its name or not at all, and the same command succeeds afterwards.
 """
@@ -210,20 +210,3 @@ def test_a_folder_of_a_command_that_was_killed_is_completed(place, undisturbed, 
     again = arguments if arguments[0] in ("import", "accept") else (*arguments, "--overwrite")
     assert run(place, again)[0] == status
     assert set(finished(place)) == set(whole)
-
-
-JUMPS = """
-import itertools, time
-true, days = time.time, itertools.cycle((0, 2, -2))
-time.time = lambda: true() + 86400 * next(days)
-"""
-
-
-@pytest.mark.parametrize("arguments", WRITERS.values(), ids=WRITERS)
-def test_a_clock_that_jumps_by_days_changes_nothing(place, undisturbed, arguments):
-    (place / "site").mkdir()
-    (place / "site/sitecustomize.py").write_text(JUMPS)
-    path = f"{place / 'site'}{os.pathsep}{ROOT}"
-    status, whole = undisturbed(arguments)
-    assert run(place, arguments, PYTHONPATH=path)[0] == status
-    assert set(written(place)) == set(whole)

@@ -10,7 +10,7 @@ from simulated import simulated
 
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import Faults, Imperfections
-from noiseclassifier.scenarios.humanoid import SETTLING, footsteps, plan, scene, standing, walk
+from noiseclassifier.scenarios.humanoid import SETTLING, footsteps, scene, walk
 from noiseclassifier.scenarios.loop import record
 from noiseclassifier.scenarios.motions import STEPS, TICK, Walk
 from noiseclassifier.scenarios.robots import WIDE
@@ -49,45 +49,6 @@ def test_a_standing_robot_stands_still_and_the_ground_bears_its_weight(robot):
     weight = pin.computeTotalMass(real) * 9.81
     assert motion.contact.sum(axis=1).mean() == pytest.approx(weight, rel=0.01)
     assert (motion.contact.min(axis=0) > 0.3 * weight).all()
-
-
-@HUMANOIDS
-def test_mujoco_and_pinocchio_agree_on_soles_and_centre_of_mass_along_a_walk(robot):
-    model = reduced_model(robot)
-    way = plan(robot, Walk(way="curve"), np.random.default_rng(0), SHORT)
-    built = scene(robot, way, Faults(), imperfect(robot)).model
-    real = real_model(model, robot.carrier, np.zeros(3), imperfect(robot))
-    ours, theirs = real.createData(), mujoco.MjData(built)
-    body, before = standing(robot, model, way), None
-    for tick in range(0, len(way.time), 5):
-        turns = [pin.rpy.rpyToMatrix(0.0, 0.0, yaw) for yaw in way.yaws[tick]]
-        base = pin.rpy.rpyToMatrix(0.0, 0.0, way.heading[tick])
-        q = body.follow(way.places[tick], turns, way.centre[tick], base)
-        if before is not None and tick % 50 == 0:
-            v = pin.difference(model, before, q) / (5 * TICK)
-            pin.forwardKinematics(real, ours, q, v)
-            pin.centerOfMass(real, ours, q, v)
-            turn = pin.Quaternion(q[3:7]).matrix()
-            theirs.qpos[:] = np.concatenate((q[:3], q[[6, 3, 4, 5]], q[7:]))
-            theirs.qvel[:] = np.concatenate((turn @ v[:3], v[3:]))
-            mujoco.mj_forward(built, theirs)
-            for sole in robot.effectors:
-                frame = real.getFrameId(sole.frame)
-                pose = pin.updateFramePlacement(real, ours, frame)
-                site = built.site(sole.frame).id
-                place = pose.act(np.array(sole.point))
-                np.testing.assert_allclose(theirs.site_xpos[site], place, rtol=0, atol=1e-8)
-                twist = np.zeros(6)
-                mujoco.mj_objectVelocity(built, theirs, mujoco.mjtObj.mjOBJ_SITE, site, twist, 0)
-                given = pin.getFrameVelocity(real, ours, frame, pin.LOCAL_WORLD_ALIGNED)
-                speed = given.linear + np.cross(given.angular, pose.rotation @ sole.point)
-                np.testing.assert_allclose(twist[3:], speed, rtol=0, atol=1e-8)
-            root = built.body("root_joint").id
-            np.testing.assert_allclose(theirs.subtree_com[root], ours.com[0], rtol=0, atol=1e-8)
-            mujoco.mj_subtreeVel(built, theirs)
-            moving = theirs.subtree_linvel[root]
-            np.testing.assert_allclose(moving, ours.vcom[0], rtol=0, atol=1e-8)
-        before = q
 
 
 @pytest.fixture(scope="module")

@@ -91,8 +91,7 @@ def test_names_that_repeat_and_runs_without_blocks_are_refused(classifier):
     run = fresh()[0]
     short = replace(run, signal=run.signal[:100], blocks=(), sha256="")
     with pytest.raises(
-        nc.DatasetError,
-        match="none of 1 recordings has a verdict; panda/swing-010: .* too short",
+        nc.DatasetError, match="none of 1 recordings has a verdict; panda/swing-010: .* too short"
     ):
         nc.assess(classifier, [short])
     with pytest.raises(nc.DatasetError, match="two recordings are called 'panda/swing-010'"):

@@ -278,13 +278,6 @@ def test_a_thousandth_of_the_training_frames_lies_above_the_bound_of_a_feature()
     assert ours.decision(ours.known[None] + [[0.5, -3.0]])[0, -1] == pytest.approx(0.5)
 
 
-def test_the_first_leaf_that_is_left_is_the_lowest_bit():
-    assert len(module._FIRST) == 1 << 16
-    few = np.random.default_rng(0).integers(1, 1 << 16, size=500).tolist()
-    for number in (*range(1, 40), *few, *(1 << place for place in range(16))):
-        assert module._FIRST[number] == f"{number:b}"[::-1].index("1")
-
-
 # --- decisions by probabilities
 
 

@@ -65,31 +65,6 @@ def test_a_stretch_of_several_classes_is_one_event_of_the_class_of_most_of_its_t
     assert labels(".Io..").events() == ()
 
 
-def test_frames_on_both_sides_of_a_gap_are_two_stretches():
-    both = labels(".IiiI.")
-    later = 5.0 * (np.arange(6) > 2)
-    far = replace(both, start=both.start + later, stop=both.stop + later)
-    assert (both.debounced == "impact").sum() == 4
-    assert set(far.debounced) == {"ok"}
-
-
-@pytest.mark.parametrize("text", ["I..", "..I", "...iI", "Iii.."])
-def test_one_frame_above_the_threshold_is_enough_without_a_neighbour(text):
-    assert (labels(text).debounced != "ok").tolist() == [letter != "." for letter in text]
-
-
-def test_one_frame_above_the_threshold_is_enough_beside_a_gap():
-    starts = np.array([0.0, 0.1, 0.2, 5.0, 5.1, 5.2])
-    for text, kept in (("..I...", 1), ("...I..", 1), (".I....", 0), ("....I.", 0)):
-        found = replace(labels(text), start=starts, stop=starts + 0.4)
-        assert (found.debounced == "impact").sum() == kept
-
-
-def test_the_only_frame_of_a_signal_is_enough():
-    assert labels("I").debounced.tolist() == ["impact"]
-    assert labels("i").debounced.tolist() == ["ok"]
-
-
 def test_without_an_alarm_threshold_each_failure_frame_is_flagged():
     plain = replace(labels("i.iOi"), above_threshold=None)
     assert plain.debounced is plain.label

@@ -93,19 +93,6 @@ def test_numpy_alone_reads_it_too(path):
     assert set(manifest["runs"]) == {"ok", "rattle", "squeal"}
 
 
-def test_of_two_that_write_one_model_at_once_the_second_fails(path, monkeypatch):
-    target = path.with_name("new.npz")
-
-    def late(_):
-        target.write_text("first")  # another process, after the name was found free
-
-    monkeypatch.setattr(os, "fsync", late)
-    with pytest.raises(nc.OutputError, match=r"new\.npz: exists already"):
-        nc.load(path).save(target)
-    assert target.read_text() == "first"
-    assert sorted(os.listdir(path.parent)) == sorted({path.name, "new.npz"})
-
-
 def test_a_model_is_not_overwritten_unless_requested(path):
     before = path.read_bytes()
     with pytest.raises(nc.OutputError, match=r"model.npz: exists already; choose another name"):
@@ -116,9 +103,8 @@ def test_a_model_is_not_overwritten_unless_requested(path):
     assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize("mask", [0o022, 0o027, 0o077])
-def test_a_model_has_the_permissions_of_any_new_file(tmp_path, mask):
-    before = os.umask(mask)
+def test_a_model_has_the_permissions_of_any_new_file(tmp_path):
+    before = os.umask(0o027)
     try:
         CLASSIFIER.save(tmp_path / "model.npz")
         (tmp_path / "other").touch()
@@ -174,11 +160,6 @@ def test_a_flipped_bit_anywhere_is_refused_or_harmless(path):
     assert refusals > 150
 
 
-def test_another_archive_of_arrays_is_refused(path):
-    np.savez(path, time=np.zeros(3))
-    refused(path, "is no model file: holds time.npy, expected coefficients, intercept")
-
-
 def test_a_missing_or_additional_array_is_refused(path):
     rewrite(path, intercept=None)
     refused(path, "is no model file: holds coefficients.npy, manifest.npy")
@@ -194,13 +175,6 @@ def test_pickled_objects_are_refused_unread(path):
 
     rewrite(path, mean=np.array([Bomb()], dtype=object))
     refused(path, "array 'mean' is of type object")
-
-
-def test_compressed_members_are_refused(path):
-    with np.load(path, allow_pickle=False) as members:
-        arrays = dict(members)
-    np.savez_compressed(path, **arrays)
-    refused(path, "is compressed, expected stored")
 
 
 @pytest.mark.parametrize(("place", "value"), [(10, 8), (20, 7), (24, 7)])

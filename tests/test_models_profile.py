@@ -31,10 +31,7 @@ def test_hyper_parameters_are_of_the_papers_table(recipe, kernel, transforms):
 
 def test_noisytest_differs_from_the_paper_by_named_settings():
     ours, theirs = nc.Profile.noisytest().as_dict(), nc.Profile.paper().as_dict()
-    assert {name for name in ours if ours[name] != theirs[name]} == {
-        "bands",
-        "multiclass",
-    }
+    assert {name for name in ours if ours[name] != theirs[name]} == {"bands", "multiclass"}
 
 
 @pytest.mark.parametrize("profile", [nc.Profile.noisytest("linear"), nc.LogBands().at(1234.5)])
@@ -62,10 +59,7 @@ def test_quick_bands_begin_with_the_speed_and_drop_out_where_it_does_not_fit():
     edges = FAST.at(1000.0).quick_edges
     assert edges == pytest.approx((0.0, 75.0, 75.0 * 2 ** (4 / 3), 75.0 * 2 ** (8 / 3)))
     assert edges == FAST.at(10_000.0).quick_edges[:4]
-    assert (FAST.at(1000.0).quick_window, FAST.at(1000.0).quick_stride) == (
-        20,
-        10,
-    )
+    assert (FAST.at(1000.0).quick_window, FAST.at(1000.0).quick_stride) == (20, 10)
     assert FAST.at(140.0).quick_window == 0
 
 
@@ -168,13 +162,10 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
         ({"hop": True}, "hop is True, expected a value of type int"),
         ({"gamma": float("nan")}, "gamma is nan, expected a finite number"),
         ({"leaves": 17}, "leaves is 17, expected 2 to 16"),
+        ({"leaves": 1}, "leaves is 1, expected 2 to 16"),
         ({"alarm": 1.0}, "alarm is 1.0, expected a probability below 1"),
         ({"kernel": "poly"}, "kernel is 'poly', expected one of linear, rbf"),
         ({"window": 4096}, "window of 4096 samples is longer than a frame of 4000"),
-        (
-            {"bands": "log", "edges": (15.0, 30.0), "quick_window": 200, "quick_stride": 9},
-            r"edges are \(\), expected two or more, ascending",
-        ),
         ({"window": 512}, "has 257 bins, expected a multiple of three"),
         ({"classes": ("impact", "ok")}, "expected 'ok' and others"),
         ({"classes": ("ok", "ok")}, "expected 'ok' and others"),
@@ -194,13 +185,6 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
             r"edges are \(9.0, 9.0\), expected two or more, asc",
         ),
         ({"bands": "log", "edges": (1, 2)}, r"edges is \(1, 2\), expected a tuple of float"),
-        ({"leaves": 1}, "leaves is 1, expected 2 to 16"),
-        ({"leaves": -3}, "leaves is -3, expected 2 to 16"),
-        ({"length": -4000}, "length is -4000, expected more than 0"),
-        ({"alarm": 1.5}, "alarm is 1.5, expected a probability below 1"),
-        ({"rate": True}, "rate is True, expected a finite number"),
-        ({"classes": ()}, "classes are none, expected 'ok' and others, each once"),
-        ({"bands": "log", "edges": (9.0,)}, r"edges are \(9.0,\), expected two or more"),
         (
             {"quick_window": 64},
             "quick_window is 64 with quick_stride 0 and bands 'adjacent', expected",
@@ -213,11 +197,6 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
         (
             {"signals": ()},
             "none, expected norms, and after them those that go joint by joint, each once$",
-        ),
-        ({"signals": ("noise", "noise")}, "signals are noise, noise, expected norms, and after"),
-        (
-            {"signals": ("measured_joints",), **LOG},
-            "are measured_joints, expected norms, and after them those that go joint by joint",
         ),
         (
             {"signals": ("measured_joints", "measured"), **LOG},

@@ -11,17 +11,7 @@ from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, p
 from noiseclassifier import match, measures
 from noiseclassifier.assessment import measure
 from noiseclassifier.labels import Event, Labels
-from noiseclassifier.matching import (
-    SHIFTS,
-    Outcome,
-    common,
-    confirmed_at,
-    duration,
-    meet,
-    pairs,
-    run_score,
-    truth_of,
-)
+from noiseclassifier.matching import SHIFTS, Outcome, confirmed_at, meet, pairs, run_score, truth_of
 from noiseclassifier.measures import MOST, Protocol, Resampling, auc
 from noiseclassifier.recording import Fault
 
@@ -83,22 +73,6 @@ def test_robots_weigh_alike_however_many_runs_and_hours_they_have():
         found = measured([reporting("panda/good-000", long, [], seconds=5.0 * hours), loud])
         assert found.alike["false_alarms_per_hour"].value == pytest.approx(3600 / 5 / 2)
         assert found.pooled["false_alarms_per_hour"].value == pytest.approx(pooled)
-
-
-def test_two_findings_on_one_fault_are_one_found_and_one_false():
-    twice = reporting("a", IMPACT, [("impact", 2.0, 2.1), ("impact", 2.15, 2.2)])
-    measures = measured([twice]).pooled
-    assert measures["class_precision"].value == 0.5
-    assert measures["class_recall"].value == 1.0
-    assert measures["class_f1"].value == pytest.approx(2 / 3)
-    assert measures["false_alarms_per_hour"].value == 0.0  # both are on the fault
-
-
-def test_one_finding_on_two_faults_finds_both_but_matches_one():
-    faults = (Fault(1.0, 1.1, "impact"), Fault(1.5, 1.6, "impact"))
-    outcome = Outcome.of(reporting("a", GOOD[:0], [("impact", 0.9, 1.7)], faults=faults))
-    assert outcome.found.tolist() == [True, True]
-    assert outcome.counts["matched_by_class"] == 1.0
 
 
 def test_pairs_are_of_one_class_where_that_is_asked_for():
@@ -354,21 +328,6 @@ def test_domains_are_ranked_apart_and_summarised_by_their_harmonic_mean():
     assert (ranked["a"]["pauc"], ranked["b"]["pauc"]) == (1.0, 0.5)
     assert found.pauc == pytest.approx(2 / 3)
     assert np.isnan(measured([exact("panda/good-000", GOOD)]).auc)
-
-
-def test_spans_are_merged_and_shared_as_on_a_fine_grid():
-    random = np.random.default_rng(2)
-    for _ in range(20):
-        one, other = (np.sort(random.integers(0, 40, (4, 2)), axis=1) / 4 for _ in range(2))
-        grid = np.arange(0, 10, 1 / 8) + 1 / 16
-
-        def inside(each, grid=grid):
-            return ((each[:, :1] < grid) & (grid < each[:, 1:])).any(axis=0)
-
-        assert duration(one) == pytest.approx(inside(one).sum() / 8)
-        both = inside(one) & inside(other)
-        assert duration(common(one, other)) == pytest.approx(both.sum() / 8)
-    assert duration(np.zeros((0, 2))) == 0.0
 
 
 def test_long_names_are_printed_whole():

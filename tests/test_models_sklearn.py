@@ -1,6 +1,4 @@
 import doctest
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,17 +19,6 @@ def test_features_pass_the_checks_of_scikit_learn(estimator, check):
 
 def test_the_example_of_the_documentation_runs():
     assert doctest.testmod(noiseclassifier.sklearn).failed == 0
-
-
-def test_the_example_of_the_page_runs():
-    page = (Path(__file__).parents[1] / "docs" / "classifier.md").read_text(encoding="utf-8")
-    (code,) = re.findall("```python\n(.*?)```", page, re.DOTALL)
-    labels = np.tile(["ok", "oscillations"], 30)
-    noise = np.random.default_rng(0).normal(1.0, 0.01, (60, 400))
-    noise[labels != "ok"] += 0.1 * np.sin(2 * np.pi * 90 * np.arange(400) / RATE)
-    names = {"frames": noise, "labels": labels, "groups": np.repeat(list("abcd"), 15)}
-    exec(code.replace("\ncross_val_score", "\nscores = cross_val_score"), names)
-    assert names["scores"].mean() > 0.9
 
 
 def test_features_are_those_of_the_profile():

@@ -2,14 +2,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.recording import (
-    check_apart,
-    folds,
-    group_of,
-    held_out,
-    robot_of,
-    seen,
-)
+from noiseclassifier.recording import check_apart, folds, group_of, held_out, robot_of, seen
 
 RUNS = [
     f"{robot}/{scenario}-{seed:03d}"

@@ -123,8 +123,7 @@ def test_the_body_goes_from_rest_to_rest_its_way(way):
 
 
 @pytest.mark.parametrize(
-    ("name", "together"),
-    [("trot", {(0, 3), (1, 2)}), ("pace", {(0, 2), (1, 3)})],
+    ("name", "together"), [("trot", {(0, 3), (1, 2)}), ("pace", {(0, 2), (1, 3)})]
 )
 def test_two_feet_swing_at_once_in_a_trot_and_a_pace(name, together):
     swing = _swing(name)

@@ -10,14 +10,7 @@ from noiseclassifier.scenarios.arm import KINDS, ReachPlan, Tool, plan
 from noiseclassifier.scenarios.domains import arm_motion
 from noiseclassifier.scenarios.faults import SLOW, Defect, Faults, no_defect
 from noiseclassifier.scenarios.labels import deviation
-from noiseclassifier.scenarios.motions import (
-    TICK,
-    Collision,
-    JointStop,
-    Payload,
-    Picks,
-    Reach,
-)
+from noiseclassifier.scenarios.motions import TICK, Collision, JointStop, Payload, Picks, Reach
 from noiseclassifier.scenarios.robots import WIDE, Arm
 from noiseclassifier.scenarios.simulation import FAULTS, ON_DRIVES, Start, Trial, _trial, suited
 from noiseclassifier.scenarios.world import reduced_model
@@ -50,6 +43,11 @@ def trial(arm: str, motion: Picks | Reach, defect: Defect = no_defect) -> Trial:
     return _trial(Start(arm, 1, motion), defect, 2.0)
 
 
+@lru_cache
+def planned(motion: Picks | Reach):
+    return plan(PANDA, motion, RNG(0), 3.0)
+
+
 @pytest.mark.parametrize("way", WAYS)
 def test_picks_never_jump(way):
     for seed in range(5):
@@ -78,7 +76,7 @@ def test_short_picks_are_the_beginning_of_long_ones_and_press_for_half_a_second(
     short, long = pick(2, 3.0), pick(2, 9.0)
     np.testing.assert_array_equal(short.places, long.places[: len(short.time)])
     assert short.contacts == long.contacts[: len(short.contacts)]
-    assert all(pick(seed, 3.0).contacts[0].start <= 2.5 for seed in range(200))
+    assert all(pick(seed, 3.0).contacts[0].start <= 2.5 for seed in range(50))
 
 
 def test_on_the_spot_all_contacts_are_at_one_place_and_in_all_directions_there_are_none():
@@ -215,8 +213,7 @@ def test_an_end_stop_holds_its_joint():
 @pytest.mark.parametrize("name", OWN)
 def test_every_fault_suits_every_motion(name):
     for one in (Picks(), Picks(way="directions"), *(Reach(kind=kind) for kind in KINDS)):
-        drawn = plan(PANDA, one, RNG(0), 3.0)
-        found = OWN[name](RNG(1), drawn)
+        found = OWN[name](RNG(1), planned(one))
         assert all(0 <= event.start < event.stop for event in found.events)
         acts = bool(found.events or found.loads or found.boxes)
         assert acts == (name in suited("arm", one))

@@ -6,12 +6,7 @@ import pinocchio as pin
 import pytest
 
 from noiseclassifier.scenarios.motions import Box, Tip
-from noiseclassifier.scenarios.world import (
-    box_changes,
-    build,
-    pinocchio_base,
-    set_collision,
-)
+from noiseclassifier.scenarios.world import box_changes, build, pinocchio_base, set_collision
 from noisemodel import Robot
 
 ODD = """<robot name="odd"><link name="base"/>
@@ -140,10 +135,7 @@ def test_the_base_is_converted_to_pinocchios_conventions():
 
 
 def test_boxes_appear_and_vanish():
-    boxes = (
-        Box((0, 0, 0), (1, 1, 1)),
-        Box((0, 0, 0), (1, 1, 1), since=0.5, until=0.8),
-    )
+    boxes = (Box((0, 0, 0), (1, 1, 1)), Box((0, 0, 0), (1, 1, 1), since=0.5, until=0.8))
     model = pin.buildModelFromXML(ODD)
     built = build(model, **physics(model.nv), boxes=boxes)
     late = built.geom("box1").id

@@ -183,8 +183,7 @@ def test_unknown_names_are_refused_with_the_known_ones():
     ):
         scenarios.simulate("panda", "sport", 0)
     with pytest.raises(
-        scenarios.ScenarioError,
-        match="robot 'baxter' cannot be simulated; there are .*panda",
+        scenarios.ScenarioError, match="robot 'baxter' cannot be simulated; there are .*panda"
     ):
         scenarios.simulate("baxter", "straight", 0)
 
