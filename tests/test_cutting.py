@@ -31,7 +31,7 @@ def run_of(kind, *, shake=0.0, frequency=55.0, noise=2e-3, during=(3.0, 6.0)):
 
 
 @pytest.mark.parametrize("kind", ["arm", "leg"])
-@pytest.mark.parametrize("shake", [0.15, 1.0, 10.0])
+@pytest.mark.parametrize("shake", [0.15, 10.0])
 def test_chatter_that_is_found_in_its_run_is_found_without_what_comes_before(kind, shake):
     run = run_of(kind, shake=shake)
     (event,) = analyse(run, LIBRARY).findings
@@ -61,7 +61,7 @@ def test_a_piece_that_is_too_short_to_tell_what_lasts_is_not_ok():
     assert f"no stretch of {SHORTEST:g} s without a gap" in found.reason
 
 
-@pytest.mark.parametrize("shake", [0.1, 1.0, 100.0])
+@pytest.mark.parametrize("shake", [0.1, 100.0])
 def test_a_chatter_does_not_become_ok_by_being_louder_coarser_slower_or_held(shake):
     run = run_of("arm", shake=shake, frequency=40.0, during=(-np.inf, np.inf))
     velocity = run.velocity

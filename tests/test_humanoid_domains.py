@@ -160,6 +160,7 @@ def test_lengths_are_scaled_and_nothing_else():
     assert again.apart == pytest.approx(G1.apart)
 
 
+@pytest.mark.slow
 def test_a_soft_and_late_robot_walks_on():
     _, run = simulated(
         G1, Stroll(walk=WALKS["walk"]), duration=3.0,

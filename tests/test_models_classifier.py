@@ -200,7 +200,3 @@ def test_the_nearest_model_is_the_one_below(ours):
         nc.nearest(library, 500.0)
     with pytest.raises(nc.RateError, match="the models' rates are none Hz"):
         nc.nearest({}, 500.0)
-
-
-def test_the_package_has_its_public_names():
-    assert all(hasattr(nc, name) for name in nc.__all__)

@@ -416,16 +416,6 @@ def test_where_the_robot_stands_power_is_that_of_the_samples(little, kind):
     np.testing.assert_allclose(averaged(robot, surface, q, v, kind), expected, rtol=1e-9)
 
 
-def test_where_the_robot_moves_power_is_right_to_a_hundredth(little):
-    robot, surface = little
-    q, v = vibration(robot, 400, moving=True)
-    noise = extended(robot, surface, q, v, "normal").power
-    expected = noise.reshape(-1, SIZE, noise.shape[1]).mean(axis=1)
-    found = averaged(robot, surface, q, v, "normal")
-    np.testing.assert_allclose(found, expected, rtol=2e-2)
-    np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=2e-3)
-
-
 @pytest.mark.parametrize("offset", [0.0, 0.7])
 @pytest.mark.parametrize("kind", ["normal", "paper"])
 def test_the_noise_of_a_floating_robot_is_the_extended_one(little, kind, offset):

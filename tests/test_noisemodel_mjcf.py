@@ -504,14 +504,6 @@ def test_what_would_take_gigabytes_or_minutes_is_refused_in_one_line(
     assert os.listdir(tmp_path) == ["robot.xml"]  # no MUJOCO_LOG.TXT
 
 
-def test_models_that_double_with_each_level_are_refused(tmp_path, apart):
-    for level in range(30):
-        models = "".join(f'<model name="{n}" file="a{level + 1}.xml"/>' for n in "lr" if level < 29)
-        written(tmp_path, f"<mujoco><asset>{models}</asset></mujoco>", f"a{level}.xml")
-    with pytest.raises(RobotError, match="MuJoCo crashes on it, or needs"):
-        Robot.load(tmp_path / "a0.xml")
-
-
 def test_a_mesh_that_is_drawn_too_often_is_refused(tmp_path, monkeypatch):
     write_stl(tmp_path / "part.stl")
     geoms = '<geom type="mesh" mesh="part"/>' * 9

@@ -347,12 +347,6 @@ def twists(surface, count=200):
     return drawn / np.sqrt(np.einsum("is,ij,js->s", drawn, form, drawn))
 
 
-def test_surface_of_a_box():
-    exact = moments(urdf.box(1.0, 2.0, 3.0) + np.array([5.0, 6.0, 7.0]))
-    assert exact["area"] == pytest.approx(22.0, rel=1e-15)
-    assert np.allclose(exact["centroid"], [5.0, 6.0, 7.0], rtol=1e-15)
-
-
 def test_a_sphere_that_spins_has_no_normal_speed():
     """The mean-square speed is w² a² 2/3, none of it outwards."""
     exact = moments(SHAPES["sphere"])

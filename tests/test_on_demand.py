@@ -94,8 +94,7 @@ def plain(labels):
     return {each.name: np.asarray(getattr(labels, each.name)).tolist() for each in fields(labels)}
 
 
-@pytest.mark.parametrize("rate", [RATE, 4000.0])
-@pytest.mark.parametrize("kind", [np.float32, np.float64])
+@pytest.mark.parametrize(("rate", "kind"), [(RATE, np.float64), (4000.0, np.float32)])
 def test_a_run_on_demand_has_the_labels_findings_and_audit_of_one_in_memory(tmp_path, kind, rate):
     path = tmp_path / "run.npz"
     run = shaken(rate=rate, samples=int(4 * rate), kind=kind)

@@ -60,7 +60,9 @@ def test_every_quadruped_stands_with_its_mass_over_its_feet_and_within_its_limit
     assert standing.feet[:, :2].mean(axis=0) == pytest.approx([0, 0], abs=1e-9)
 
 
-@pytest.mark.parametrize(("robot", "gait"), [(A1, "walk"), (HYQ, "trot")])
+@pytest.mark.parametrize(
+    ("robot", "gait"), [(A1, "walk"), pytest.param(HYQ, "trot", marks=pytest.mark.slow)]
+)
 def test_a_target_robot_walks_upright_and_where_it_is_planned(robot, gait):
     motion = Trot(gait=gait)
     trial = run(robot, motion)
@@ -177,6 +179,7 @@ class Soft(Drives):
         return super().torque(position, velocity, *self.held)
 
 
+@pytest.mark.slow
 def test_go2_trots_on_the_softest_drives(monkeypatch):
     monkeypatch.setattr(simulation, "Drives", Soft)
     trial = run(GO2, steady(Trot(gait="trot")))

@@ -188,16 +188,6 @@ def test_unknown_names_are_refused_with_the_known_ones():
         scenarios.simulate("baxter", "straight", 0)
 
 
-def test_a_scenario_of_another_family_is_refused(monkeypatch):
-    lame = replace(scenarios.SCENARIOS["straight"], name="lame", cases={})
-    monkeypatch.setattr(simulation, "SCENARIOS", {**scenarios.SCENARIOS, "lame": lame})
-    with pytest.raises(
-        scenarios.ScenarioError,
-        match="scenario 'lame' does not exist for 'panda'; it has straight, curve",
-    ):
-        scenarios.simulate("panda", "lame", 0)
-
-
 def test_numbers_out_of_range_are_refused():
     with pytest.raises(scenarios.ScenarioError, match="seed -1: expected an integer of at least 0"):
         scenarios.simulate("panda", "straight", -1)
