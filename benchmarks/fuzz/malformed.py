@@ -69,7 +69,8 @@ def main() -> None:
     warnings.simplefilter("ignore")
     _imported()
     found: list[Result] = []
-    with tempfile.TemporaryDirectory(dir=_fast_folder()) as scratch:
+    memory = "/dev/shm" if Path("/dev/shm").is_dir() else None  # faster than a disk
+    with tempfile.TemporaryDirectory(dir=memory) as scratch:
         for name in options.only or [each for each in READERS if READERS[each].command]:
             for result in results(name, options.count, options.seed, Path(scratch), options.keep):
                 found.append(result)
@@ -247,10 +248,6 @@ def _imported() -> None:
     call("noise", "/nowhere.npz")  # what the command line itself imports when it is used
     gc.collect()
     gc.freeze()
-
-
-def _fast_folder() -> str | None:
-    return "/dev/shm" if Path("/dev/shm").is_dir() else None
 
 
 if __name__ == "__main__":

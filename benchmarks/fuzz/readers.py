@@ -315,6 +315,10 @@ def _noisytest(folder: Path) -> Path:
     return folder / "data" / "a.toml"
 
 
+def _noisytest_log(folder: Path) -> Path:
+    return _noisytest(folder).with_suffix(".log")
+
+
 def _dataset(folder: Path) -> Path:
     return Folder.opened(folder / "set", duration=SHORTEST).path / "dataset.json"
 
@@ -356,6 +360,11 @@ def _dae() -> str:
 def _read_log(path: Path) -> None:
     listing(path, ReadOptions())
     for _ in read_logs(path):
+        pass
+
+
+def _read_folder(path: Path) -> None:
+    for _ in noisytest.read_folder(path.parent):
         pass
 
 
@@ -487,18 +496,12 @@ def _labels(name: str, content: str) -> Reader:
 
 
 def _robot(name: str, content: str | bytes, kind: str = "text", *, mesh: bool = False) -> Reader:
+    robot = "{folder}/robot.urdf" if mesh else "{}"
     return Reader(
         kind,
         _mesh(name, content) if mesh else _written(name, content),
         _read_mesh if mesh else _read_robot,
-        (
-            "noise",
-            "{folder}/run.npz",
-            "--kind",
-            "normal",
-            "--robot",
-            "{folder}/robot.urdf" if mesh else "{}",
-        ),
+        ("noise", "{folder}/run.npz", "--kind", "normal", "--robot", robot),
     )
 
 
@@ -646,18 +649,9 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         ),
         "names": Reader("text", _written("names", NAMES.replace(";", "\n")), _read_names, ()),
         "ROS definition": Reader("text", _written("state.msg", STATES[3]), _read_definition, ()),
-        "NoisyTest log": Reader(
-            "text",
-            lambda folder: _noisytest(folder).with_suffix(".log"),
-            lambda path: [*noisytest.read_folder(path.parent)],
-            EVALUATE,
-        ),
-        "NoisyTest labels": Reader(
-            "text", _noisytest, lambda path: [*noisytest.read_folder(path.parent)], EVALUATE
-        ),
-        "NoisyTest, two columns": Reader(
-            "text", lambda folder: _noisytest(folder).with_suffix(".log"), nc.read_log, CLASSIFY
-        ),
+        "NoisyTest log": Reader("text", _noisytest_log, _read_folder, EVALUATE),
+        "NoisyTest labels": Reader("text", _noisytest, _read_folder, EVALUATE),
+        "NoisyTest, two columns": Reader("text", _noisytest_log, nc.read_log, CLASSIFY),
         "dataset.json": Reader(
             "text",
             _dataset,
