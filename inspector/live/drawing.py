@@ -179,10 +179,9 @@ def _parsed(address: str) -> tuple[str, int]:
 
 # Lines are drawn at once for this time, in [s]: a message costs more than the points in it.
 SEND_INTERVAL = 0.1
-# The same for a file without a viewer: a twentieth of the time so far, within these ends, in [s].
-# For each message, rerun keeps some hundred bytes until the file is closed; longer messages take
-# more memory while they are written.
-FILE_INTERVAL, FILE_LONGEST, FILE_SHARE = 2.0, 20.0, 0.05
+# The same for a file without a viewer, in [s]: rerun keeps some hundred bytes of each message until
+# the end.
+FILE_INTERVAL = 10.0
 
 
 class Messages:
@@ -191,7 +190,7 @@ class Messages:
     def __init__(self, recording: rr.RecordingStream, *, watched: bool = True) -> None:
         self.recording, self._watched = recording, watched
         self._interval = SEND_INTERVAL if watched else FILE_INTERVAL
-        self._held = self._drawn = 0.0  # time that waits, and time so far, in [s]
+        self._held = 0.0  # time that waits, in [s]
         self._makers: dict[str, Callable[[Any], Iterable[Any]]] = {}
         self._waiting: dict[str, list[tuple[NDArray[np.int64], Any]]] = {}
 
@@ -215,9 +214,6 @@ class Messages:
         """Send what waits if enough time has passed."""
         self._held += seconds
         if self._held >= self._interval:
-            self._drawn += self._held
-            if not self._watched:
-                self._interval = min(max(FILE_SHARE * self._drawn, FILE_INTERVAL), FILE_LONGEST)
             self.flush()
 
     def flush(self) -> None:
@@ -477,9 +473,8 @@ class Drawing:
         )
         self._lane_end = -np.inf  # until when the class of the latest frame is drawn, in [ns]
         self._told = ""  # findings that are drawn
-        self._start: float | None = None  # time of the first sample
+        self._begun = False
         self._camera: Camera | None = None
-        self._full = False  # whether plots show the last ten seconds, not the first
         self._plots: dict[str, dict[str, slice]] = {}  # columns of each entity, by signal
         self._titles: dict[str, list[str]] = {}  # entities of each plot
         size = panels.JOINTS_PER_PLOT
@@ -527,20 +522,17 @@ class Drawing:
         axes.log_beside(recording, self._classes, named, nothing)
 
     def begin(self, time: float, signals: Mapping[str, Array]) -> None:
-        """Send the layout with the first sample, whose pose places the camera, and at 10 s."""
-        if self._start is None:
-            self._start = time
-            if self._robot is not None:
-                pose = signals.get("base_pose")
-                first = None if pose is None else pose[0]
-                self._camera = self._robot.camera(signals["position"][0], first)
-                self._robot.colour(time, (), np.empty(0))
-            self.findings(time, ())
-        elif not self._full and time >= self._start + SHOWN:
-            self._full = True
-        else:
+        """Send the layout with the first sample, whose pose places the camera."""
+        if self._begun:
             return
-        self._recording.send_blueprint(self._layout(self._start))
+        self._begun = True
+        if self._robot is not None:
+            pose = signals.get("base_pose")
+            first = None if pose is None else pose[0]
+            self._camera = self._robot.camera(signals["position"][0], first)
+            self._robot.colour(time, (), np.empty(0))
+        self.findings(time, ())
+        self._recording.send_blueprint(self._layout())
 
     def piece(self, time: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
         """Draw the spectrogram and the levels of links of a stretch without missing samples."""
@@ -634,20 +626,15 @@ class Drawing:
 
     def finish(self, time: float, found: Sequence[Event]) -> None:
         """Show what waits, and the findings of the whole stream."""
-        if self._start is not None:
+        if self._begun:
             self.findings(time, found)
         self._messages.flush()
 
-    def _layout(self, start: float) -> Blueprint:
-        """Lay the recording out; every plot shows ten seconds: the first, and then the last.
-
-        Until the last ten seconds all lie after the start, no time is negative.
-        """
-        shown: dict[str, Any] = {"last": SHOWN} if self._full else {}
-        shown = shown or {"during": (start, start + SHOWN)}
+    def _layout(self) -> Blueprint:
+        """Lay the recording out; every plot shows the last ten seconds."""
         over_time = [
-            axes.timed(NOISE_PANEL, title="Noise", paths=BELOW, between=None, **shown),
-            axes.timed(SPECTROGRAM_PANEL, title="Spectrum", paths=BELOW, **shown),
+            axes.timed(NOISE_PANEL, title="Noise", paths=BELOW, between=None, last=SHOWN),
+            axes.timed(SPECTROGRAM_PANEL, title="Spectrum", paths=BELOW, last=SHOWN),
         ]
         left = [
             (unstable.text("Findings", "/report", titled=False), 2.0),
@@ -655,7 +642,8 @@ class Drawing:
         ]
         signals = {title: ("/joints", paths) for title, paths in self._titles.items()}
         if self._classes is not None:  # otherwise there is no verdict
-            over_time.insert(0, axes.timed(self._classes, title="Classes", paths=BELOW, **shown))
+            classes = axes.timed(self._classes, title="Classes", paths=BELOW, last=SHOWN)
+            over_time.insert(0, classes)
             left.insert(0, (unstable.drawing("/verdict"), 0.32))
             signals["Scores"] = (SCORES, list(BELOW))
         if self._camera is not None:
@@ -664,7 +652,7 @@ class Drawing:
         plots = [
             axes.timed(
                 SIGNALS_PANEL, origin, title=title, name=title, between=None, paths=paths,
-                legend=True, **shown,
+                legend=True, last=SHOWN,
             )
             for title, (origin, paths) in signals.items()
         ]  # fmt: skip
