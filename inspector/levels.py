@@ -30,6 +30,7 @@ class Scale:
     high: float  # of the lightest one, in [dB]
     unit: str  # such as "dB re 1 rad/s"
     step: float = 20.0  # from one tick to the next, in [dB]
+    shades: int = 32  # colours of a row of levels: few change rarely
     palette: Callable[[Array], NDArray[np.uint8]] = colors.heat  # of places from 0 to 1
 
     def place(self, level: Array) -> Array:

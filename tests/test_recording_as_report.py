@@ -27,9 +27,9 @@ def recording(analysis, tmp_path_factory):
 
 
 def text(recording):
-    """The report of a recording, without the marks and the addresses of Markdown."""
+    """The report of a recording, without the marks of Markdown."""
     _, (document,) = read(recording, "/report", "TextDocument:text")
-    return re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", re.sub(r"[*`]", "", document[0]))
+    return re.sub(r"[*`]", "", document[0])
 
 
 def table(analysis, title):

@@ -161,16 +161,14 @@ def urdf(folder: Path, shape: str) -> Path:
     return path
 
 
-def kinds(tree):
-    """The shapes that are drawn."""
-    return [kind for shapes in scene.shapes_by_link(tree).values() for _, kind in shapes]
-
-
 def test_a_link_without_visual_shapes_is_drawn_as_it_collides(tmp_path):
     (tmp_path / "out").mkdir()
     tree = scene.load(str(urdf(tmp_path, BAR.replace("visual", "collision"))), tmp_path / "out")
-    assert set(kinds(tree)) == {"Boxes3D"}
-    assert set(scene.entities(tree)) == {"a", "b"}
+    shapes = scene.shapes_by_link(tree)
+    assert {link: [kind for _, kind in own] for link, own in shapes.items()} == {
+        "a": ["Boxes3D"],
+        "b": ["Boxes3D"],
+    }
 
 
 def test_what_has_no_extent_is_in_the_middle_of_the_picture():

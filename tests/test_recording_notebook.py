@@ -37,28 +37,26 @@ def opened(monkeypatch):
     return shown
 
 
-def test_plain_python_opens_a_window(run, opened):
+def test_plain_python_opens_a_window_of_a_run_and_of_a_run_file(run, opened, tmp_path):
     inspector.show(run)
-    (recording,) = opened
-    assert recording.read_bytes().startswith(b"RRF2")
-
-
-def test_a_run_file_can_be_shown(run, opened, tmp_path):
     run.save(tmp_path / "run.npz")
     inspector.show(tmp_path / "run.npz")
     inspector.show(str(tmp_path / "run.npz"))
-    assert len(set(opened)) == 1  # the same run replaces its own recording
+    assert all(recording.read_bytes().startswith(b"RRF2") for recording in opened)
+    assert len(opened) == 3
+    assert len(set(opened)) == 2  # the same run replaces its own recording
 
 
-def test_without_a_display_the_recording_is_named(run, monkeypatch):
-    monkeypatch.setattr(viewer, "has_display", lambda: False)
-    with pytest.raises(ViewerError, match=r"no display; the recording is in .*\.rrd"):
-        inspector.show(run)
-
-
-def test_a_viewer_that_ends_is_an_error_that_names_the_recording(run, monkeypatch):
-    monkeypatch.setattr(viewer, "open_window", lambda _: "the viewer ended with status 101")
-    with pytest.raises(ViewerError, match=r"status 101; the recording is in .*\.rrd"):
+@pytest.mark.parametrize(
+    ("name", "result", "problem"),
+    [
+        ("has_display", False, "no display"),
+        ("open_window", "the viewer ended with status 101", "status 101"),
+    ],
+)
+def test_where_no_window_opens_the_recording_is_named(run, monkeypatch, name, result, problem):
+    monkeypatch.setattr(viewer, name, lambda *_: result)
+    with pytest.raises(ViewerError, match=rf"{problem}; the recording is in .*\.rrd"):
         inspector.show(run)
 
 

@@ -242,19 +242,11 @@ def _log_levels(
     found = np.stack([_columns(time, level, edges) for time, level in several.levels])
     scale = levels.JOINTS.following(found)
     width, lines = _lines(several, panel)
-    axes.log_levels(
-        recording,
-        panel,
-        edges,
-        found,
-        scale,
-        _names(several, panel),
-        path="/levels",
-        names=[f"{name} [{scale.unit}]" for name in several.names],
-        width=width,
-        lines=lines,
-    )
-    return axes.timed(panel, name="Level above 10 Hz")
+    left, names = _names(several, panel), [f"{name} [{scale.unit}]" for name in several.names]
+    return axes.log_levels(
+        recording, panel, edges, found, scale, left,
+        title="Level above 10 Hz", names=names, width=width, lines=lines,
+    )  # fmt: skip
 
 
 def _columns(time: Array, level: Array, edges: Array) -> Array:

@@ -88,23 +88,18 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[P
     both = spectra(pair, joint)
     if not len(both[0].time):
         return []
-    edges, level = panels.in_levels(both[0])[0], [panels.in_levels(each)[1] for each in both]
+    time, edges, _ = panels.in_levels(both[0])
+    level = [panels.in_levels(each)[2] for each in both]
     scale = SPECTRUM.following(np.stack(level))
-    level = [np.maximum(each, scale.low) for each in level]
-    shown = {
-        "change": (level[1] - level[0], CHANGE),
-        "before": (level[0], scale),
-        "after": (level[1], scale),
-    }
+    before, after = (np.maximum(each, scale.low) for each in level)
+    shown = {"change": (after - before, CHANGE), "before": (before, scale), "after": (after, scale)}
     parts = []
     for what, (values, own) in shown.items():
-        panel = Panel(f"spectrum_{what}", DETAILS)
-        path, title = f"/spectrogram/{what}", f"{joint or 'noise'}\n{what}"
-        shades = panels.SHADES if own is CHANGE else axes.SHADES
-        time = both[0].time
-        panels.log_heat(recording, panel, path, time, edges, values, own, title, shades=shades)
-        name = f"Spectrum{', ' if what == 'change' else ' '}{what}"
-        parts.append(axes.timed(panel, path, name=name)[0])
+        panel, axis = Panel(f"spectrum_{what}", DETAILS), f"{joint or 'noise'}\n{what}"
+        path, title = f"/spectrogram/{what}", f"Spectrum{', ' if what == 'change' else ' '}{what}"
+        bands = time, edges, values
+        part, _ = panels.log_heat(recording, panel, bands, own, axis, title, path=path, below="")
+        parts.append(part)
     return parts
 
 
@@ -216,11 +211,9 @@ def log_links(recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair
     own = [level.name for level in by_link(pair)[:SHOWN_LINKS]]
     time, change = link_steps(pair, own)
     edges = np.append(time, max(float(pair.time[-1]) + 1.0 / pair.rate, float(time[-1])))
-    panel, title, unit = Panel("links", DETAILS), "Links, change", ", change [dB]"
-    every = range(len(own))
-    shades = panels.SHADES
+    title, unit, every = "Links, change", ", change [dB]", range(len(own))
     return panels.log_strip(
-        recording, panel, title, edges, change, own, every, CHANGE, unit, shades=shades
+        recording, "links", title, edges, change, own, every, CHANGE, unit, DETAILS
     )[0]
 
 

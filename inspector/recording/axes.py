@@ -220,7 +220,6 @@ def timed(
     between: tuple[float, float] | None = (0.0, TOP),
     paths: Sequence[str] = ALL,
     legend: bool = False,
-    during: tuple[float, float] | None = None,
     last: float | None = None,
 ) -> Timed:
     """A panel of what lies below a path, its own unless given, with what stands beside it.
@@ -228,7 +227,7 @@ def timed(
     Args:
         name: What its tab is called.
         between: Ends of its axis, those of rows by default; that of its lines if None.
-        during: See `unstable.plot`, as for `last`.
+        last: See `unstable.plot`.
     """
     path = path or f"/{panel.name}"
     plot = unstable.plot(
@@ -239,7 +238,6 @@ def timed(
         fixed=between == (0.0, TOP),
         titled=False,
         legend=legend,
-        during=during,
         last=last,
     )
     left, right = (unstable.drawing(f"/axis/{panel.name}/{side}") for side in ("left", "right"))
@@ -303,7 +301,6 @@ def log_verdict(
 
 # Colour of a row where nothing is known: the viewer's background.
 EMPTY = (*colors.BACKGROUNDS[0], 255)
-SHADES = 32  # colours of a row: few change rarely
 
 
 def log_rows(
@@ -347,37 +344,21 @@ def log_levels(
     scale: Scale,
     left: Sequence[Label],
     *,
-    path: str,
+    title: str,
     names: Sequence[str],
     width: float,
     lines: int = 1,
-    shades: int = SHADES,
-) -> None:
-    """Log levels in [dB], shape (rows, columns), as rows of colours; nothing where one is NaN."""
-    unknown = np.isnan(level)
-    rgba = scale.colours(np.asarray(np.where(unknown, scale.low, level)), shades=shades)
-    rgba[unknown] = EMPTY
-    log_rows(recording, path, edges, rgba, names=names, width=width, lines=lines)
-    log_beside(recording, panel, left, scale)
+    path: str = "",
+    below: str = "",
+) -> Timed:
+    """Log levels in [dB], shape (rows, columns), as rows of colours; nothing where one is NaN.
 
-
-def log_row(
-    recording: rr.RecordingStream,
-    path: str,
-    name: str,
-    stretches: Sequence[tuple[float, float]],
-    color: Color,
-    place: tuple[int, int],
-    between: tuple[float, float],
-) -> None:
-    """Log stretches of time, in [s], if there are any, in a row by its number among all rows.
-
-    Args:
-        between: From where to where in the row, from above.
+    The rows lie below the panel's path, or further below it.
     """
-    if stretches:
-        row, count = place
-        upper, lower = (TOP * (1.0 - (row + share) / count) for share in between)
-        unstable.log_stretches(
-            recording, path, stretches, between=(lower, upper), name=name, color=color, opaque=True
-        )
+    path = path or f"/{panel.name}"
+    unknown = np.isnan(level)
+    rgba = scale.colours(np.asarray(np.where(unknown, scale.low, level)), shades=scale.shades)
+    rgba[unknown] = EMPTY
+    log_rows(recording, path + below, edges, rgba, names=names, width=width, lines=lines)
+    log_beside(recording, panel, left, scale)
+    return timed(panel, path, name=title)

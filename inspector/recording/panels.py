@@ -195,7 +195,14 @@ def log_class(
     between: tuple[tuple[float, float], tuple[float, float]],
     side: str = "",
 ) -> None:
-    """Log when a class was found, and when it was annotated, in its row; see `axes.log_row`."""
+    """Log when a class was found, and when it was annotated, in its row.
+
+    Args:
+        place: The number of the row, and of all rows.
+        between: From where to where in the row, from above, what was found and annotated is drawn.
+        side: Which of two runs this is.
+    """
+    row, count = place
     stretches = {
         "found": found_stretches(analysis, name),
         "annotated": [(b.start, b.stop) for b in analysis.run.blocks if b.label == name],
@@ -203,7 +210,10 @@ def log_class(
     for (how, own), color, ends in zip(stretches.items(), shades, between, strict=True):
         called = f"{side}, {how}: {spoken(name)}" if side else f"{how}: {spoken(name)}"
         path = "/".join(["/class", *([side] if side else []), how, name])
-        axes.log_row(recording, path, called, own, color, place, ends)
+        low, high = (axes.TOP * (1.0 - (row + share) / count) for share in reversed(ends))
+        unstable.log_stretches(
+            recording, path, own, between=(low, high), name=called, color=color, opaque=True
+        )
 
 
 def found_stretches(analysis: Analysis, name: str) -> list[tuple[float, float]]:
@@ -457,12 +467,11 @@ def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> list[
     edges = np.append(time, float(run.time[-1]) + 1.0 / run.rate)
     scale, which = levels.JOINTS.following(level), chosen(analysis, time, level)
     title, names = "Joints above 10 Hz", run.joint_names
-    return [log_strip(recording, _strip("joints", which), title, edges, level, names, which, scale)]
+    return [log_strip(recording, "joints", title, edges, level, names, which, scale)]
 
 
 # Blue is before and quieter, orange is after and louder; what did not change is grey.
 BEFORE, AFTER, SAME = (86, 180, 233), (240, 160, 30), (62, 68, 80)
-SHADES = 25  # an odd number, so that no change has a shade of its own
 
 
 def diverging(place: Array) -> NDArray[np.uint8]:
@@ -472,8 +481,9 @@ def diverging(place: Array) -> NDArray[np.uint8]:
     return np.stack([*channels, np.full(np.shape(place), 255.0)], axis=-1).astype(np.uint8)
 
 
-# Of levels; what is beyond is as blue or as orange as can be.
-CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
+# Of levels; what is beyond is as blue or as orange as can be. The number of colours is odd, so that
+# no change has one of its own.
+CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging, shades=25)
 
 
 def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
@@ -481,10 +491,7 @@ def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
     edges = np.append(beside.time - HOP / 2, beside.time[-1] + HOP / 2)
     which, title, unit = beside.loudest(SHOWN), "Over the reference", ", over the reference [dB]"
     level, names = beside.by_joint, beside.joints
-    panel = _strip("over", which)
-    return log_strip(
-        recording, panel, title, edges, level, names, which, CHANGE, unit, shades=SHADES
-    )
+    return log_strip(recording, "over", title, edges, level, names, which, CHANGE, unit)
 
 
 def log_links(
@@ -492,17 +499,18 @@ def log_links(
 ) -> Timed:
     """Log the noise of a robot's links: levels of those that vibrate most, power, colours."""
     time, level = levels.link_levels(noise)
-    log_power(recording, "/power/total", noise, noise.total, colors.NOISE)
-    for (term, power), shade in zip(noise.terms.items(), colors.of_series(3), strict=False):
-        log_power(recording, f"/power/terms/{term}", noise, power, shade)
+    powers = {"total": noise.total, **{f"terms/{name}": own for name, own in noise.terms.items()}}
+    shades = [colors.NOISE, *colors.of_series(len(noise.terms))]
+    for (path, power), shade in zip(powers.items(), shades, strict=True):
+        shown = np.maximum(decibel(power / REFERENCE_POWER), POWER_FLOOR_DB)
+        axes.log_line(recording, f"/power/{path}", noise.time, shown, shade)
     scale = levels.LINKS.following(level)
     log_robot_levels(recording, tree, noise, scale)
     axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
     edges = np.append(time, noise.time[-1] + width / 2)
     title, which = "Links above 10 Hz", chosen(analysis, time, level)
-    panel = _strip("links", which)
-    return log_strip(recording, panel, title, edges, level, noise.links, which, scale)
+    return log_strip(recording, "links", title, edges, level, noise.links, which, scale)
 
 
 def log_robot_levels(
@@ -515,14 +523,9 @@ def log_robot_levels(
     robot.log_colours(recording, tree, time, colours, rest=scale.colours(np.array([-np.inf])))
 
 
-def _strip(name: str, which: Sequence[int]) -> Panel:
-    """A panel with a row for each."""
-    return Panel(name, STRIP_ROW * len(which) + axes.AXIS)
-
-
 def log_strip(
     recording: rr.RecordingStream,
-    panel: Panel,
+    name: str,
     title: str,
     edges: Array,
     level: Real,
@@ -530,25 +533,23 @@ def log_strip(
     which: Sequence[int],
     scale: Scale,
     unit: str = "",
-    *,
-    shades: int = axes.SHADES,
+    height: float = 0.0,
 ) -> Timed:
-    """Log levels, shape (columns, rows), of some rows."""
-    own, path = [names[index] for index in which], f"/strips/{panel.name}"
-    axes.log_levels(
+    """Log levels, shape (columns, rows), of some rows; the panel is as high as these need."""
+    own = [names[index] for index in which]
+    return axes.log_levels(
         recording,
-        panel,
+        Panel(name, height or STRIP_ROW * len(own) + axes.AXIS),
         edges,
         level[:, which].T,
         scale,
         axes.row_labels(own),
-        path=path,
+        title=title,
         names=[f"{each}{unit or f' [{scale.unit}]'}" for each in own],
         width=STRIP_WIDTH,
         lines=STROKES,
-        shades=shades,
+        path=f"/strips/{name}",
     )
-    return axes.timed(panel, path, name=title)
 
 
 def robot_view(camera: Camera, *, coloured: bool = True) -> Part:
@@ -559,73 +560,50 @@ def robot_view(camera: Camera, *, coloured: bool = True) -> Part:
     return unstable.beside((robot, 88.0), (key, 12.0)) if coloured else robot
 
 
-def log_power(
-    recording: rr.RecordingStream, path: str, noise: LinkNoise, power: Array, color: colors.Color
-) -> None:
-    """Log a sound power over time, as a level."""
-    level = np.maximum(decibel(power / REFERENCE_POWER), POWER_FLOOR_DB)
-    axes.log_line(recording, path, noise.time, level, color)
-
-
 BANDS = 48
 LINE_WIDTH = 5.0
 HEIGHT = 160.0  # height of a spectrogram, in points
 
 
-def log_panel(
-    recording: rr.RecordingStream,
-    panel: Panel,
-    spectrum: Spectrogram,
-    scale: Scale,
-    title: str,
-    written: Callable[[float], str] = axes.hertz,
-) -> None:
-    """Log a spectrogram with its axis and its scale."""
-    edges, level = in_levels(spectrum)
-    path = f"/{panel.name}/bands"
-    log_heat(recording, panel, path, spectrum.time, edges, level, scale, title, written=written)
+def in_levels(spectrum: Spectrogram) -> tuple[Array, Array, Array]:
+    """Middles of columns in [s], edges of bands, and levels in [dB], shape (bands, columns).
 
-
-def in_levels(spectrum: Spectrogram) -> tuple[Array, Array]:
-    """Edges of bands, and their levels in [dB], shape (bands, columns); NaN in gaps."""
+    Levels are NaN in gaps.
+    """
     low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
     edges = np.geomspace(low, max(high, 1.01 * low), BANDS + 1)
     level = 2 * decibel(in_bands(spectrum.frequency, spectrum.amplitude, edges))
-    return edges, np.where(spectrum.valid, level, np.nan)
+    return spectrum.time, edges, np.where(spectrum.valid, level, np.nan)
 
 
 def log_heat(
     recording: rr.RecordingStream,
     panel: Panel,
-    path: str,
-    time: Array,
-    edges: Array,
-    level: Array,
+    spectrum: tuple[Array, Array, Array],
     scale: Scale,
+    axis: str,
     title: str,
     *,
-    written: Callable[[float], str] = axes.hertz,
-    shades: int = axes.SHADES,
-) -> None:
-    """Log a heat map of bands over time, with its axis and its scale.
-
-    Args:
-        time: Middles of the columns, shape (columns,), in [s].
-        level: Shape (bands, columns), in [dB]; nothing is drawn where it is NaN.
-    """
+    path: str = "",
+    below: str = "/bands",
+    orders: bool = False,
+) -> Timed:
+    """Log a spectrogram, as `in_levels` has it, with its axis and its scale."""
+    time, edges, level = spectrum
     half = np.diff(time).min(initial=WINDOW) / 2
-    unit = "Hz" if written is axes.hertz else "periods per turn"
-    axes.log_levels(
+    unit = "periods per turn" if orders else "Hz"
+    return axes.log_levels(
         recording,
         panel,
         np.append(time - half, time[-1] + half),
         level[::-1],
         scale,
-        band_axis(panel, edges, title, written),
-        path=path,
+        band_axis(panel, edges, axis, "{:g}".format if orders else axes.hertz),
+        title=title,
         names=[f"{centre:.0f} {unit}" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1].tolist()],
         width=LINE_WIDTH,
-        shades=shades,
+        path=path,
+        below=below,
     )
 
 
@@ -634,14 +612,14 @@ def log_orders(recording: rr.RecordingStream, analysis: Analysis, scale: Scale) 
 
     Nothing where no joint moves for long enough.
     """
-    found = orders(analysis)
-    if found is None:
+    known = orders(analysis)
+    if known is None:
         return []
-    joint, spectrum = found
-    panel = Panel("orders", HEIGHT)
-    log_panel(recording, panel, spectrum, scale, "periods\nper turn", "{:g}".format)
+    joint, spectrum = known
+    panel, axis, title = Panel("orders", HEIGHT), "periods\nper turn", f"Orders of {joint}"
     log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
-    return [axes.timed(panel, name=f"Orders of {joint}")[0]]
+    found = log_heat(recording, panel, in_levels(spectrum), scale, axis, title, orders=True)
+    return [found[0]]
 
 
 def band_axis(
@@ -676,14 +654,13 @@ def log_details(
         velocity = run.velocity[part].astype(np.float64)
         energy = (vibrating(velocity, valid, run.rate) ** 2).sum(axis=0)
         joints = np.sort(np.argsort(-energy, kind="stable")[:DETAIL_JOINTS])
-        path = f"/detail/{number}"
-        time = run.time[part][valid]
-        names = {"noise": ["simplified"], "velocity": [run.joint_names[i] for i in joints]}
-        values = {"noise": analysis.noise[part, None], "velocity": velocity[:, joints]}
-        for kind, lines in names.items():
-            one = [colors.NOISE] if kind == "noise" else colors.of_series(len(lines))
-            thin = extremes(time, values[kind][valid], points=DETAIL_POINTS)
-            axes.log_lines(recording, f"{path}/{kind}", *thin, names=lines, colours=one)
+        path, names = f"/detail/{number}", [run.joint_names[joint] for joint in joints]
+        for kind, lines, values, shades in (
+            ("noise", ["simplified"], analysis.noise[part, None], [colors.NOISE]),
+            ("velocity", names, velocity[:, joints], colors.of_series(len(names))),
+        ):
+            thin = extremes(run.time[part][valid], values[valid], points=DETAIL_POINTS)
+            axes.log_lines(recording, f"{path}/{kind}", *thin, names=lines, colours=shades)
         title = f"Velocities [rad/s], {spoken(moment.label)} at {moment.peak:.2f} s"
         found += [
             unstable.plot(title, f"{path}/velocity", legend=True, during=edges),

@@ -81,17 +81,6 @@ def frame(tree: UrdfTree, link: str) -> str:
     return f"{tree.frame_prefix or ''}{link}"
 
 
-def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
-    """For each link that moves, and the root, the links that are fixed to it, itself first."""
-    groups = {tree.root_link().name: [tree.root_link().name]}
-    carrier = {tree.root_link().name: tree.root_link().name}
-    for joint in outwards(tree):
-        fixed = joint.joint_type == "fixed"
-        carrier[joint.child_link] = carrier[joint.parent_link] if fixed else joint.child_link
-        groups.setdefault(carrier[joint.child_link], []).append(joint.child_link)
-    return groups
-
-
 def outwards(tree: UrdfTree) -> Iterator[UrdfJoint]:
     """The joints of a robot, each after those that carry it."""
     reached, waiting = {tree.root_link().name}, list(tree.joints())
@@ -102,27 +91,26 @@ def outwards(tree: UrdfTree) -> Iterator[UrdfJoint]:
         waiting = [joint for joint in waiting if joint not in ready]
 
 
-def entities(tree: UrdfTree) -> dict[str, str]:
-    """The entity to select of each link that moves and is drawn."""
-    drawn = {
-        link: [path for each in own for path in tree.get_visual_geometry_paths(each)]
-        for link, own in moving_links(tree).items()
-    }
-    return {link: paths[0].rpartition("/")[0] for link, paths in drawn.items() if paths}
-
-
 def shapes_by_link(tree: UrdfTree) -> dict[str, list[tuple[str, str]]]:
-    """What is drawn of each link that moves: entities and their shapes, keys of ``COLOURED``."""
+    """What is drawn of each link that moves, and of the root, with what is fixed to it.
+
+    These are entities and their shapes, keys of ``COLOURED``.
+    """
     kinds = {}
     for chunk in tree.stream().to_chunks():
         for name in chunk.to_record_batch().schema.names:
             shape, _, component = name.partition(":")
             if shape in COLOURED and component != COLOURED[shape]:
                 kinds[chunk.entity_path] = shape
-    return {
-        link: [(path, kinds[path]) for each in own for path in tree.get_visual_geometry_paths(each)]
-        for link, own in moving_links(tree).items()
-    }
+    carrier = {tree.root_link().name: tree.root_link().name}
+    for joint in outwards(tree):
+        fixed = joint.joint_type == "fixed"
+        carrier[joint.child_link] = carrier[joint.parent_link] if fixed else joint.child_link
+    found: dict[str, list[tuple[str, str]]] = {}
+    for link, moved in carrier.items():
+        paths = tree.get_visual_geometry_paths(link)
+        found.setdefault(moved, []).extend((path, kinds[path]) for path in paths)
+    return found
 
 
 def coloured(kind: str, shades: NDArray[np.uint8]) -> Iterable[Any]:
@@ -240,12 +228,9 @@ DRAWN = {".stl", ".dae", ".obj", ".glb", ".gltf"}
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-class MeshError(InspectorError):
+def _not_drawn(mesh: str, problem: str) -> InspectorError:
     """A mesh that is missing, lies outside of the robot's folders, or cannot be read."""
-
-    def __init__(self, mesh: str, problem: str) -> None:
-        self.mesh, self.problem = mesh, problem
-        super().__init__(f"mesh {mesh}: {problem}; `--no-robot` shows the run without the robot")
+    return InspectorError(f"mesh {mesh}: {problem}; `--no-robot` shows the run without the robot")
 
 
 def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
@@ -280,7 +265,9 @@ def drawable_mjcf(moved: Robot, folder: Path) -> str:
         folder: Takes the links' shapes as STL files, one for each colour.
     """
     assert moved.mjcf is not None
-    names = [_unlike(link_names(moved), "base"), *link_names(moved)]
+    names = ["base", *link_names(moved)]
+    while names[0] in names[1:]:
+        names[0] += "_"
     shapes: dict[tuple[int, tuple[float, ...]], list[Array]] = {}
     try:
         for joint, shape, triangles in pieces(moved):
@@ -288,7 +275,7 @@ def drawable_mjcf(moved: Robot, folder: Path) -> str:
                 names[0] = shape.link  # the foot of an arm
             shapes.setdefault((joint, shape.colour), []).append(triangles)
     except noisemodel.MeshError as error:
-        raise MeshError(error.mesh, error.problem) from error
+        raise _not_drawn(error.mesh, error.problem) from error
     tree = ET.Element("robot", name=moved.name)
     base = 1 if moved.floating_base else 0
     links = {base: ET.SubElement(tree, "link", name=names[base])}
@@ -333,24 +320,20 @@ def _numbers(values: Iterable[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _unlike(known: Sequence[str], name: str) -> str:
-    while name in known:
-        name += "_"
-    return name
-
-
 def _checked(address: str, urdf: Path, roots: Sequence[Path], folder: Path) -> Path:
+    """The file of a mesh; its triangles as the noise model reads them where rerun draws nothing."""
     try:
         path = find_mesh(address, urdf, roots)
         if path.suffix.lower() not in DRAWN:
             known = ", ".join(sorted(DRAWN))
-            raise MeshError(address, f"of kind {path.suffix!r}, expected {known}")
+            raise _not_drawn(address, f"of kind {path.suffix!r}, expected {known}")
         meshes.check_whole(path)  # the viewer draws nothing of others, without a warning
-        if path.suffix.lower() == ".dae" and not _read_by_rerun(path):
-            return _as_stl(path, folder)
+        if path.suffix.lower() != ".dae" or _read_by_rerun(path):
+            return path
+        copy = folder / f"{hashlib.sha256(bytes(path)).hexdigest()[:16]}.stl"
+        return copy if copy.exists() else _write_stl(meshes.read(path), copy)
     except noisemodel.MeshError as error:
-        raise MeshError(address or "''", error.problem) from error
-    return path
+        raise _not_drawn(address or "''", error.problem) from error
 
 
 def _read_by_rerun(path: Path) -> bool:
@@ -362,12 +345,6 @@ def _read_by_rerun(path: Path) -> bool:
     text = path.read_text(encoding="utf-8", errors="replace")
     others = re.search(r"<(polylist|polygons|tristrips|trifans)\b", text)
     return not others and 'version="1.4.1"' in text and "<up_axis>Z_UP<" in text
-
-
-def _as_stl(path: Path, folder: Path) -> Path:
-    """Write the triangles of a mesh, as the noise model reads them, as an STL file."""
-    copy = folder / f"{hashlib.sha256(bytes(path)).hexdigest()[:16]}.stl"
-    return copy if copy.exists() else _write_stl(meshes.read(path), copy)
 
 
 def _write_stl(triangles: Array, file: Path) -> Path:

@@ -1,7 +1,7 @@
 """A run as a rerun recording: findings, robot and details at the left, time at the right."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from math import ceil
 from pathlib import Path
@@ -116,8 +116,7 @@ def write(
             (_log_spectra(recording, analysis, floor, sound), panels.HEIGHT + TITLES),
             _log_strips(recording, analysis, tree, beside),
         ]
-        entities = {} if tree is None else robot.entities(tree)
-        _log_text(recording, analysis, linked(report(analysis), entities))
+        _log_text(recording, analysis)
         whole = unstable.beside(
             (unstable.above(*left, (details, DETAILS)), 36.0), (unstable.above(*over_time), 64.0)
         )
@@ -128,7 +127,9 @@ def write(
 
 def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tuple[Part, float]]:
     """Log the verdict; it, the report and the list of events, with their heights."""
-    axes.log_verdict(recording, analysis.status, verdict_of(analysis))
+    kinds = spoken(analysis.headline).partition(": ")[2] or "no finding"
+    told = {"findings": f"FAIL   {kinds}", "ok": f"PASS   {kinds}", "cannot-tell": "CANNOT TELL"}
+    axes.log_verdict(recording, analysis.status, told[analysis.status])
     text = unstable.text("Findings", "/report", titled=False)
     parts = [
         (unstable.drawing("/verdict"), axes.VERDICT),
@@ -150,9 +151,9 @@ def _log_spectra(
     scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
     title = f"Spectrogram of {'the noise' if joint is None else run.joint_names[joint]}"
     panel = axes.Panel("spectrogram", panels.HEIGHT)
-    panels.log_panel(recording, panel, spectrum, scale, "velocity\nspectrum")
     panels.log_gaps(recording, "/spectrogram", run, (0.0, axes.TOP))
-    parts = [axes.timed(panel, name=title)[0]]
+    bands = panels.in_levels(spectrum)
+    parts = [panels.log_heat(recording, panel, bands, scale, "velocity\nspectrum", title)[0]]
     parts += panels.log_orders(recording, analysis, scale)
     if links is not None:
         paths = ["/power/total", axes.SPAN]
@@ -200,15 +201,8 @@ def height(markdown: str) -> float:
     return max(found, HEAD) + FOOT
 
 
-def verdict_of(analysis: Analysis) -> str:
-    """Whether a run passes, in a line, and what was found."""
-    kinds = spoken(analysis.headline).partition(": ")[2]
-    words = {"findings": "FAIL", "ok": "PASS", "cannot-tell": "CANNOT TELL"}
-    found = "" if analysis.status == "cannot-tell" else kinds or "no finding"
-    return f"{words[analysis.status]}   {found}".rstrip()
-
-
-def _log_text(recording: rr.RecordingStream, analysis: Analysis, text: str) -> None:
+def _log_text(recording: rr.RecordingStream, analysis: Analysis) -> None:
+    """Log the report, and what a program wants to know of the run."""
     run, links = analysis.run, analysis.links
     properties = {
         "input_sha256": analysis.sha256,
@@ -221,14 +215,4 @@ def _log_text(recording: rr.RecordingStream, analysis: Analysis, text: str) -> N
         "link_noise": "" if links is None else links.kind,
         "findings": len(analysis.findings),
     }
-    log_report(recording, analysis.name, text, properties)
-
-
-def linked(markdown: str, entities: Mapping[str, str]) -> str:
-    """Let the names of links that stand before a share point to their entities."""
-
-    def address(found: re.Match[str]) -> str:
-        entity = entities.get(found[1], "").lstrip("/")
-        return f"[{found[1]}](recording://{entity}) {found[2]}" if entity else found[0]
-
-    return re.sub(r"(?<=[ |])([^\s|,]+) (\d+%)", address, markdown)
+    log_report(recording, analysis.name, report(analysis), properties)

@@ -202,11 +202,13 @@ def log_stretches(
     color: tuple[int, int, int],
     opaque: bool = False,
 ) -> None:
-    """Shade stretches of time, in [s], in a plot; rerun 0.41 cannot annotate them.
+    """Shade stretches of time, in [s], in a plot, if there are any; rerun cannot annotate them.
 
     The band of a measurement, one standard deviation to either side, is filled to its exact edges;
     a thick line has round ends. It is translucent, and several of them are opaque.
     """
+    if not stretches:
+        return
     copies = COPIES if opaque else 1
     middle, half = (between[0] + between[1]) / 2, (between[1] - between[0]) / 2
     apart: list[tuple[int, int]] = []
