@@ -11,13 +11,14 @@ enough of it.
 """
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from noiseclassifier.labels import Event
-from noiseclassifier.lasting import AROUND, HIGHEST, STRONG, Windows, merged, spectrum
+from noiseclassifier.lasting import AROUND, MEASURED, STRONG, Windows, loud, merged, spectrum
 from noiseclassifier.signals import Array
 
 WINDOW, HOP = 0.5, 0.125  # duration of a window, and time from one to the next, in [s]
@@ -61,6 +62,8 @@ class Bursts(Windows):
             stream.
     """
 
+    SIGNALS = (MEASURED,)
+
     def __init__(self, rate: float, *, start: float = 0.0, whole: bool = False) -> None:
         # One sample more: its differences have a length that is transformed fast.
         super().__init__(rate, WINDOW + 1.0 / rate, HOP, start)
@@ -79,8 +82,12 @@ class Bursts(Windows):
         found = (self._event(line, REST) for line in self._lines)
         return merged(*(event for event in found if event is not None))
 
-    def _window(self, samples: Array) -> None:
-        power, frequency = spectrum(samples[0], self.rate)
+    def _found(self, slopes: Array) -> Iterable[tuple[Array, list[tuple[int, slice]]]]:
+        power, frequency = spectrum(slopes[0], self.rate)
+        return zip(power.swapaxes(0, 1), prominent(power, frequency, self.rate), strict=True)
+
+    def _follow(self, found: tuple[Array, list[tuple[int, slice]]]) -> None:
+        power, lines = found
         self._sum = self._sum + power
         self._windows += 1
         for line in reversed(self._lines if self._whole else []):
@@ -88,7 +95,7 @@ class Bursts(Windows):
                 break
             line.near += float(power[line.row, line.places].sum())
             line.windows += 1
-        for row, places in prominent(power, frequency, self.rate):
+        for row, places in lines:
             own = float(power[row, places].sum())
             near = own + sum(float(each[row, places].sum()) for each in self._recent)
             line = Line(row, places, own, near, len(self._recent) + 1, self._first)
@@ -113,33 +120,34 @@ class Bursts(Windows):
         return Event("oscillations", first + MARGIN, first + WINDOW - MARGIN, SCORE)
 
 
-def prominent(power: Array, frequency: Array, rate: float) -> list[tuple[int, slice]]:
-    """Joint and frequencies of each prominent line of a window.
+def prominent(power: Array, frequency: Array, rate: float) -> list[list[tuple[int, slice]]]:
+    """Joint and frequencies of each prominent line of each window.
 
-    The power is the mean square at each frequency, shape (joints, frequencies).
+    The power is the mean square at each frequency, shape (joints, windows, frequencies).
     """
-    loud = power >= 10.0 ** (LEVEL / 10.0)
-    loud &= (frequency >= LOWEST) & (frequency <= HIGHEST * rate)
-    loud[:, 1:-1] &= (power[:, 1:-1] >= power[:, :-2]) & (power[:, 1:-1] >= power[:, 2:])
-    if not loud.any():
-        return []
-    rows, places = np.nonzero(loud)
-    lines = places - WIDTH // 2, np.minimum(places + WIDTH // 2 + 1, len(frequency))
-    first, stop = around(frequency, places, np.sqrt(2.0))
-    octaves = np.minimum(first, lines[0]), np.maximum(stop, lines[1])
-    summed = power.cumsum(axis=1)
-    own, whole = (
-        summed[rows, stop - 1] - summed[rows, first - 1] for first, stop in (lines, octaves)
-    )
+    row, window, place = loud(power, frequency, LEVEL, LOWEST, rate)
+    found: list[list[tuple[int, slice]]] = [[] for _ in range(power.shape[1])]
+    first, stop = place - WIDTH // 2, np.minimum(place + WIDTH // 2 + 1, len(frequency))
+    low, high = around(frequency, place, np.sqrt(2.0))
+    low, high = np.minimum(low, first), np.maximum(high, stop)
+    summed = power.cumsum(axis=2)
+    own = summed[row, window, stop - 1] - summed[row, window, first - 1]
+    whole = summed[row, window, high - 1] - summed[row, window, low - 1]
     pure = own >= PURE * whole
-    rows, places, first, stop = (each[pure].tolist() for each in (rows, places, *lines))
-    found = []
-    for row, place, *line, low, high in zip(
-        rows, places, first, stop, *around(frequency, places, AROUND), strict=True
-    ):
-        beside, middle = power[row, low:high], (high - low) // 2
-        if power[row, place] >= 10.0 ** (PROMINENT / 10.0) * np.partition(beside, middle)[middle]:
-            found.append((row, slice(*line)))
+    row, window, place = row[pure], window[pure], place[pure]
+    kept = np.empty(len(place), dtype=bool)
+    for each in np.unique(place).tolist():
+        same = np.flatnonzero(place == each)
+        low, high = around(frequency, each, AROUND)
+        middle = (high - low) // 2
+        beside = np.partition(power[row[same], window[same], low:high], middle, axis=1)
+        own = power[row[same], window[same], each]
+        kept[same] = own >= 10.0 ** (PROMINENT / 10.0) * beside[:, middle]
+    for k in np.flatnonzero(kept).tolist():
+        line = slice(
+            int(place[k]) - WIDTH // 2, min(int(place[k]) + WIDTH // 2 + 1, len(frequency))
+        )
+        found[window[k]].append((int(row[k]), line))
     return found
 
 

@@ -16,15 +16,17 @@ has no one frequency. Files and streams have the same windows, hence the same nu
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from noiseclassifier.labels import UNKNOWN, Event
-from noiseclassifier.signals import JOINTS, Array, Mask, Real
+from noiseclassifier.signals import JOINTS, Array, Index, Mask, Real
 
 WINDOW, HOP = 1.0, 0.25  # duration of a window, and time from one to the next, in [s]
 # Time by which a finding begins after the first of its windows, and ends before the last, in [s],
@@ -46,6 +48,9 @@ SHARP = 25.0  # strength in one window that makes a finding of a strong line of 
 DRIFT = 2.0  # how far a line moves from one window to the next, in [Hz]
 TINY = 1e-30  # mean square of silence, in [rad²/s²]
 MEASURED, ERROR = JOINTS[1], JOINTS[2]
+# How many samples are transformed at once, of all joints: more leave the cache of the processor.
+AT_ONCE = 2**17
+Peak: TypeAlias = tuple[int, float, float]  # joint, frequency in [Hz] and strength in [dB]
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,8 @@ class Windows(ABC):
     Rate in [Hz]; window, hop and start in [s].
     """
 
+    SIGNALS: ClassVar[tuple[str, ...]] = (MEASURED, ERROR)  # that are taken
+
     def __init__(self, rate: float, window: float, hop: float, start: float) -> None:
         self.rate, self.start = rate, start
         self._length, self._hop = round(window * rate), max(1, round(hop * rate))
@@ -88,7 +95,7 @@ class Windows(ABC):
         """
         if MEASURED not in signals:
             return
-        names = [name for name in (MEASURED, ERROR) if name in signals]
+        names = [name for name in self.SIGNALS if name in signals]
         fresh = np.stack([np.asarray(signals[name], np.float64) for name in names])
         gaps = [] if valid is None else np.flatnonzero(np.diff(valid, prepend=True)).tolist()
         for first, stop in pairwise([0, *gaps, fresh.shape[2]]):
@@ -111,14 +118,26 @@ class Windows(ABC):
     def _take(self, fresh: Array) -> None:
         held = self._samples if len(self._samples) == len(fresh) else fresh[..., :0]
         self._samples = np.concatenate((held, fresh), axis=2)
-        while self._samples.shape[2] >= self._length:
-            self._window(self._samples[..., : self._length])
-            self._samples = self._samples[..., self._hop :]
-            self._first += self._hop
+        windows = max(0, 1 + (self._samples.shape[2] - self._length) // self._hop)
+        if not windows:
+            return
+        # Of the differences: slow motion, which is far louder, would leak into all frequencies.
+        slopes = np.diff(self._samples[..., : (windows - 1) * self._hop + self._length], axis=2)
+        cut = sliding_window_view(slopes, self._length - 1, axis=2)[:, :, :: self._hop]
+        at_once = max(1, AT_ONCE // (slopes.shape[1] * self._length))
+        for first in range(0, windows, at_once):
+            for found in self._found(cut[:, :, first : first + at_once]):
+                self._follow(found)
+                self._first += self._hop
+        self._samples = self._samples[..., windows * self._hop :]
 
     @abstractmethod
-    def _window(self, samples: Array) -> None:
-        """Take the next window of a stretch."""
+    def _found(self, slopes: Array) -> Iterable[Any]:
+        """What is found in each of some windows of differences, (signals, joints, windows, n)."""
+
+    @abstractmethod
+    def _follow(self, found: Any) -> None:
+        """Take what is found in the next window of a stretch."""
 
     @abstractmethod
     def _end(self, rest: Array) -> None:
@@ -147,24 +166,25 @@ class Lasting(Windows):
         firsts = [line.first for line in self._lines]
         return self.start + min([self._first, *firsts]) / self.rate
 
-    def _window(self, samples: Array) -> None:
-        self._follow(strong(samples, self.rate), self._length)
+    def _found(self, slopes: Array) -> Iterable[list[Peak]]:
+        return strong(slopes, self.rate)
 
     def _end(self, rest: Array) -> None:
         length = rest.shape[2]
         if not self._windows and length >= SHORTEST * self.rate:
-            self._follow(strong(rest, self.rate), length)
+            (peaks,) = strong(np.diff(rest)[:, :, None], self.rate)
+            self._follow(peaks, length)
         for line in self._lines:
             if line.found or line.windows == self._windows < WINDOWS:
                 self._add(line, self._first + length)
         self._lines, self._windows = [], 0
 
-    def _follow(self, peaks: list[tuple[int, float, float]], length: int) -> None:
+    def _follow(self, found: list[Peak], length: int = 0) -> None:
         """Continue the lines of the window before with the peaks of the next one."""
-        stop, lines = self._first + length, []
+        stop, lines = self._first + (length or self._length), []
         self._windows += 1
         self.examined += 1
-        for row, frequency, strength in peaks:
+        for row, frequency, strength in found:
             line = Line(row, frequency, strength, 1, self._first, stop, strength)
             before = [
                 each
@@ -194,46 +214,67 @@ class Lasting(Windows):
         self._events = [*merged(*self._events, Event("oscillations", *times, score))]
 
 
-def strong(window: Array, rate: float) -> list[tuple[int, float, float]]:
-    """Joint, frequency in [Hz] and strength in [dB] of each strong line of a window.
+def strong(slopes: Array, rate: float) -> list[list[Peak]]:
+    """The strong lines of each window.
 
-    It holds measured velocities, and tracking errors if there are any, in [rad/s], of shape
-    (1 or 2, joints, samples).
+    It takes differences of measured velocities, and of tracking errors if there are any, in
+    [rad/s], of shape (1 or 2, joints, windows, samples).
     """
-    line, frequency = spectrum(window[0], rate)
-    loud = line >= 10.0 ** ((STRONG + FLOOR) / 10.0)
-    loud &= (frequency >= LOWEST) & (frequency <= HIGHEST * rate)
-    loud[:, 1:-1] &= (line[:, 1:-1] >= line[:, :-2]) & (line[:, 1:-1] >= line[:, 2:])
-    if not loud.any():
-        return []
-    rows, places = np.nonzero(loud)
-    loudest, row = np.unique(rows, return_inverse=True)  # most often few joints, or none
-    power = np.concatenate((line[None, loudest], spectrum(window[1:, loudest], rate)[0]))
-    median = np.empty((len(power), len(rows)))
-    band = np.floor(np.log(frequency[places] / LOWEST) / np.log(BAND))
+    line, frequency = spectrum(slopes[0], rate)
+    row, window, place = loud(line, frequency, STRONG + FLOOR, LOWEST, rate)
+    found: list[list[Peak]] = [[] for _ in range(line.shape[1])]
+    if not len(place):
+        return found
+    pairs, pair = np.unique([row, window], axis=1, return_inverse=True)  # most often few, or none
+    errors = spectrum(slopes[1:, *pairs], rate)[0]
+    power = np.concatenate((line[None, *pairs], errors))
+    median = np.empty((len(power), len(place)))
+    band = np.floor(np.log(frequency[place] / LOWEST) / np.log(BAND))
     for each in np.unique(band).tolist():
         centre = LOWEST * BAND ** (each + 0.5)
         around = slice(*np.searchsorted(frequency, (centre / AROUND, centre * AROUND)))
         own = np.flatnonzero(band == each)
-        beside = power[:, row[own], around]
+        beside = power[:, pair[own], around]
         middle = beside.shape[-1] // 2
         median[:, own] = np.partition(beside, middle, axis=-1)[..., middle]
     # A line of both, at the level of the weaker one.
-    shared = np.maximum(np.minimum(power[0, row, places], power[:, row, places]), TINY)
+    shared = np.maximum(np.minimum(power[0, pair, place], power[:, pair, place]), TINY)
     level = 10.0 * np.log10(shared)
     prominence = level - 10.0 * np.log10(np.maximum(median, TINY))
     strength = np.minimum(prominence, level - FLOOR).max(axis=0)
-    kept = np.flatnonzero(strength >= STRONG)
-    return [(int(rows[k]), float(frequency[places[k]]), float(strength[k])) for k in kept.tolist()]
+    for k in np.flatnonzero(strength >= STRONG).tolist():
+        found[window[k]].append((int(row[k]), float(frequency[place[k]]), float(strength[k])))
+    return found
 
 
-def spectrum(window: Array, rate: float) -> tuple[Array, Array]:
-    """Mean square of the line at each frequency, shape (..., frequencies), and these in [Hz]."""
-    taper, response = _taper(window.shape[-1] - 1)
-    # Of the differences: slow motion, which is far louder, would leak into all frequencies.
-    waves = np.fft.rfft(np.diff(window, axis=-1) * taper, axis=-1)
-    frequency = np.arange(waves.shape[-1]) * (rate / (window.shape[-1] - 1))
-    return np.asarray((np.square(waves.real) + np.square(waves.imag)) * response), frequency
+def loud(
+    power: Array, frequency: Array, level: float, lowest: float, rate: float
+) -> tuple[Index, Index, Index]:
+    """Joint, window and place of each line of a level in [dB] or more, from a frequency on.
+
+    The power is the mean square at each frequency, shape (joints, windows, frequencies).
+    """
+    first = max(1, int(np.searchsorted(frequency, lowest)))
+    stop = min(len(frequency) - 1, int(np.searchsorted(frequency, HIGHEST * rate, "right")))
+    joint, window, place = np.nonzero(power[..., first:stop] >= 10.0 ** (level / 10.0))
+    place += first
+    own = power[joint, window, place]
+    top = (own >= power[joint, window, place - 1]) & (own >= power[joint, window, place + 1])
+    return joint[top], window[top], place[top]
+
+
+def spectrum(slopes: Array, rate: float) -> tuple[Array, Array]:
+    """Mean square of the line at each frequency, shape (..., frequencies), and these in [Hz].
+
+    It takes the differences of samples, shape (..., samples - 1).
+    """
+    length = slopes.shape[-1]
+    taper, response = _taper(length)
+    waves = np.fft.rfft(slopes * taper, axis=-1)
+    power = np.square(waves.real)
+    power += np.square(waves.imag)
+    power *= response
+    return power, np.arange(waves.shape[-1]) * (rate / length)
 
 
 @lru_cache
