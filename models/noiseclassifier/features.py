@@ -12,7 +12,7 @@ the second.
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,27 +143,27 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
         squares = np.square(spectrum.real)
         squares += np.square(spectrum.imag)
         # A product for each window: the rounding of one for all depends on how many they are.
-        power = squares[..., None, :] @ _power_shares(profile.rate, resolution)
-        amplitude = np.sqrt(power[..., 0, :])
+        power = np.moveaxis(squares, 0, -2) @ _power_shares(profile.rate, resolution)
+        amplitude = np.sqrt(power, out=power)
     else:
-        amplitude = compress(np.abs(spectrum), comb=profile.bands == "comb")
+        amplitude = np.moveaxis(compress(np.abs(spectrum), comb=profile.bands == "comb"), 0, -2)
     amplitude += profile.floor
     found = np.log(amplitude, out=amplitude)
-    norms, joints = found[: profile.norms], found[profile.norms :]
+    norms, joints = found[..., : profile.norms, :], found[..., profile.norms :, :]
     parts = [norms]
     if profile.differences:
-        parts.append(norms[1:] - norms[:-1])
-    if len(joints):
-        joints = joints.reshape(len(profile.signals) - len(norms), -1, *found.shape[1:])
-        loudest = np.maximum.reduce(joints, 1)
-        moving = loudest[: profile.moving]
-        parts += [loudest, moving[1:] - moving[:-1]]
+        parts.append(norms[..., 1:, :] - norms[..., :-1, :])
+    if joints.size:
+        *leading, rows, bands = joints.shape
+        signals = len(profile.signals) - profile.norms
+        joints = joints.reshape(*leading, signals, rows // signals, bands)
+        loudest = np.maximum.reduce(joints, -2)
+        moving = loudest[..., : profile.moving, :]
+        parts += [loudest, moving[..., 1:, :] - moving[..., :-1, :]]
         if profile.relative:
             # The order in which `add.reduce` sums up depends on the shape; this one does not.
-            parts.append(loudest - np.add.reduceat(joints, [0], 1)[:, 0] / joints.shape[1])
-    energies = np.concatenate(parts)
-    *leading, last = range(1, energies.ndim)
-    return energies.transpose(*leading, 0, last).reshape(*found.shape[1:-1], -1)
+            parts.append(loudest - np.add.reduceat(joints, [0], -2)[..., 0, :] / joints.shape[-2])
+    return np.concatenate(parts, axis=-2).reshape(*found.shape[:-2], -1)
 
 
 def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
@@ -520,10 +520,11 @@ class FrameFeatures:
     def _take(self, samples: Array, valid: Mask) -> Frames:
         """Features of the frames that samples complete; they are held for the next ones."""
         length, hop = self._profile.length, self._profile.hop
-        self._held.append((samples.copy(), valid.copy()))
         self.count += len(valid)
         if self.count < self._frame + length:
+            self._held.append((samples.copy(), valid.copy()))
             return self._nothing
+        self._held.append((samples, valid))
         frames = np.arange(self._frame, self.count - length + 1, hop)
         self._frame += len(frames) * hop
         samples, valid = self._all_held()
@@ -566,7 +567,9 @@ class FrameFeatures:
         at_once = max(1, AT_ONCE // (self._rows * resolution.window))
         parts = [known[1]]
         for first in range(0, len(fresh), at_once):
-            places = fresh[first : first + at_once] - self._base
+            places: Any = fresh[first : first + at_once] - self._base
+            if (np.diff(places) == resolution.stride).all():  # a view is faster than a copy
+                places = slice(places[0], places[-1] + 1, resolution.stride)
             parts.append(log_band_energies(windows[:, places], self._profile, resolution))
         starts = np.concatenate((known[0], fresh))
         order = starts.argsort()
