@@ -29,7 +29,7 @@ import numpy as np
 import noiseclassifier as nc
 from inspector.audit.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.errors import InspectorError, without_path
-from inspector.library import Library, nearest, signals_of
+from inspector.library import Library, nearest, signal_names
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.plausibility import check_joints, limit_warnings
 from inspector.logs.read import Reading, left_out, open_source, sources
@@ -249,7 +249,7 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
             reach,
             run.mask,
             library,
-            signals_of(part),
+            signal_names(part),
             rate=(slower or without_hold(run)).rate,
         ),
     )

@@ -8,6 +8,7 @@ where frames without a feature belong. Bound to a rate and to signals (`General.
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Self, TypeAlias
 
@@ -381,17 +382,22 @@ class General:
         taken = next((names for names in INPUTS if feeds(signals, names)), None)
         if taken is None:
             raise MissingSignalError([NOISE], signals)
-        profile = self.recipe.bound(min(rate, HIGHEST), taken)
-        there = self.recipe.places(profile)
-        estimator, mean, scale = self.estimator.at(there), self.mean[there], self.scale[there]
-        known = (self.runs, self.metrics, self.versions, self.sha256)
-        return Classifier(profile, self.classes, estimator, mean, scale, *known)
+        return _bound(self, min(rate, HIGHEST), taken)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, as `Classifier.save` does."""
         profile = self.recipe.bound(HIGHEST).as_dict()
         settings = {"recipe": asdict(self.recipe), "profile": profile, "rate": HIGHEST}
         modelfile.write(path, self, settings, overwrite=overwrite)
+
+
+@lru_cache(maxsize=4)  # many logs have one rate and the same signals
+def _bound(model: General, rate: float, signals: Sequence[str]) -> Classifier:
+    profile = model.recipe.bound(rate, signals)
+    there = model.recipe.places(profile)
+    estimator, mean, scale = model.estimator.at(there), model.mean[there], model.scale[there]
+    known = (model.runs, model.metrics, model.versions, model.sha256)
+    return Classifier(profile, model.classes, estimator, mean, scale, *known)
 
 
 def frames_of(

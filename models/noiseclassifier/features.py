@@ -143,7 +143,9 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
         squares = np.square(spectrum.real)
         squares += np.square(spectrum.imag)
         # A product for each window: the rounding of one for all depends on how many they are.
-        power = np.moveaxis(squares, 0, -2) @ _power_shares(profile.rate, resolution)
+        last = squares.ndim - 1
+        by_window = squares.transpose(*range(1, last), 0, last)
+        power = by_window @ _power_shares(profile.rate, resolution)
         amplitude = np.sqrt(power, out=power)
     else:
         amplitude = np.moveaxis(compress(np.abs(spectrum), comb=profile.bands == "comb"), 0, -2)
