@@ -87,15 +87,20 @@ def order(run: Run, failure: Event | Block) -> Order | None:
         The order; None if a line at an order does not explain the vibration, or hardly better than
         one at a frequency does.
     """
-    best, over_angle, over_time = best_lines(run, failure)
+    best, over_angle, over_time = best_lines(run, failure, least=LEAST)
     return best if over_angle >= max(LEAST, over_time + MARGIN) else None
 
 
-def best_lines(run: Run, failure: Event | Block) -> tuple[Order | None, float, float]:
+def best_lines(
+    run: Run, failure: Event | Block, *, least: float = 0.0
+) -> tuple[Order | None, float, float]:
     """The best order of the joint that vibrates most, and what it explains.
 
     The vibration is the measured velocity less the desired one, or the measured one of a joint
     without, above 10 Hz.
+
+    Args:
+        least: Share that an order has to explain, else no line of a fixed frequency is sought.
 
     Returns:
         The order, its share of the joint's vibration, and the share of the best line of a fixed
@@ -117,6 +122,8 @@ def best_lines(run: Run, failure: Event | Block) -> tuple[Order | None, float, f
     if fastest <= SLOWEST or not _energy(pieces) > 0.0:
         return None, 0.0, 0.0
     found, over_angle = _explained(pieces, fastest, run.rate, fewest=FEWEST, periods=PERIODS)
+    if over_angle < least:
+        return None, over_angle, 0.0
     # Time is the angle of a joint that turns at 1 rad/s throughout. Few periods count too: a tone
     # that is called ripple is worse than the reverse.
     uniform = [
