@@ -9,16 +9,13 @@ from rerun.chunk import RrdReader
 
 LINE = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
 LINE |= {"SeriesLines:aggregation_policy"}
-ROW = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
-ROW |= {"SeriesLines:aggregation_policy"}
+ROW = LINE
 POINTS = {"Scalars:scalars"} | {
     f"SeriesPoints:{part}" for part in ("names", "colors", "markers", "marker_sizes")
 }
 BAND = {f"Measurements:{part}" for part in ("names", "colors", "widths", "values", "variances")}
 LABELS = {f"Points2D:{part}" for part in ("positions", "labels", "colors", "radii", "show_labels")}
 STRIP = {f"LineStrips2D:{part}" for part in ("strips", "colors", "radii")}
-LANE = {f"StateConfiguration:{part}" for part in ("values", "labels", "colors")}
-LANE |= {"StateChange:state"}
 MOTION = {f"Transform3D:{part}" for part in ("translation", "quaternion")}
 MOTION |= {"Transform3D:parent_frame", "Transform3D:child_frame"}
 

@@ -155,15 +155,6 @@ def test_a_lower_rate_is_that_of_the_whole_run_but_at_its_ends(ratio, data):
     np.testing.assert_allclose(lower[10:], whole[10:], atol=1e-9)
 
 
-def test_what_is_too_fast_for_the_lower_rate_is_gone():
-    time = np.arange(10_000)[:, None] / 10_000
-    ones = np.ones(10_000, dtype=bool)
-    lower, valid = Decimator(10).push(np.sin(2 * np.pi * 1000 * time), ones)
-    assert np.abs(lower[valid]).max() < 1e-3
-    steady, valid = Decimator(10).push(np.full((10_000, 1), 0.7), ones)
-    np.testing.assert_allclose(steady[valid], 0.7, rtol=1e-12)
-
-
 # Labels.
 
 

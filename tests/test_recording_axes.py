@@ -36,13 +36,3 @@ def test_ticks_are_round_apart_and_within_the_axis(low, high, height):
     if len(found) > 1 and not all(np.log10(tick) % 1 == 0 for tick in found):
         assert np.diff(np.log10(found)).min() * decade >= axes.APART
     assert all(f"{tick:.0e}"[0] in "1235" for tick in found)
-
-
-def test_frequencies_and_levels_are_written_briefly():
-    assert [axes.hertz(value) for value in (10.0, 500.0, 1000.0, 2000.0)] == [
-        "10 Hz",
-        "500 Hz",
-        "1 kHz",
-        "2 kHz",
-    ]
-    assert axes.written(-20.0) == "\u221220"

@@ -144,10 +144,10 @@ def tabs(*parts: Part, name: str | None = None) -> Part:
     return rrb.Tabs(*parts, active_tab=0, name=name)
 
 
-def above(*parts: tuple[Part, float], name: str | None = None) -> Part:
+def above(*parts: tuple[Part, float]) -> Part:
     """Put parts above each other, each with its share of the height."""
     shares = [share for _, share in parts]
-    return rrb.Vertical(*(part for part, _ in parts), row_shares=shares, name=name)
+    return rrb.Vertical(*(part for part, _ in parts), row_shares=shares)
 
 
 def beside(*parts: tuple[Part, float], name: str | None = None) -> Part:
