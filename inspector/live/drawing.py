@@ -22,7 +22,7 @@ from rerun.blueprint import Blueprint
 import noisemodel as nm
 from inspector import colors
 from inspector.levels import LINKS, SPECTRUM, amplitudes, extremes, in_bands, window_length
-from inspector.live.labels import Labeller, Windows
+from inspector.live.labels import Labeller
 from inspector.live.samples import SinkError
 from inspector.recording import axes, panels, unstable, viewer
 from inspector.recording import robot as scene
@@ -233,6 +233,36 @@ class Messages:
 def nanoseconds(time: Array) -> NDArray[np.int64]:
     """Times in [s] as rerun counts them."""
     return np.round(1e9 * time).astype(np.int64)
+
+
+class Windows:
+    """Cuts samples into windows that overlap, whatever the pieces in which they come."""
+
+    def __init__(self, length: int, hop: int) -> None:
+        self._length, self._hop = length, hop
+        self.clear()
+
+    def clear(self, before: int = 0) -> None:
+        """Begin anew, after so many samples that are not valid."""
+        self._samples, self._valid = np.zeros((before, 1)), np.zeros(before, dtype=bool)
+
+    def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask, NDArray[np.int64]]:
+        """Windows that are complete, which touch no gap, and samples from their starts to the end.
+
+        Windows have the shape (windows, columns, length).
+        """
+        held = np.broadcast_to(self._samples, (len(self._valid), samples.shape[1]))
+        samples = np.concatenate((held, samples))
+        valid = np.concatenate((self._valid, valid))
+        length, hop = self._length, self._hop
+        count = max(0, (len(samples) - length) // hop + 1)
+        self._samples, self._valid = samples[count * hop :], valid[count * hop :]
+        since = len(samples) - hop * np.arange(count)
+        if not count:
+            return np.empty((0, samples.shape[1], length)), valid[:0], since
+        view = np.lib.stride_tricks.sliding_window_view
+        whole = view(valid, length)[::hop][:count].all(axis=1)
+        return view(samples, length, axis=0)[::hop][:count], np.asarray(whole), since
 
 
 class SpectrogramStream:

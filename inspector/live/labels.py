@@ -2,72 +2,18 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, inf
+from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.library import Library
 from noiseclassifier import Event, Labels
 from noiseclassifier.lasting import ERROR, MEASURED
-from noiseclassifier.profile import NOMINAL, TOLERANCE
+from noiseclassifier.profile import NOMINAL
 from noiseclassifier.signals import JOINTS, NOISE
-from noisemodel.run import EDGE
 from noisemodel.types import Array, Mask
-
-BETA = 5.0  # shape of the Kaiser window, as in SciPy's polyphase resampling
-
-
-class Windows:
-    """Cuts samples into windows that overlap, whatever the pieces in which they come."""
-
-    def __init__(self, length: int, hop: int, before: int = 0) -> None:
-        self._length, self._hop = length, hop
-        self.clear(before)
-
-    def clear(self, before: int = 0) -> None:
-        """Begin anew, after so many samples that are not valid."""
-        self._samples, self._valid = np.zeros((before, 1)), np.zeros(before, dtype=bool)
-
-    def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask, NDArray[np.int64]]:
-        """Windows that are complete, which touch no gap, and samples from their starts to the end.
-
-        Windows have the shape (windows, columns, length).
-        """
-        held = np.broadcast_to(self._samples, (len(self._valid), samples.shape[1]))
-        samples = np.concatenate((held, samples))
-        valid = np.concatenate((self._valid, valid))
-        length, hop = self._length, self._hop
-        count = max(0, (len(samples) - length) // hop + 1)
-        self._samples, self._valid = samples[count * hop :], valid[count * hop :]
-        since = len(samples) - hop * np.arange(count)
-        if not count:
-            return np.empty((0, samples.shape[1], length)), valid[:0], since
-        view = np.lib.stride_tricks.sliding_window_view
-        whole = view(valid, length)[::hop][:count].all(axis=1)
-        return view(samples, length, axis=0)[::hop][:count], np.asarray(whole), since
-
-
-class Decimator:
-    """Low-passes and decimates signals as `noisemodel.decimated` does, but for their ends.
-
-    That one extrapolates: here the first ten samples are not valid, and the last ten are missing.
-    """
-
-    def __init__(self, ratio: int) -> None:
-        reach = EDGE * ratio
-        cutoff = np.sinc(np.arange(-reach, reach + 1) / ratio)
-        taps = cutoff * np.kaiser(2 * reach + 1, BETA)
-        self._taps = taps / taps.sum()  # a constant stays what it is
-        self._windows = Windows(len(taps), ratio, before=reach)
-
-    def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask]:
-        """Take samples; what is complete now, shape (lower, columns), and what touches no gap."""
-        windows, whole, _ = self._windows.push(samples, valid)
-        return windows @ self._taps, whole
-
 
 # What makes noise, in the order of the columns of a motion: where one is unknown, no label is.
 NOISY = ("base_velocity", "velocity", "velocity_desired")
@@ -87,17 +33,15 @@ def noise_signal(name: str, motion: Array, base: int, joints: int) -> Array:
 
 
 class Labeller:
-    """Labels frames as they become complete, or remarks why it does not, or at which rate."""
+    """Labels frames as they become complete, or remarks why it does not."""
 
     def __init__(self, library: Library, rate: float, widths: Mapping[str, int]) -> None:
         self.rate, self.remark, self.model = rate, "", ""
         # Without a model there are no classes; duration of frames, from one to the next, in [s].
         self.classes, self.length, self.hop = tuple[str, ...](), 0.0, 0.0
         self._stream: nc.Stream | None = None
-        self._decimator: Decimator | None = None
-        self._ratio, self._samples = 1, 0
+        self._samples = 0
         self._base, self._joints, desired = (widths.get(name, 0) for name in NOISY)
-        self._columns = self._base + self._joints + desired
         kinds = ("desired", "measured", "error") if desired else ("measured",)
         there = (NOISE, *kinds, *(f"{kind}_joints" for kind in kinds))
         self._followed = [name for name in there if name in (MEASURED, ERROR)]
@@ -106,28 +50,16 @@ class Labeller:
         except nc.ModelsError as error:
             self.remark = f"No labels: {error}."
             return
-        ratio = round(rate / chosen.rate)
-        if rate > chosen.rate and isinstance(general := library[model], nc.General):
-            ratio = ceil(rate / chosen.rate * (1.0 - TOLERANCE))
-            chosen = general.at(rate / ratio, there)
-        if abs(rate / ratio / chosen.rate - 1.0) > NOMINAL:
+        if abs(rate / chosen.rate - 1.0) > NOMINAL:
             self.remark = (
-                f"No labels: {rate:g} Hz is no multiple of the {chosen.rate:g} Hz of the nearest"
-                " model, as is needed while samples come in."
+                f"No labels: samples come at {rate:g} Hz, the nearest model takes"
+                f" {chosen.rate:g} Hz; only files are decimated."
             )
             return
-        self.model, self._ratio, lower = model, ratio, rate / ratio
-        self.classes, self.length = chosen.classes, chosen.profile.duration
-        self.hop = chosen.profile.hop / rate * ratio
-        self._names = chosen.profile.signals
-        self._stream = nc.Stream(chosen, rate=lower, joints=self._joints)
-        self._lasting, self._bursts = nc.Lasting(lower), nc.Bursts(lower)
-        if ratio > 1:
-            self._decimator = Decimator(ratio)
-            self.remark = (
-                f"Labelled at {lower:g} Hz, the rate of model {model}: nothing above"
-                f" {lower / 2:g} Hz is left."
-            )
+        self.model, self.classes, self.length = model, chosen.classes, chosen.profile.duration
+        self.hop, self._names = chosen.profile.hop / rate, chosen.profile.signals
+        self._stream = nc.Stream(chosen, rate=rate, joints=self._joints)
+        self._lasting, self._bursts = nc.Lasting(rate), nc.Bursts(rate)
 
     @property
     def elapsed(self) -> float:
@@ -137,14 +69,8 @@ class Labeller:
     def push(self, motion: Array, valid: Mask) -> Labels | None:
         """Take a motion, shape (samples, columns); labels now complete, None without a model."""
         self._samples += len(motion)
-        return self._take(motion, valid)
-
-    def _take(self, motion: Array, valid: Mask) -> Labels | None:
-        """Take samples that the clock has counted."""
         if self._stream is None:
             return None
-        if self._decimator is not None:
-            motion, valid = self._decimator.push(motion, valid)
         followed, signals = (
             {name: noise_signal(name, motion, self._base, self._joints) for name in names}
             for names in (self._followed, self._names)
@@ -172,18 +98,9 @@ class Labeller:
     def skip(self, samples: int) -> None:
         """Pass over samples that were lost."""
         self._samples += samples
-        if self._stream is None:
-            return
-        whole = samples
-        if self._decimator is not None:
-            # Samples in a gap are all alike: enough of them to fill the filter are processed.
-            whole = max(samples - 4 * self._ratio * EDGE, 0) // self._ratio
-        self._stream.skip(whole)
-        self._lasting.skip(whole)
-        self._bursts.skip(whole)
-        if self._decimator is not None:
-            rest = samples - whole * self._ratio
-            self._take(np.zeros((rest, self._columns)), np.zeros(rest, dtype=bool))
+        if self._stream is not None:
+            for each in (self._stream, self._lasting, self._bursts):
+                each.skip(samples)
 
 
 SETTLED = 3  # hops after the start of an event until its class is known apart from its edge's
