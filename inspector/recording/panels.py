@@ -16,7 +16,7 @@ from rerun.components import MarkerShapeLike
 from rerun.urdf import UrdfTree
 
 from inspector import colors, levels
-from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps, orders
+from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps
 from inspector.levels import WINDOW, Scale, Spectrogram, extremes, in_bands
 from inspector.recording import axes, robot, unstable
 from inspector.recording.axes import Label, Panel, Timed
@@ -605,21 +605,6 @@ def log_heat(
         path=path,
         below=below,
     )
-
-
-def log_orders(recording: rr.RecordingStream, analysis: Analysis, scale: Scale) -> list[Part]:
-    """Log an order spectrogram: what goes with the speed of a joint is level in it.
-
-    Nothing where no joint moves for long enough.
-    """
-    known = orders(analysis)
-    if known is None:
-        return []
-    joint, spectrum = known
-    panel, axis, title = Panel("orders", HEIGHT), "periods\nper turn", f"Orders of {joint}"
-    log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
-    found = log_heat(recording, panel, in_levels(spectrum), scale, axis, title, orders=True)
-    return [found[0]]
 
 
 def band_axis(

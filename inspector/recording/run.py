@@ -12,7 +12,7 @@ import rerun as rr
 from rerun.urdf import UrdfTree
 
 from inspector import levels
-from inspector.analysis import LOUDEST, Analysis, worst, worst_joint, worst_signal
+from inspector.analysis import LOUDEST, Analysis, orders, worst, worst_joint, worst_signal
 from inspector.levels import spectrogram
 from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.unstable import Part
@@ -149,12 +149,17 @@ def _log_spectra(
     fast = worst_signal(analysis, joint)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
     scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
-    title = f"Spectrogram of {'the noise' if joint is None else run.joint_names[joint]}"
-    panel = axes.Panel("spectrogram", panels.HEIGHT)
-    panels.log_gaps(recording, "/spectrogram", run, (0.0, axes.TOP))
-    bands = panels.in_levels(spectrum)
-    parts = [panels.log_heat(recording, panel, bands, scale, "velocity\nspectrum", title)[0]]
-    parts += panels.log_orders(recording, analysis, scale)
+    name = "the noise" if joint is None else run.joint_names[joint]
+    shown = {"spectrogram": (spectrum, "velocity\nspectrum", f"Spectrogram of {name}")}
+    if known := orders(analysis):  # what goes with the speed of a joint is level there
+        shown["orders"] = (known[1], "periods\nper turn", f"Orders of {known[0]}")
+    parts: list[Part] = []
+    for kind, (own, axis, title) in shown.items():
+        panel, bands = axes.Panel(kind, panels.HEIGHT), panels.in_levels(own)
+        panels.log_gaps(recording, f"/{kind}", run, (0.0, axes.TOP))
+        turns = kind == "orders"
+        part, _ = panels.log_heat(recording, panel, bands, scale, axis, title, orders=turns)
+        parts.append(part)
     if links is not None:
         paths = ["/power/total", axes.SPAN]
         parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", paths))
