@@ -5,16 +5,16 @@ from pathlib import Path
 
 from inspector.recording.viewer import (
     final_state,
+    has_driver,
     headless_viewer,
-    missing_packages,
     picture,
     shoot,
 )
 
 __all__ = ["DRIVERS", "MISSING", "final_state", "headless_viewer", "picture"]
 
-DRIVERS = not missing_packages()
-MISSING = f"needs Debian's {' and '.join(missing_packages())} (rerun draws on software Vulkan)"
+DRIVERS = has_driver()
+MISSING = "needs Debian's libvulkan1 and mesa-vulkan-drivers (rerun draws on software Vulkan)"
 
 
 if __name__ == "__main__":

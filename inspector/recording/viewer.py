@@ -333,21 +333,17 @@ TIMEOUT = 120.0  # how long the viewer may take to draw everything, in [s]
 REPORTS_TIMEOUT = 20.0
 
 
-def missing_packages() -> tuple[str, ...]:
-    """The system packages that pictures need and that are missing, by their names in Debian."""
-    if not sys.platform.startswith("linux"):
-        return ()  # others draw without Vulkan
-    packages = [] if find_library("vulkan") else ["libvulkan1"]
-    return (*packages, *([] if _drivers("*.json") else ["mesa-vulkan-drivers"]))
+def has_driver() -> bool:
+    """Whether pictures can be drawn here: on Linux by Vulkan, elsewhere without."""
+    return not sys.platform.startswith("linux") or bool(find_library("vulkan") and _drivers("*"))
 
 
 def require_driver() -> None:
     """Refuse a picture before long work is done for it."""
-    missing = missing_packages()
-    if missing:
+    if not has_driver():
         raise ViewerError(
-            "a picture takes a Vulkan driver;"
-            f" `apt-get install {' '.join(missing)}` brings one (Fedora: mesa-vulkan-drivers)"
+            "a picture takes a Vulkan driver; `apt-get install libvulkan1 mesa-vulkan-drivers`"
+            " brings one (Fedora: mesa-vulkan-drivers)"
         )
 
 
@@ -449,13 +445,13 @@ def final_state(client: "ViewerClient") -> Any:
 
 def _environment(folder: str) -> dict[str, str]:
     """Environment for the viewer: no settings of the user, software rendering if possible."""
-    software = _drivers("lvp_icd*.json")
+    software = _drivers("lvp_icd*")
     driver = {"VK_DRIVER_FILES": str(software[0])} if software else {}
     return os.environ | {"HOME": folder, "XDG_RUNTIME_DIR": folder, "RUST_LOG": "error"} | driver
 
 
 def _drivers(pattern: str) -> list[Path]:
-    return sorted(path for folder in DRIVER_FOLDERS for path in folder.glob(pattern))
+    return sorted(path for folder in DRIVER_FOLDERS for path in folder.glob(f"{pattern}.json"))
 
 
 # Width and height of a notebook's viewer, in pixels; it is as wide as its cell.
