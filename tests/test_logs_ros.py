@@ -328,28 +328,20 @@ def test_a_bag_without_motion_is_an_error_of_one_line(tmp_path, states, message)
     assert "\n" not in str(caught.value)
 
 
-def test_one_nan_is_a_gap_but_columns_of_nan_are_left_out(tmp_path):
-    never = np.full_like(EFFORT, np.nan)
-    topics = {
-        "/joint_states": joint_states(TALK, position=POSITION, velocity=VELOCITY, effort=never)
-    }
-    imported = read_log(bag(tmp_path, topics))
+def test_columns_of_nan_are_left_out_and_an_infinite_value_is_named(tmp_path):
+    never, broken = np.full_like(EFFORT, np.nan), VELOCITY.copy()
+    broken[123, 1] = np.inf
+    for name, velocity in (("bag", VELOCITY), ("infinite", broken)):
+        messages = joint_states(TALK, position=POSITION, velocity=velocity, effort=never)
+        bag(tmp_path, {"/joint_states": messages}, name=name)
+    imported = read_log(tmp_path / "bag")
     assert imported.run.effort is None
     assert any("all nan, left out: /joint_states/effort of" in r for r in imported.remarks)
-    broken = VELOCITY.copy()
-    broken[123, 1] = np.nan
-    topics = {"/joint_states": joint_states(TALK, position=POSITION, velocity=broken)}
-    imported = read_log(bag(tmp_path, topics, name="broken"))
-    assert np.flatnonzero(~imported.run.mask).tolist() == [123]
-    text = "1 sample without a number, marked as not valid: /joint_states/velocity of elbow"
-    assert any(text in remark for remark in imported.remarks)
-    broken[123, 1] = np.inf
-    topics = {"/joint_states": joint_states(TALK, position=POSITION, velocity=broken)}
     message = (
         r"column '/joint_states/velocity of elbow' holds inf \(sample 124, 1.23 s into the log\)"
     )
     with pytest.raises(LogError, match=message):
-        read_log(bag(tmp_path, topics, name="infinite"))
+        read_log(tmp_path / "infinite")
 
 
 def test_a_long_bag_takes_little_more_memory_than_its_values(tmp_path):
