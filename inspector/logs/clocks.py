@@ -9,6 +9,7 @@ A zero-order hold is a slow signal that was sampled faster by holding its values
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
+from functools import partial
 from itertools import pairwise
 from math import log
 from pathlib import Path
@@ -280,10 +281,12 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
         if valid.all() and places[-1] - places[0] == len(places) - 1:
             return track.values[places[0] : places[-1] + 1]  # no copy of a long log
         return np.where(valid[:, None], track.values[places], 0.0)
+    stretches = track.stamps.clock.stretches
+    between = partial(resample, track.stamps.time, between=stretches, slack=slack)
     if track.signal == "base_pose":
         pose = np.asarray(track.values, dtype=np.float64)
         pose = np.hstack((pose[:, :3], continuous_quaternions(pose[:, 3:])))
-        found = _between(instants, track.stamps, pose, slack)
+        found, _ = between(pose, instants)
         length = np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
         found[:, 3:] /= np.where(length > 0, length, 1.0)
     else:
@@ -295,7 +298,7 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
             angles = track.angles[part]
             if any(angles):
                 values = np.where(angles, np.unwrap(values, axis=0), values)
-            found[:, part] = _between(instants, track.stamps, values, slack)
+            found[:, part], _ = between(values, instants)
     found[~valid] = 0.0
     return found
 
@@ -313,11 +316,6 @@ def _beside(instants: Array, stamps: Stamps, missing: Mask, slack: float) -> Mas
     after = np.searchsorted(stamps.time, instants - slack).clip(max=len(stamps.time) - 1)
     between = np.abs(stamps.time[after] - instants) > slack
     return np.asarray(missing[after] | (between & missing[np.maximum(after - 1, 0)]))
-
-
-def _between(instants: Array, stamps: Stamps, values: Real, slack: float) -> Array:
-    gaps = stamps.clock.stretches
-    return resample(stamps.time, values, instants, between=gaps, slack=slack)[0]
 
 
 # Two clocks

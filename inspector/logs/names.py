@@ -150,8 +150,6 @@ LONGEST = 300  # characters of a name from which on it names no signal: patterns
 
 SIDES = ("before", "within", "after", "last")  # parts of a name that tell whether it is desired
 
-ROBOSUITE = re.compile(r"robot\d+_(?=joint_(pos|vel)$)")  # prefix of robosuite's arrays
-
 
 @dataclass(frozen=True)
 class Naming:
@@ -297,7 +295,7 @@ def _without_side(joint: str) -> tuple[str, bool]:
 
 def array_signal(name: str) -> str | None:
     """Signal of an array by its name, without the folders in it; None for an unknown name."""
-    bare = ROBOSUITE.sub("", without_unit(name)[0].rpartition("/")[2].lower())
+    bare = without_unit(name)[0].rpartition("/")[2].lower()
     if bare in SIGNALS:
         return bare
     if len(name) > LONGEST or NOT_MOTION.fullmatch(without_unit(name)[0]):
