@@ -12,6 +12,7 @@ from inspector.errors import InspectorError
 from inspector.logs.clocks import without_hold
 from noiseclassifier.profile import NOMINAL
 from noisemodel.files import also_reading
+from noisemodel.noise import in_both
 from noisemodel.run import pieces_of
 from noisemodel.types import Array, Mask, Real
 
@@ -178,11 +179,9 @@ def _signals(run: nm.Run) -> dict[str, Real]:
 def _differs(run: nm.Run) -> bool:
     """Whether the desired motion is not the measured one."""
     desired = run.velocity_desired
-    names = [name for name in run.joint_names if name in run.desired_joint_names]
-    if desired is None or not names:
+    if desired is None:
         return False
-    measured = [run.joint_names.index(name) for name in names]
-    wanted = [run.desired_joint_names.index(name) for name in names]
+    measured, wanted = in_both(run)
     return bool(np.any(desired[:, wanted] != run.velocity[:, measured]))
 
 

@@ -82,7 +82,7 @@ def norms(run: Run) -> dict[str, Array]:
         signals["desired"] = simplified(desired)
         measured = run.velocity
         if run.desired_joint_names != run.joint_names:
-            own, wanted = _both(run)
+            own, wanted = in_both(run)
             measured, desired = measured[:, own], desired[:, wanted]
         if desired.shape[1]:
             signals["error"] = simplified(np.asarray(desired - measured))
@@ -99,7 +99,7 @@ def by_joint(run: Run) -> dict[str, Array]:
     found = {}
     own = list(range(len(run.joint_names)))
     if run.velocity_desired is not None:
-        own, wanted = _both(run)
+        own, wanted = in_both(run)
         found["desired_joints"] = _rows(run.velocity_desired, wanted)
     if not own:
         return {}
@@ -111,7 +111,7 @@ def by_joint(run: Run) -> dict[str, Array]:
     return found
 
 
-def _both(run: Run) -> tuple[list[int], list[int]]:
+def in_both(run: Run) -> tuple[list[int], list[int]]:
     """Columns of the joints that are measured and desired, in both signals."""
     names = [name for name in run.joint_names if name in run.desired_joint_names]
     measured = [run.joint_names.index(name) for name in names]

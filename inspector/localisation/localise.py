@@ -42,7 +42,7 @@ from inspector.localisation.stage import (
 )
 from noiseclassifier import Event
 from noisemodel import Block, Run
-from noisemodel.noise import FAST, LinkNoise
+from noisemodel.noise import FAST, LinkNoise, in_both
 from noisemodel.types import Array, Indices, Mask, Real
 
 BIN = 0.001  # time over which power is taken, in [s], or one sample if that is longer
@@ -123,7 +123,13 @@ def _powers(run: Run, first: int, bins: int, size: int, *, backwards: bool) -> t
     if backwards:
         part = slice(len(run.time) - part.stop, len(run.time) - first)
     order = slice(None, None, -1) if backwards else slice(None)
-    motion, error = (signal[order].reshape(bins, size, -1) for signal in _signals(run, part))
+    velocity = motion = error = run.velocity[part][order]
+    if run.base_velocity is not None:
+        motion = error = np.hstack((run.base_velocity[part][order], motion))
+    measured, desired = in_both(run) if run.velocity_desired is not None else ([], [])
+    if run.velocity_desired is not None and measured:
+        error = run.velocity_desired[part][order][:, desired] - velocity[:, measured]
+    motion, error = motion.reshape(bins, size, -1), error.reshape(bins, size, -1)
     valid = np.asarray(run.mask[part][order].reshape(bins, size).all(axis=1), dtype=np.bool_)
     rate = run.rate / size
     last = np.arange(1, bins + 1)
@@ -144,19 +150,6 @@ def _high_passed(signal: Array, begin: Indices, rate: float) -> Array:
     first = np.maximum(begin, last - round(PAST * rate))
     sums = np.concatenate((np.zeros((1, signal.shape[1])), np.cumsum(signal, axis=0)))
     return np.asarray(signal - (sums[last] - sums[first]) / np.maximum(last - first, 1)[:, None])
-
-
-def _signals(run: Run, part: slice) -> tuple[Real, Real]:
-    """All measured velocities of a part of a run, and the tracking error, else the same."""
-    motion = run.velocity[part]
-    if run.base_velocity is not None:
-        motion = np.hstack((run.base_velocity[part], motion))
-    both = [name for name in run.joint_names if name in run.desired_joint_names]
-    if run.velocity_desired is None or not both:
-        return motion, motion
-    measured = [run.joint_names.index(name) for name in both]
-    desired = [run.desired_joint_names.index(name) for name in both]
-    return motion, run.velocity_desired[part][:, desired] - run.velocity[part][:, measured]
 
 
 def _gain(power: Array, known: Mask, shortest: int) -> Array:
@@ -190,14 +183,12 @@ def localise(
     if not failures:
         return {}
     quiet = quiet_statistics(run, failures) if has_stages(run) else None
-    reach = max(ANNOTATED, frame)
-
-    def one(failure: Event | Block) -> Localisation:
-        latest = reach if failure in found else ANNOTATED
-        stage = Localisation() if quiet is None else first_stage(run, quiet, failure, reach=latest)
-        return replace(stage, band=band(run, failure, failures))
-
-    return {failure: one(failure) for failure in failures}
+    localised = {}
+    for failure in failures:
+        reach = max(ANNOTATED, frame) if failure in found else ANNOTATED
+        stage = Localisation() if quiet is None else first_stage(run, quiet, failure, reach=reach)
+        localised[failure] = replace(stage, band=band(run, failure, failures))
+    return localised
 
 
 def has_stages(run: Run) -> bool:
@@ -252,8 +243,12 @@ def band(
     excess = np.where(frequency >= FAST, np.maximum(excess, 0.0), 0.0)
     if not excess.sum() > 0.0:
         return None
-    low, high = _narrowest(excess)
-    return float(frequency[low]), float(frequency[high])
+    # The narrowest band: for each first bin, the last one with which it holds enough.
+    below = np.concatenate(([0.0], np.cumsum(excess)))
+    stops = np.searchsorted(below, below[:-1] + SHARE * below[-1])
+    firsts = np.flatnonzero(stops < len(below))
+    best = firsts[np.argmin(stops[firsts] - firsts)]
+    return float(frequency[best]), float(frequency[stops[best] - 1])
 
 
 def _spectrum(velocity: Real) -> Array:
@@ -262,16 +257,6 @@ def _spectrum(velocity: Real) -> Array:
     line = np.linspace(velocity[0], velocity[-1], len(velocity), dtype=np.float64)
     waves = np.fft.rfft((velocity - line).T * np.hanning(len(velocity)), axis=1)
     return np.asarray(np.square(np.abs(waves)).sum(axis=0))
-
-
-def _narrowest(excess: Array) -> tuple[int, int]:
-    """First and last bin of the narrowest band that holds `SHARE` of the whole."""
-    below = np.concatenate(([0.0], np.cumsum(excess)))
-    wanted = below[:-1] + SHARE * below[-1]
-    ends = np.searchsorted(below, wanted, side="left")
-    starts = np.flatnonzero(ends < len(below))
-    best = starts[np.argmin(ends[starts] - starts)]
-    return int(best), int(ends[best]) - 1
 
 
 Failure: TypeAlias = Event | Block  # a finding, or an annotated block
@@ -300,7 +285,17 @@ def fault_links(
         others: All failures of the run, found and annotated.
         known: Its localisation, if there is one: onset and joints are used.
     """
-    excess = _excess(links, failure, others, None if known is None else known.onset)
+    time, vibration = links.time, links.vibration
+    start, stop = failure.start, failure.stop
+    if known is not None and known.onset is not None:
+        half = (time[1] - time[0]) / 2.0  # bins that it covers in part count too
+        start, stop = known.onset - half, known.onset + BEGINNING + half
+    inside = (time >= start) & (time < stop)
+    busy = np.any([(time >= each.start) & (time < each.stop) for each in others], axis=0)
+    if not inside.any():
+        return ()
+    quiet = np.median(vibration[~busy], axis=0) if not busy.all() else 0.0
+    excess = np.maximum(vibration[inside].mean(axis=0) - quiet, 0.0)
     ranked = [index for index in np.argsort(-excess, kind="stable").tolist() if excess[index] > 0.0]
     named = ranked[:1]
     for joint, _ in () if known is None else known.joints:
@@ -310,24 +305,3 @@ def fault_links(
     named += [index for index in ranked if index not in named]
     largest_first = sorted(named[:NAMED], key=ranked.index)
     return tuple((links.links[i], float(excess[i] / excess.sum())) for i in largest_first)
-
-
-def _excess(
-    links: LinkNoise, failure: Failure, others: Sequence[Failure], onset: float | None
-) -> Array:
-    """Excess of each link, shape (links,), in [W]; 0 where nothing was measured."""
-    time, vibration = links.time, links.vibration
-    start, stop = failure.start, failure.stop
-    if onset is not None:
-        half = (time[1] - time[0]) / 2.0
-        start, stop = (
-            onset - half,
-            onset + BEGINNING + half,
-        )  # bins that it covers in part count too
-    inside = (time >= start) & (time < stop)
-    busy = np.any([(time >= each.start) & (time < each.stop) for each in others], axis=0)
-    if not inside.any():
-        return np.zeros(len(links.links))
-    quiet = np.median(vibration[~busy], axis=0) if not busy.all() else 0.0
-    excess: Array = np.maximum(vibration[inside].mean(axis=0) - quiet, 0.0)
-    return excess

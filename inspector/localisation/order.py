@@ -39,7 +39,7 @@ import numpy as np
 from inspector.levels import Spectrogram, amplitudes, in_bands
 from noiseclassifier import Event
 from noisemodel import Block, Run
-from noisemodel.noise import vibrating
+from noisemodel.noise import in_both, vibrating
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
@@ -187,9 +187,7 @@ def _vibration(run: Run, part: slice) -> Array:
     half = _half(run)
     wave = _around(run, part, 4 * half, run.velocity)
     if run.velocity_desired is not None:
-        both = [name for name in run.joint_names if name in run.desired_joint_names]
-        measured = [run.joint_names.index(name) for name in both]
-        desired = [run.desired_joint_names.index(name) for name in both]
+        measured, desired = in_both(run)
         wave[:, measured] -= _around(run, part, 4 * half, run.velocity_desired)[:, desired]
     return _fast(wave, half)
 
@@ -243,20 +241,17 @@ def _strongest(
             continue
         weight, sample = _hann(len(wave)), np.arange(len(wave))
         at = np.interp(np.arange(0.0, angle[-1], step), angle, sample)
-        line = _finer(weight * wave, at) / np.sqrt(np.interp(at, sample, speed))
+        # Values between samples: the weighted wave begins and ends near 0, as if it were periodic.
+        many = FINER * len(wave)
+        finer = FINER * np.fft.irfft(np.fft.rfft(weight * wave), many)
+        line = np.interp(FINER * at, np.arange(many), finer)
+        line /= np.sqrt(np.interp(at, sample, speed))
         enough = orders * angle[-1] >= 2.0 * np.pi * fewest
         energy += enough * np.square(np.abs(np.fft.rfft(line, size))) / (weight @ speed)
         counted += enough * orders * (weight @ speed) / (2.0 * np.pi * rate)
     frequency = orders * fastest / (2.0 * np.pi)
     known = (frequency >= LOWEST) & (frequency <= HIGHEST * rate) & (counted >= periods)
     return _peak(orders, energy * known)
-
-
-def _finer(signal: Array, at: Array) -> Array:
-    """Values between samples of a signal that begins and ends near 0."""
-    size = FINER * len(signal)
-    finer = FINER * np.fft.irfft(np.fft.rfft(signal), size)
-    return np.asarray(np.interp(FINER * at, np.arange(size), finer))
 
 
 def _without(piece: Piece, order: float, *, fewest: float) -> Piece:

@@ -287,19 +287,14 @@ def first_stage(
         return Localisation()
     innovation, during = quiet.innovation(stages), slice(start, end)
     found = None
-    if not _lasts(innovation.level[-1, during], float(quiet.power[-1]), stages):
+    level, size = innovation.level[-1, during], stages.samples(BIN)
+    power = np.add.reduceat(np.square(level), np.arange(0, len(level), size)) / size
+    loud = power > max(LOUD * power.max(), MORE * float(quiet.power[-1]))
+    if not loud.sum() * BIN >= LASTING:
         edges = (failure.start - EARLY, failure.start + reach)
         first, last = np.searchsorted(stages.time, edges).tolist()
         found = _earliest(stages, innovation, quiet, first, last)
     return found or _adding(stages, innovation, quiet, during) or Localisation()
-
-
-def _lasts(level: Array, quiet: float, stages: Flow) -> bool:
-    """Whether a vibration lasts, by its level and its power in quiet stretches."""
-    size = stages.samples(BIN)
-    power = np.add.reduceat(np.square(level), np.arange(0, len(level), size)) / size
-    loud = power > max(LOUD * power.max(), MORE * quiet)
-    return bool(loud.sum() * BIN >= LASTING)
 
 
 def _earliest(
@@ -353,7 +348,11 @@ def _adding(
     if place == len(excess) - 1:
         return Localisation(stages.names[place], lasting=True, joints=joints)
     cause, effect = innovation.change[place, during], innovation.change[-1, during]
-    lag = _lag(cause, effect, stages.samples(SLOWEST)) / stages.rate
+    # The lag, up to the slowest, at which one follows the other best, all joints together.
+    most = stages.samples(SLOWEST)
+    waves = [np.fft.rfft(signal, len(cause) + most, axis=0) for signal in (effect, cause)]
+    together = np.fft.irfft((waves[0] * waves[1].conj()).sum(axis=1), len(cause) + most)
+    lag = int(np.argmax(together[: most + 1])) / stages.rate
     return Localisation(stages.names[place], stages.names[-1], lag, lasting=True, joints=joints)
 
 
@@ -363,14 +362,6 @@ def _joints(stages: Flow, residual: Array) -> tuple[tuple[str, float], ...]:
     shares = power / (power.sum() or 1.0)
     ranked = np.argsort(-shares, kind="stable")[:JOINTS].tolist()
     return tuple((stages.joints[i], float(shares[i])) for i in ranked if shares[i] > 0.0)
-
-
-def _lag(cause: Array, effect: Array, most: int) -> int:
-    """Samples, up to a number, by which one vibration follows another, all joints together."""
-    size = len(cause) + most
-    waves = [np.fft.rfft(signal, size, axis=0) for signal in (effect, cause)]
-    together = np.fft.irfft((waves[0] * waves[1].conj()).sum(axis=1), size)
-    return int(np.argmax(together[: most + 1]))
 
 
 def rise(level: Array, first: int, last: int, *, rate: float) -> int:
