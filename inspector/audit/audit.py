@@ -18,7 +18,7 @@ some are at the quantisation floor: then a failure must exceed that.
 """
 
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -89,29 +89,30 @@ def observable_classes(
     try:
         name, chosen = nearest(library, rate, signals, logged=logged)
     except nc.ModelsError as error:
-        classes = dict.fromkeys(name for model in library.values() for name in _failures(model))
+        models = library.values()
+        known = [each.recipe if isinstance(each, nc.General) else each.profile for each in models]
+        classes = dict.fromkeys(name for each in known for name in each.classes[1:])
         if isinstance(error, nc.MissingSignalError):
-            return tuple(
-                ClassObservability(label, Observability.CANNOT_TELL, reason=str(error))
-                for label in classes
-            )
-        slowest = min(map(_lowest, library.values()), default=None)
+            return _none_of(classes, str(error))
+        rates = [LOWEST if isinstance(each, nc.LogBands) else each.rate for each in known]
         reason = f"{rate:g} Hz is below the rate of every model"
-        return tuple(
-            ClassObservability(label, Observability.CANNOT_TELL, needed=slowest, reason=reason)
-            for label in classes
-        )
+        return _none_of(classes, reason, min(rates, default=None))
     profile = chosen.profile
     labels = [label for label in chosen.classes if label != "ok"]
     if not has_frame(valid, profile.duration * logged):
-        reason = f"no stretch of {profile.duration:g} s without a gap"
-        return tuple(
-            ClassObservability(label, Observability.CANNOT_TELL, reason=reason) for label in labels
-        )
+        return _none_of(labels, f"no stretch of {profile.duration:g} s without a gap")
     general = isinstance(library[name], nc.General)
     return tuple(
         _observability(label, bandwidth, profile, library, general=general) for label in labels
     )
+
+
+def _none_of(
+    labels: Iterable[str], reason: str, needed: float | None = None
+) -> tuple[ClassObservability, ...]:
+    """Say of all classes that they cannot be observed, why, and which rate it takes, in [Hz]."""
+    cannot_tell = Observability.CANNOT_TELL
+    return tuple(ClassObservability(each, cannot_tell, 0.0, 0.0, needed, reason) for each in labels)
 
 
 def has_frame(valid: Mask, length: float) -> bool:
@@ -161,17 +162,6 @@ def band_edges(profile: Profile) -> Array:
     # Bin 0 is the mean; the first after it is the paper's f_min (Sec. III-A).
     bin_width = profile.rate / profile.window
     return np.arange(1.0, profile.bins, 3.0) * bin_width
-
-
-def _failures(model: nc.Model) -> tuple[str, ...]:
-    """All classes of a model but the first, which is `ok`."""
-    known = model.recipe if isinstance(model, nc.General) else model.profile
-    return known.classes[1:]
-
-
-def _lowest(model: nc.Model) -> float:
-    """Lowest rate that a model takes, in [Hz]."""
-    return LOWEST if isinstance(model, nc.General) else model.rate
 
 
 def _rate_for(frequency: float, library: Library) -> float:
@@ -347,8 +337,21 @@ ROUNDING = 1e-9  # deviation of a stamp that is rounding, in [s]: stamps have na
 
 def text(name: str, audit: Audit, assumed: str = "") -> str:
     """An audit as text."""
+    off = "stamps are uniform"
+    if audit.jitter and audit.jitter[1] >= ROUNDING:
+        rms, largest = (1e3 * value for value in audit.jitter)
+        off = f"stamps were off by {rms:.3g} ms rms, {largest:.3g} ms at most"
+    lines = [
+        *([assumed] if assumed else []),
+        f"rate: {audit.rate:g} Hz, {off}",
+        f"missing: {audit.gaps}",
+        f"bandwidth: up to {plain(audit.bandwidth.usable, 4)} Hz ({audit.bandwidth.limit})",
+        *(f"warning: {warning}" for warning in audit.warnings),
+        *(f"note: {note}" for note in audit.notes),
+        *map(str, audit.classes),
+    ]
     head = f"{name}: {audit.duration:.2f} s, {counted(audit.joints, 'joint')}"
-    return "\n".join([head, *([f"  {assumed}"] if assumed else []), *_text_lines(audit)])
+    return "\n  ".join([head, *lines])
 
 
 def summary(audit: Audit, *, classes: bool = True) -> tuple[str, ...]:
@@ -372,19 +375,6 @@ def as_json(
     ]
     runs += [{"run": name, "message": message} for name, message in failed.items()]
     return json.dumps({"format": "noise-audit/2", "runs": runs}, indent=2)
-
-
-def _text_lines(audit: Audit) -> Iterator[str]:
-    off = "stamps are uniform"
-    if audit.jitter and audit.jitter[1] >= ROUNDING:
-        rms, largest = (1e3 * value for value in audit.jitter)
-        off = f"stamps were off by {rms:.3g} ms rms, {largest:.3g} ms at most"
-    yield f"  rate: {audit.rate:g} Hz, {off}"
-    yield f"  missing: {audit.gaps}"
-    yield f"  bandwidth: up to {plain(audit.bandwidth.usable, 4)} Hz ({audit.bandwidth.limit})"
-    yield from (f"  warning: {warning}" for warning in audit.warnings)
-    yield from (f"  note: {note}" for note in audit.notes)
-    yield from (f"  {each}" for each in audit.classes)
 
 
 def _sentence(audit: Audit) -> str:

@@ -37,29 +37,15 @@ PER_OCTAVE = 4  # bands of a smoothed spectrum in an octave
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """A one-sided power spectral density."""
+    """A one-sided power spectral density, the sum of all joints, as the noise counts them."""
 
     frequency: Array  # above 0, rising, shape (frequency,), in [Hz]
-    density: Array  # of each joint, shape (frequency, joints), in [(rad/s)²/Hz]
+    total: Array  # shape (frequency,), in [(rad/s)²/Hz]
     rate: float  # of the samples, in [Hz]
-
-    @property
-    def total(self) -> Array:
-        """Sum over the joints, as the noise counts them, shape (frequency,), in [(rad/s)²/Hz]."""
-        return np.asarray(self.density.sum(axis=1))
 
 
 def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
-    """Estimate the spectrum of joint velocities by Welch's method.
-
-    Args:
-        velocity: Shape (samples, joints), in [rad/s].
-        rate: Sample rate, in [Hz].
-        valid: False in gaps, shape (samples,).
-
-    Returns:
-        The spectrum without its value at 0 Hz; None if no stretch between gaps is long enough.
-    """
+    """Spectrum of velocities, (samples, joints), by Welch's method; None if gaps leave too few."""
     length = max(FEWEST_SAMPLES, round(SEGMENT * rate))
     starts = [
         start
@@ -86,17 +72,13 @@ def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
     # P. Welch, IEEE Trans. Audio Electroacoust. 15 (1967): one-sided, per hertz
     density: Array = 2.0 * power / (len(chosen) * rate * np.square(window).sum())
     frequency = np.arange(1.0, length // 2 + 1.0) * (rate / length)
-    return Spectrum(np.asarray(frequency, dtype=np.float64), density.T[1:], rate)
+    return Spectrum(np.asarray(frequency, dtype=np.float64), density.T[1:].sum(axis=1), rate)
 
 
 def smoothed(
     frequency: Array, density: Array, middle: Callable[[Array], float]
 ) -> tuple[Array, Array]:
-    """Level of a spectrum in quarters of an octave.
-
-    Returns:
-        Middle of each quarter that has a value, in [Hz], and its level, in [dB]; shape (bands,).
-    """
+    """Middle of each quarter of an octave that has a value, in [Hz], and its level, in [dB]."""
     steps = np.round(np.log2(frequency / frequency[-1]) * PER_OCTAVE)
     places = np.unique(steps)
     level = [10.0 * np.log10(middle(density[steps == step]) + 1e-300) for step in places]
@@ -119,15 +101,7 @@ class Differentiator:
     weights: tuple[float, ...]
 
     def response(self, frequency: Array, rate: float) -> Array:
-        """Frequency response: velocity by position.
-
-        Args:
-            frequency: Shape (frequency,), in [Hz].
-            rate: Sample rate, in [Hz].
-
-        Returns:
-            Amplitude of the velocity divided by the position's, shape (frequency,), in [1/s].
-        """
+        """Amplitude of the velocity divided by the position's, at some frequencies, in [1/s]."""
         taps = np.arange(len(self.weights)) - (len(self.weights) - 1) / 2
         turns = np.exp(2j * np.pi * np.outer(frequency, taps) / rate)
         return np.asarray(rate * np.abs(turns @ np.array(self.weights)))
@@ -189,11 +163,10 @@ def differentiator_of(run: Run) -> Differentiator | None:
         FORWARD: (after - here) * run.rate,
         CENTRAL: (after - before) * run.rate / 2,
     }
-    return next((how for how, v in found.items() if _same(v - velocity, tolerance)), None)
-
-
-def _same(difference: Array, tolerance: float) -> bool:
-    return bool(np.mean(np.abs(difference) <= tolerance) >= 0.99)
+    for method, slope in found.items():
+        if np.mean(np.abs(slope - velocity) <= tolerance) >= 0.99:
+            return method
+    return None
 
 
 # Quantisation
@@ -217,11 +190,10 @@ def step_of(values: Real) -> float:
 
 
 def steps_of(run: Run, differentiator: Differentiator | None) -> Array:
-    """Quantisation steps of the signal from which a run's velocities come.
+    """Quantisation steps of the signal from which a run's velocities come, 0 where there are none.
 
-    Returns:
-        Steps of the positions if those were differentiated, else of the velocities, 0 where there
-        are none, shape (joints,), in [rad] or [rad/s].
+    They are of the positions, in [rad], if these were differentiated, else of the velocities, in
+    [rad/s]; shape (joints,).
     """
     signal = run.position if differentiator and run.position is not None else run.velocity
     return np.array([step_of(values) for values in np.ascontiguousarray(valid(run, signal).T)])
@@ -230,11 +202,7 @@ def steps_of(run: Run, differentiator: Differentiator | None) -> Array:
 def quantisation_noise(
     steps: Array, spectrum: Spectrum, differentiator: Differentiator | None
 ) -> Array:
-    """Spectrum of the quantisation noise of velocities.
-
-    Returns:
-        Sum over the joints, shape (frequency,), in [(rad/s)²/Hz].
-    """
+    """Spectrum of the velocities' quantisation noise, all joints together, in [(rad/s)²/Hz]."""
     # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12.
     white = float(np.square(steps).sum()) / 12.0 / (spectrum.rate / 2)
     frequency = spectrum.frequency
@@ -247,8 +215,7 @@ def quantisation_noise(
 def floor_frequency(spectrum: Spectrum, floor: Array) -> float:
     """Frequency above which a spectrum is less than twice its noise floor, in amplitude.
 
-    Returns:
-        The frequency, in [Hz]; the Nyquist frequency if the spectrum stays above.
+    The Nyquist frequency if it stays above.
     """
     frequency, level = smoothed(spectrum.frequency, spectrum.total, np.mean)
     _, lowest = smoothed(spectrum.frequency, floor, np.mean)
@@ -475,9 +442,12 @@ def unit_warnings(run: Run) -> Iterator[str]:
 def _angles(run: Run, farthest: Real) -> Iterator[str]:
     """Warnings about positions that reach too far, or stop at round numbers."""
     largest = float(farthest.max())
-    if largest in ROUND_ENDS and _stops_at(run, largest) >= 2:
-        yield f"positions look normalised: several joints stop at {largest:g}"
-        return
+    assert run.position is not None
+    if largest in ROUND_ENDS:
+        there = np.abs(run.position) == largest
+        if np.sum((there[1:] & there[:-1]).any(axis=0)) >= 2:  # for two samples in a row
+            yield f"positions look normalised: several joints stop at {largest:g}"
+            return
     moving = np.ptp(valid(run, run.velocity), axis=0) > 0
     far = (farthest > TURNS / 2) & moving
     enough = np.sum(far) > 1 or (farthest[far] > TURNS).any()
@@ -485,13 +455,6 @@ def _angles(run: Run, farthest: Real) -> Iterator[str]:
         other = " or normalised" if largest <= max(ROUND_ENDS) else ""
         joint = run.joint_names[int(np.argmax(farthest))]
         yield f"positions look like degrees{other} ({joint} reaches {largest:.4g})"
-
-
-def _stops_at(run: Run, end: float) -> int:
-    """Count the joints that are at one position, to the bit, for two samples in a row."""
-    assert run.position is not None
-    there = np.abs(run.position) == end
-    return int(np.sum((there[1:] & there[:-1]).any(axis=0)))
 
 
 # Speed from which a joint moves, in [rad/s] or [m/s]: pushes on a standing arm peak below.
