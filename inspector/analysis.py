@@ -298,7 +298,7 @@ def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysi
     try:
         return replace(found, links=link_noise(run, kind, terms=terms))
     except nm.GeometryError as error:
-        raise InspectorError(f"{error}; `--no-robot` shows the run without the robot") from error
+        raise InspectorError(f"{error}; `--robot none` shows the run without the robot") from error
 
 
 def robot_known(run: nm.Run) -> bool:

@@ -45,22 +45,20 @@ PANELS = {
         "evaluate": "Evaluate a model on annotated runs that it was not trained on.",
     },
     "Simulate": {"simulate": "Simulate runs with annotated failures."},
-    "Help": {
-        "config": "Print the settings in force.",
-        "help": "Print the help of a command or a topic: logs.",
-    },
+    "Help": {"help": "Print the help of a command or a topic: logs."},
 }
+IN = (
+    "commands.inspect",
+    "commands.check",
+    "commands.convert",
+    "commands.train",
+    "commands.simulate",
+    "cli",
+)  # the module of each panel
 MODULES = {
-    name: module
-    for panel, module in {
-        "Inspect": "inspector.commands.inspect",
-        "Check": "inspector.commands.check",
-        "Import and export": "inspector.commands.convert",
-        "Train": "inspector.commands.train",
-        "Simulate": "inspector.commands.simulate",
-        "Help": "inspector.cli",
-    }.items()
-    for name in PANELS[panel]
+    name: f"inspector.{module}"
+    for module, own in zip(IN, PANELS.values(), strict=True)
+    for name in own
 }
 EXAMPLES = {
     "view": "view run.npz -o run.png",
@@ -81,7 +79,6 @@ EXAMPLES = {
     "tune": "tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl",
     "evaluate": "evaluate model.npz data/ --part test",
     "simulate": "simulate run talos --scenario 7",
-    "config": "config",
     "help": "help logs",
 }
 # Commands that take the options on reading logs.
@@ -217,7 +214,7 @@ class _Group(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find a command, and the settings of the project for it."""
         name, command, rest = super().resolve_command(ctx, args)
-        takes_none = name in ("config", "help", "robots") or {"-h", "--help"} & set(rest)
+        takes_none = name in ("help", "robots") or {"-h", "--help"} & set(rest)
         if name and not takes_none and (found := find_settings()) is not None:
             ctx.default_map = {name: settings_of(name, *found)}
         return name, command, rest
@@ -273,19 +270,17 @@ def help_(
 ) -> None:
     """Print the help of a command or a topic: logs."""
     parent: Any = ctx.parent
-    if not topic:
-        typer.echo(parent.get_help())
-        return
     if topic == "logs":
         typer.echo("Options on reading logs, taken by all commands that open logs:\n")
         for option in _command("import").added:
             typer.echo(f"  {option.opts[0]:15} {option.help}")
-        return
-    command = parent.command.commands.get(topic)
-    if command is None:
+    elif not topic:
+        typer.echo(parent.get_help())
+    elif (command := parent.command.commands.get(topic)) is None:
         raise typer.BadParameter(f"{topic!r} is no command and no topic", param_hint="TOPIC")
-    with command.make_context(topic, [], parent=parent, resilient_parsing=True) as inner:
-        typer.echo(inner.get_help())
+    else:
+        with command.make_context(topic, [], parent=parent, resilient_parsing=True) as inner:
+            typer.echo(inner.get_help())
 
 
 # --- settings of a project
@@ -347,8 +342,11 @@ def settings_of(name: str, path: Path, content: Mapping[str, Any]) -> dict[str, 
     }
     shared = SHARED | {each.opts[0].lstrip("-") for each in _command("import").added}
     top = {key: value for key, value in content.items() if not isinstance(value, dict)}
-    table = content.get(name) if name not in top else None
-    for where, given, known in (("", top, shared), (f" [{name}]", table or {}, own)):
+    tables = {key: value for key, value in content.items() if isinstance(value, dict)}
+    if unknown := next((key for key in tables if key not in MODULES), None):
+        raise OptionError(f"{path}: no command {unknown!r}")
+    table = tables.get(name, {})
+    for where, given, known in (("", top, shared), (f" [{name}]", table, own)):
         if unknown := next((key for key in given if key not in known), None):
             from noisemodel.types import hint
 
@@ -356,7 +354,7 @@ def settings_of(name: str, path: Path, content: Mapping[str, Any]) -> dict[str, 
             raise OptionError(f"{path}:{where} {told}")
     # In commands that open no log, options of these names mean something else.
     applied = shared if name in READ_LOGS or name == "live" else SHARED
-    values = {key: value for key, value in top.items() if key in applied} | (table or {})
+    values = {key: value for key, value in top.items() if key in applied} | table
     return {own[key]: _meant(path, key, value) for key, value in values.items() if key in own}
 
 
@@ -369,32 +367,6 @@ def _meant(path: Path, key: str, value: Any) -> Any:
         return value
     there = path.parent / value
     return str(there) if there.exists() or key != "model" else value
-
-
-def config(ctx: typer.Context) -> None:
-    """Print the settings of this project that are in force.
-
-    They are in inspector.toml, or in the table tool.noise-inspector of pyproject.toml: options on
-    reading logs, model and jobs for all commands, and a table for each command, such as classify.
-    The command line wins.
-    """
-    found = find_settings()
-    if found is None:
-        typer.echo("no settings: no inspector.toml, no [tool.noise-inspector] in pyproject.toml")
-        return
-    path, content = found
-    tables = {name: each for name, each in content.items() if isinstance(each, dict)}
-    for name in tables:
-        if name not in MODULES:
-            raise OptionError(f"{path}: no command {name!r}")
-    for name in MODULES:
-        settings_of(name, path, content)  # refuses what is not known
-    typer.echo(f"{path}:")
-    top = {key: value for key, value in content.items() if key not in tables}
-    for table, settings in {"": top, **tables}.items():
-        for key, value in settings.items():
-            line = f"{table + '.' if table else ''}{key} = {value!r}"
-            typer.echo("  " + line.replace("'", '"'))
 
 
 # --- how the program runs and ends

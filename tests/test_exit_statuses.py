@@ -82,7 +82,7 @@ def place(inputs, tmp_path, monkeypatch):
 
 
 def test_each_command_is_tried():
-    assert set(cli.MODULES) - {"help", "config"} == set(COMMANDS)
+    assert set(cli.MODULES) - {"help"} == set(COMMANDS)
 
 
 @pytest.fixture

@@ -82,7 +82,7 @@ def test_a_link_without_visual_geometry_is_drawn_as_it_collides(tmp_path):
 def test_a_missing_mesh_is_named_with_the_way_out(tmp_path):
     head = '<asset><mesh name="m" file="gone.stl"/></asset>'
     path = written(tmp_path, one_body('<geom type="mesh" mesh="m"/>', head=head))
-    with pytest.raises(InspectorError, match=r"gone\.stl: not found in .*--no-robot"):
+    with pytest.raises(InspectorError, match=r"gone\.stl: not found in .*--robot none"):
         scene.load(str(path), tmp_path)
 
 

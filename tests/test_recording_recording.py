@@ -583,7 +583,7 @@ def test_an_unreadable_mesh_is_named_and_the_run_can_be_shown_without(tmp_path):
         joint_names=("HAA",),
         robot=str(leg),
     )
-    with pytest.raises(InspectorError, match="mesh gone.stl: not found.*--no-robot"):
+    with pytest.raises(InspectorError, match="mesh gone.stl: not found.*--robot none"):
         inspected(run, tmp_path)
     write(inspected(run, tmp_path, links=False), tmp_path / "out.rrd")
     assert "/noise/simplified" in entities(tmp_path / "out.rrd")

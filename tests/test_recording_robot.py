@@ -55,7 +55,7 @@ def test_a_path_is_relative_to_the_urdf(tmp_path):
 )
 def test_a_mesh_that_cannot_be_read_is_named(tmp_path, name, content, problem):
     (tmp_path / name).write_bytes(content)
-    with pytest.raises(InspectorError, match=f"mesh package://{name}: .*{problem}.*--no-robot"):
+    with pytest.raises(InspectorError, match=f"mesh package://{name}: .*{problem}.*--robot none"):
         drawable(robot(tmp_path, f"package://{name}"), (tmp_path,), tmp_path)
 
 

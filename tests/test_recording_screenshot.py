@@ -7,7 +7,6 @@ from commandline import call
 
 from inspector.analysis import analyse_file
 from inspector.cli import main
-from inspector.errors import InspectorError
 from inspector.library import demo_run
 from inspector.recording import viewer
 from inspector.recording.run import write
@@ -62,19 +61,11 @@ def test_a_viewer_that_ends_is_one_line(monkeypatch):
         pass
 
 
-def test_a_size_is_width_and_height():
-    assert viewer.parse_size("1920x1080") == (1920, 1080)
-    for wrong in ("1920", "12x12", "ax900", "99999x900"):
-        with pytest.raises(InspectorError, match=f"a size of '{wrong}', expected"):
-            viewer.parse_size(wrong)
-
-
 @pytest.mark.parametrize(
     ("arguments", "status", "text"),
     [
         (["gone.npz"], 3, "gone.npz: cannot be read"),
         (["gone.rrd"], 3, "gone.rrd: cannot be read"),
-        (["gone.npz", "--size", "12"], 2, "a size of '12'"),
     ],
 )
 def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monkeypatch, capsys):
@@ -94,7 +85,7 @@ def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monk
     [
         (["view", demo_run(), "-o", "s.jpg"], "s.jpg: name a .rrd, .png or .html file"),
         (["view", demo_run(), demo_run(), "-o", "v.png"], ".png takes one run"),
-        (["view", demo_run(), "-o", "v.rrd", "--at", "1"], "--at and --size take -o FILE.png"),
+        (["view", demo_run(), "-o", "v.rrd", "--at", "1"], "--at takes -o FILE.png"),
         (["view", demo_run(), "-o", "s.png", "--at", "100"], "--at 100: the run lasts from 0.00 s"),
         (["view", demo_run(), "-o", "s.png", "--at", "-1"], "--at -1: the run lasts from 0.00 s"),
     ],

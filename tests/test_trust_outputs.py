@@ -116,7 +116,7 @@ def test_accepting_keeps_runs_in_the_folder_of_the_reference(place):
 
 
 def test_each_command_that_reads_and_writes_is_in_the_table():
-    others = WITHOUT | {"config", "history"}
+    others = WITHOUT | {"history"}
     assert {command for command, *_ in TABLE} == set(MODULES) - others
 
 

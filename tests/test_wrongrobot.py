@@ -78,7 +78,6 @@ COMMANDS = [
     ["audit"],
     ["noise"],
     ["view", "-o", "run.rrd"],
-    ["view", "--no-robot", "-o", "run.rrd"],
     ["view", "-o", "run.html"],
     ["listen", "-o", "run.wav"],
     ["export", "-o", "run.csv"],

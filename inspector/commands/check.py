@@ -1,7 +1,7 @@
 """Commands that check runs: `classify`, `diff`, `accept`, `audit`, `smoothness` and more."""
 
 import os
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from datetime import date
 from fnmatch import fnmatchcase
@@ -11,27 +11,8 @@ from typing import Annotated, Any, Literal, NoReturn
 
 import typer
 
-from inspector.commands.shared import (
-    Dask,
-    ModelFiles,
-    NumberOfJobs,
-    OnBadInput,
-    Overwrite,
-    ReportUrl,
-    Runs,
-    TextOrJson,
-    UnknownFrames,
-    Write,
-    argument,
-    end,
-    finite,
-    jobs_or_dask,
-    option,
-    outputs_of,
-    prepare,
-    say_assumed,
-    written,
-)
+from inspector.commands import shared
+from inspector.commands.shared import argument, option
 from inspector.errors import EXIT, InspectorError, Status, Unknown
 from inspector.library import Library, load_library
 from inspector.logs.read import left_out, sources
@@ -47,54 +28,55 @@ from inspector.verdict import UNREAD, Verdict, classify_files, exit_status, read
 from noisemodel.files import refuse_existing, write_whole
 from noisemodel.types import hint
 
+Format = Annotated[
+    Literal["text", "json", "junit", "github", "sarif", "markdown"], option("Output format.")
+]
+
 # --- classify
 
 _gate = partial(option, rich_help_panel="What fails a run")
 
-VerdictFormat = Annotated[
-    Literal["text", "json", "junit", "github", "sarif", "markdown"], option("Output format.")
-]
-Verbose = Annotated[
-    bool, option("All that was assumed, and the runs of scenarios.", "--verbose", "-v")
-]
-RunsReport = Annotated[
-    Path | None, option("Write index.html with a picture of each run to this folder.")
-]
-Resume = Annotated[Path | None, option("Keep verdicts in this file; continue if it exists.")]
 Accepted = Annotated[
     Path | None,
     _gate("Accepted runs, or a folder of good ones; by default the nearest reference/."),
 ]
-NoReference = Annotated[bool, _gate("Use the general model alone.", "--no-reference")]
 FailOnClass = Annotated[
     list[str] | None, _gate("Only findings of this class; repeatable, or a,b,c.")
 ]
 MinScore = Annotated[
     float | None, _gate("Only findings of this score or more, 0 to 1.", min=0.0, max=1.0)
 ]
-MinDuration = Annotated[float, _gate("Only findings of so many seconds.", min=0.0, callback=finite)]
+MinDuration = Annotated[
+    float, _gate("Only findings of so many seconds.", min=0.0, callback=shared.finite)
+]
 
 
 def classify(
     ctx: typer.Context,
-    runs: Runs,
-    format: VerdictFormat = "text",  # noqa: A002
-    verbose: Verbose = False,
-    jobs: NumberOfJobs = 1,
-    dask: Dask = "",
-    model: ModelFiles = None,
-    write: Write = None,
-    report: RunsReport = None,
-    report_url: ReportUrl = "",
-    overwrite: Overwrite = False,
-    resume: Resume = None,
-    unknown: UnknownFrames = Unknown.FINDING,
+    runs: shared.Runs,
+    format: Format = "text",  # noqa: A002
+    verbose: Annotated[
+        bool, option("All that was assumed, and the runs of scenarios.", "--verbose", "-v")
+    ] = False,
+    jobs: shared.NumberOfJobs = 1,
+    dask: shared.Dask = "",
+    model: shared.ModelFiles = None,
+    write: shared.Write = None,
+    report: Annotated[
+        Path | None, option("Write index.html with a picture of each run to this folder.")
+    ] = None,
+    report_url: shared.ReportUrl = "",
+    overwrite: shared.Overwrite = False,
+    resume: Annotated[
+        Path | None, option("Keep verdicts in this file; continue if it exists.")
+    ] = None,
+    unknown: shared.UnknownFrames = Unknown.FINDING,
     reference: Accepted = None,
-    no_reference: NoReference = False,
+    no_reference: Annotated[bool, _gate("Use the general model alone.", "--no-reference")] = False,
     fail_on_class: FailOnClass = None,
     min_score: MinScore = None,
     min_duration: MinDuration = 0.0,
-    on_bad_input: OnBadInput = "fail",
+    on_bad_input: shared.OnBadInput = "fail",
 ) -> None:
     """Classify runs and print verdicts.
 
@@ -107,10 +89,10 @@ def classify(
     references = References() if no_reference else References.found(shown, reference, ctx.obj)
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
     formats = FORMATS | {"text": partial(text, verbose=verbose)}
-    outputs = outputs_of(write, formats, overwrite=overwrite)
+    outputs = shared.outputs_of(write, formats, overwrite=overwrite)
     if report:
         require("a report")
-        prepare(report, html.PAGE, overwrite=overwrite)
+        shared.prepare(report, html.PAGE, overwrite=overwrite)
         outputs[report] = partial(html.write_index, folder=report)
 
     classified = classify_files(
@@ -120,19 +102,25 @@ def classify(
         unknown=unknown,
         draw=None if report is None else partial(html.draw, folder=report),
         reference=references if references.of else None,
-        jobs=jobs_or_dask(jobs, dask),
+        jobs=shared.jobs_or_dask(jobs, dask),
         resume=resume,
     )
     known = {each.path: each for each in progress(classified, "classify", total=len(found))}
-    ignore = on_bad_input == "ignore"
-    address = partial(published, folder=report, address=report_url)
-    verdicts = [_judged(known[path], references, gate, ignore, address) for path in shown]
+    judged = [references.judge(known[path], gate, date.today()) for path in shown]
+    verdicts = [
+        replace(
+            each,
+            ignored=on_bad_input == "ignore" and each.status is Status.BAD_INPUT,
+            picture_url=published(each.picture, report, report_url),
+        )
+        for each in judged
+    ]
     verdicts += references.absent(verdicts, [each for each in runs if each.is_dir()])
 
-    say_assumed({str(each.path): each.assumed for each in verdicts}, verbose=verbose)
+    shared.say_assumed({str(each.path): each.assumed for each in verdicts}, verbose=verbose)
     for remark in filter(None, [left_out(others), *references.remarks(date.today())]):
         typer.echo(f"inspector: {remark}", err=True)
-    _end(verdicts, written(verdicts, formats[format], outputs))
+    _end(verdicts, shared.written(verdicts, formats[format], outputs))
 
 
 def _classes(given: Sequence[str], library: Library) -> tuple[str, ...]:
@@ -148,21 +136,6 @@ def _classes(given: Sequence[str], library: Library) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _judged(
-    verdict: Verdict,
-    references: References,
-    gate: Gate,
-    ignore: bool,
-    address: Callable[[Path | None], str],
-) -> Verdict:
-    """A verdict with what fails it today, and where its picture will be."""
-    return replace(
-        references.judge(verdict, gate, date.today()),
-        ignored=ignore and verdict.status is Status.BAD_INPUT,
-        picture_url=address(verdict.picture),
-    )
-
-
 def _name_failed(verdicts: Sequence[Verdict]) -> None:
     """Print on standard error which runs could not be read."""
     for bad in verdicts:
@@ -173,7 +146,7 @@ def _name_failed(verdicts: Sequence[Verdict]) -> None:
 def _end(verdicts: Sequence[Verdict], lost: Sequence[str]) -> NoReturn:
     """Name the runs that could not be read, and end with the exit status of all."""
     _name_failed(verdicts)
-    end(exit_status(verdicts), [*(line for each in verdicts for line in each.lost), *lost])
+    shared.end(exit_status(verdicts), [*(line for each in verdicts for line in each.lost), *lost])
 
 
 # --- diff
@@ -199,15 +172,14 @@ def diff(
         Path | None,
         option("Write recording, picture and diff.json of the worst to this folder."),
     ] = None,
-    report_url: ReportUrl = "",
-    write: Write = None,
-    on_bad_input: OnBadInput = "fail",
-    jobs: NumberOfJobs = 1,
-    dask: Dask = "",
-    model: ModelFiles = None,
-    robot: Annotated[bool, option("Draw the robot in the recording.", "--robot/--no-robot")] = True,
-    unknown: UnknownFrames = Unknown.FINDING,
-    overwrite: Overwrite = False,
+    report_url: shared.ReportUrl = "",
+    write: shared.Write = None,
+    on_bad_input: shared.OnBadInput = "fail",
+    jobs: shared.NumberOfJobs = 1,
+    dask: shared.Dask = "",
+    model: shared.ModelFiles = None,
+    unknown: shared.UnknownFrames = Unknown.FINDING,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Compare runs with earlier ones: worse, better or same.
 
@@ -216,12 +188,12 @@ def diff(
 
     Exit status: 0 as before, 1 worse, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost.
     """
-    outputs = outputs_of(write, DIFF_FORMATS, overwrite=overwrite)
-    library, where = load_library(model), jobs_or_dask(jobs, dask)
+    outputs = shared.outputs_of(write, DIFF_FORMATS, overwrite=overwrite)
+    library, where = load_library(model), shared.jobs_or_dask(jobs, dask)
     if report:
         require("a report")
-        prepare(report, *FILES, overwrite=overwrite)
-        worst = partial(_report, library=library, robot=robot, overwrite=overwrite)
+        shared.prepare(report, *FILES, overwrite=overwrite)
+        worst = partial(_write_worst, library=library, overwrite=overwrite)
         outputs[report] = partial(worst, folder=report)
     found = difference(reference, candidate, library, margin=margin, unknown=unknown, jobs=where)
     _name_failed(found.failed)
@@ -229,12 +201,10 @@ def diff(
     drawn = report / PICTURE if report and any(row.worst for row in found.rows) else None
     address = published(drawn, report, report_url)
     found = replace(found, gate=gate, picture=drawn, picture_url=address)
-    end(found.exit_status, written(found, DIFF_FORMATS[format], outputs))
+    shared.end(found.exit_status, shared.written(found, DIFF_FORMATS[format], outputs))
 
 
-def _report(
-    found: Difference, folder: Path, library: Library, robot: bool, overwrite: bool
-) -> None:
+def _write_worst(found: Difference, folder: Path, library: Library, overwrite: bool) -> None:
     """Write the worst scenario as recording and picture, and all numbers."""
     from inspector.compare.pair import compare
     from inspector.compare.recording import write
@@ -244,8 +214,11 @@ def _report(
     if row is None or row.worst is None:
         return
     after = Path(row.worst.run.run)
-    pair = compare(row.before[0], after, library, robot=robot)
-    write(pair, folder / RECORDING, overwrite=overwrite)
+    runs, recording = (row.before[0], after, library), folder / RECORDING
+    try:
+        write(compare(*runs), recording, overwrite=overwrite)
+    except InspectorError:  # the robot cannot be drawn: a mesh is missing
+        write(compare(*runs, robot=False), recording, overwrite=overwrite)
     title = f"{row.name}: {row.outcome}, {row.reason}; {after.name}"
     write_whole(folder / PICTURE, over_reference(row.worst, title), overwrite=overwrite)
 
@@ -255,7 +228,7 @@ def _report(
 
 def accept(
     ctx: typer.Context,
-    runs: Runs,
+    runs: shared.Runs,
     reason: Annotated[str, option("Why they are accepted; reviewers read it.")],
     output: Annotated[
         Path | None,
@@ -266,8 +239,8 @@ def accept(
     ] = None,
     by: Annotated[str, option("Who accepts them; you by default.")] = "",
     in_ci: Annotated[bool, option("Write though CI=true is set.", "--in-ci")] = False,
-    jobs: NumberOfJobs = 1,
-    model: ModelFiles = None,
+    jobs: shared.NumberOfJobs = 1,
+    model: shared.ModelFiles = None,
 ) -> None:
     """Accept good runs: from then on `classify` finds what is louder than they are.
 
@@ -316,7 +289,7 @@ def _verdicts_on(
     found = [each for each in sources(runs, reading)[0] if str(each.shown) in wanted]
     classified = classify_files(found, library, reading=reading, jobs=jobs)
     verdicts = list(progress(classified, "accept", total=len(found)))
-    say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
+    shared.say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
     for each in verdicts:
         if each.status in UNREAD:
             raise InspectorError(f"{each.path}: {each.message}; nothing is accepted")
@@ -329,8 +302,8 @@ def _verdicts_on(
 def audit(
     ctx: typer.Context,
     logs: Annotated[list[Path], argument("Run files, or any logs; folders of them.")],
-    format: TextOrJson = "text",  # noqa: A002
-    model: ModelFiles = None,
+    format: shared.TextOrJson = "text",  # noqa: A002
+    model: shared.ModelFiles = None,
 ) -> None:
     """Print what logs can show: rates, quantisation, failure classes.
 
@@ -378,7 +351,7 @@ def smoothness(
     labels: Annotated[
         bool, option("Classify episodes from 80 Hz on.", "--labels/--no-labels")
     ] = True,
-    model: ModelFiles = None,
+    model: shared.ModelFiles = None,
 ) -> None:
     """Rank episodes of policies and demonstrations by smoothness.
 
@@ -400,16 +373,16 @@ def smoothness(
 
 def merge(
     results: Annotated[list[Path], argument("Files that `classify --write json=FILE` wrote.")],
-    format: VerdictFormat = "text",  # noqa: A002
-    write: Write = None,
+    format: Format = "text",  # noqa: A002
+    write: shared.Write = None,
     report: Annotated[Path | None, option("Write index.html with all runs to this folder.")] = None,
-    overwrite: Overwrite = False,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Join the results of several jobs into one.
 
     The exit status is the one that `classify` has for all of their runs.
     """
-    outputs = outputs_of(write, FORMATS, overwrite=overwrite)
+    outputs = shared.outputs_of(write, FORMATS, overwrite=overwrite)
     found: dict[Path, tuple[Verdict, Path]] = {}
     for path in results:
         for verdict in read_results(path):
@@ -419,10 +392,10 @@ def merge(
             found[verdict.path] = verdict, path
     merged = [verdict for verdict, _ in found.values()]
     if report is not None:
-        prepare(report, html.PAGE, overwrite=overwrite)
+        shared.prepare(report, html.PAGE, overwrite=overwrite)
         merged = [html.with_picture(each, report) for each in merged]
         outputs[report] = partial(html.write_index, folder=report)
-    _end(merged, written(merged, FORMATS[format], outputs))
+    _end(merged, shared.written(merged, FORMATS[format], outputs))
 
 
 def history(
@@ -432,7 +405,7 @@ def history(
     output: Annotated[
         Path | None, option("Write a page (.html) to this file.", "--output", "-o")
     ] = None,
-    overwrite: Overwrite = False,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Show the results of many commits, and where they changed.
 

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 import typer
 
 from inspector.analysis import analyse
-from inspector.commands.shared import ModelFiles, Overwrite, RunFile, argument, opened, option
+from inspector.commands import shared
+from inspector.commands.shared import argument, opened, option
 from inspector.errors import EXIT, OUTPUT_LOST, Status, worst
 from inspector.export.labels import read_labels, write_labels
 from inspector.library import Library, load_library
@@ -30,7 +31,7 @@ def import_(
     list_: Annotated[
         bool, option("List the contents of the logs, write nothing.", "--list")
     ] = False,
-    overwrite: Overwrite = False,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Convert logs of robots to run files.
 
@@ -67,7 +68,7 @@ def import_(
 
 def export(
     ctx: typer.Context,
-    run: RunFile,
+    run: shared.RunFile,
     output: Annotated[
         Path,
         option(
@@ -85,8 +86,8 @@ def export(
         Path | None, option("Write the run with the labels of this file instead.")
     ] = None,
     kind: Annotated[str, option("Extended noise: normal, rms, mean, paper, A, B or C.")] = "normal",
-    model: ModelFiles = None,
-    overwrite: Overwrite = False,
+    model: shared.ModelFiles = None,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Write noise, labels and scores for other tools.
 

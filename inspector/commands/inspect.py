@@ -20,20 +20,8 @@ from inspector.analysis import (
     write_csv,
 )
 from inspector.audit.audit import text
-from inspector.commands.shared import (
-    Geometries,
-    Kind,
-    Limits,
-    ModelFiles,
-    NumberOfJobs,
-    Overwrite,
-    PackageRoot,
-    argument,
-    one_at_a_time,
-    opened,
-    option,
-    say_warnings,
-)
+from inspector.commands import shared
+from inspector.commands.shared import argument, opened, option
 from inspector.errors import EXIT, InspectorError, Status
 from inspector.export import sound as sonification
 from inspector.export.sound import of_recording, worst_time
@@ -51,7 +39,6 @@ from noisemodel.files import refuse_existing
 # --- view
 
 SUFFIXES = ("", ".rrd", ".png", ".html")  # of what is written; without a suffix a recording
-SIZE = "1440x900"
 
 Shown = Annotated[
     list[Path] | None,
@@ -60,11 +47,9 @@ Shown = Annotated[
 Target = Annotated[
     Path | None, option("Write a recording .rrd, a picture .png or a .html.", "--output", "-o")
 ]
-NoRobot = Annotated[bool, option("Do not draw the robot and the noise of its links.", "--no-robot")]
 Floor = Annotated[float | None, option("Darkest level of spectrograms, in dB re 1 rad/s.", max=0.0)]
 Terms = Annotated[bool, option("Show the terms A, B and C of the paper separately.", "--terms")]
 At = Annotated[float | None, option("Time of a picture, in s; else the worst finding.")]
-Size = Annotated[str, option("Width and height of a picture.")]
 Web = Annotated[bool, option("Serve it to a browser on this machine until Ctrl-C.", "--web")]
 Port = Annotated[int, option("Port of --web; 0 takes a free one.", min=0, max=65535)]
 Align = Annotated[
@@ -82,11 +67,10 @@ class Request:
 
     reading: Reading
     library: Library
-    links: str  # kind of the noise of the links; empty where no robot is drawn
+    kind: str  # of the noise of the links
     floor: float | None
     terms: bool
     at: float | None  # time of a picture, in [s]; None where that is the worst finding's
-    size: str
     align: str | None
     reference: Path | None
     overwrite: bool
@@ -96,18 +80,16 @@ def view(
     ctx: typer.Context,
     runs: Shown = None,
     output: Target = None,
-    model: ModelFiles = None,
-    no_robot: NoRobot = False,
-    kind: Kind = "normal",
+    model: shared.ModelFiles = None,
+    kind: shared.Kind = "normal",
     floor: Floor = None,
     terms: Terms = False,
     at: At = None,
-    size: Size = SIZE,
     web: Web = False,
     port: Port = 0,
     align: Align = None,
     reference: GoodRuns = None,
-    overwrite: Overwrite = False,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Show a run, or several side by side.
 
@@ -119,14 +101,14 @@ def view(
     from inspector.recording import viewer
 
     paths = runs or [demo_run()]
-    one_at_a_time(ctx.obj, len(paths))
+    shared.one_at_a_time(ctx.obj, len(paths))
     if web and output:
         raise typer.BadParameter("name one of --web and -o")
     together = f"{paths[0].stem}-and-{len(paths) - 1}" if len(paths) > 1 else paths[0].stem
     target = output or viewer.scratch_path(paths[0].with_name(f"{together}.npz"))
     library = load_library(model)
-    links, overwrite = "" if no_robot else kind, overwrite or output is None
-    request = Request(ctx.obj, library, links, floor, terms, at, size, align, reference, overwrite)
+    overwrite = overwrite or output is None
+    request = Request(ctx.obj, library, kind, floor, terms, at, align, reference, overwrite)
     _check(paths, target, request)
     refuse_existing(target, overwrite=overwrite)
     if target.suffix.lower() in (".png", ".html"):
@@ -157,8 +139,8 @@ def _check(paths: list[Path], target: Path, asked: Request) -> None:
             raise typer.BadParameter(f"{name} takes one run")
     if asked.align and (not several or (asked.align == "auto" and len(paths) > 2)):
         raise typer.BadParameter("--align takes two runs or more, --align auto two")
-    if suffix != ".png" and (asked.at is not None or asked.size != SIZE):
-        raise typer.BadParameter("--at and --size take -o FILE.png")
+    if suffix != ".png" and asked.at is not None:
+        raise typer.BadParameter("--at takes -o FILE.png")
 
 
 def _picture(run: Path, output: Path, request: Request) -> None:
@@ -167,7 +149,7 @@ def _picture(run: Path, output: Path, request: Request) -> None:
     from inspector.recording.run import write
 
     viewer.require_driver()
-    points, at = viewer.parse_size(request.size), request.at
+    at = request.at
     with TemporaryDirectory() as folder:
         recording, seconds = run, at or 0.0
         if run.suffix != ".rrd":
@@ -181,9 +163,7 @@ def _picture(run: Path, output: Path, request: Request) -> None:
             recording = Path(folder) / "run.rrd"
             seconds = worst_time(found) if at is None else at
             write(found, recording, floor=request.floor, beside=beside)
-        complaints = viewer.shoot(
-            recording, output, seconds, size=points, overwrite=request.overwrite
-        )
+        complaints = viewer.shoot(recording, output, seconds, overwrite=request.overwrite)
     typer.echo(f"{output}: {run} at {seconds:.2f} s")
     for complaint in complaints:
         typer.echo(f"  the viewer reports: {complaint}", err=True)
@@ -223,8 +203,8 @@ def _read(paths: list[Path], reading: Reading) -> list[Opened]:
 
 def _analysed(run: Opened, request: Request) -> tuple[Analysis, Verdict | None, Comparison | None]:
     """A run with what was found in it, beside its reference if there is one."""
-    kind, path = request.links, run.source.shown
-    found = analyse_file(run, request.library, links=bool(kind), kind=kind, terms=request.terms)
+    path = run.source.shown
+    found = analyse_file(run, request.library, kind=request.kind, terms=request.terms)
     if request.reference is None:
         return found, None, None
     references = References.found([path], request.reference, request.reading)
@@ -258,8 +238,8 @@ def _two(runs: list[Opened], target: Path, request: Request) -> None:
     from inspector.compare.recording import write
 
     before, after = runs
-    how, kind = Align(request.align or "auto"), request.links
-    pair = compare(before, after, request.library, how=how, robot=bool(kind), kind=kind)
+    how = Align(request.align or "auto")
+    pair = compare(before, after, request.library, how=how, kind=request.kind)
     write(pair, target, overwrite=request.overwrite)
     typer.echo(f"{before.source.shown} → {after.source.shown}: {summary(pair)}")
     typer.echo(f"  aligned {pair.alignment}")
@@ -311,7 +291,7 @@ Compare = Annotated[
     bool, _model_option("Compare noise models on run files with positions.", "--compare")
 ]
 Robots = Annotated[str, _model_option("Compare them on robots that move: talos,go2 or all.")]
-Geometry = Annotated[Geometries, _model_option("Shapes: visual, collision, hull or auto.")]
+Geometry = Annotated[shared.Geometries, _model_option("Shapes: visual, collision, hull or auto.")]
 Seed = Annotated[int, _model_option("Random seed of the generated motion.", min=0)]
 
 
@@ -324,8 +304,8 @@ def noise(
     robots: Robots = "",
     geometry: Geometry = "auto",
     seed: Seed = 0,
-    jobs: NumberOfJobs = 1,
-    overwrite: Overwrite = False,
+    jobs: shared.NumberOfJobs = 1,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Print noise levels by joint and link.
 
@@ -367,7 +347,7 @@ def _print_levels(
 ) -> None:
     """Print the noise levels of a run, and write the noise over time."""
     recorded = opened(run, reading).run
-    say_warnings(recorded)
+    shared.say_warnings(recorded)
     estimates = tuple(estimate(recorded, each) for each in kinds or default_kinds(recorded))
     if csv:
         write_csv(recorded, estimates, csv, overwrite=overwrite)
@@ -393,15 +373,15 @@ def listen(
         option("In dB; at 0, full scale is 1 rad/s (or √W). By default, the peak fits."),
     ] = None,
     speed: Annotated[float, option("Playback speed; the pitch changes by the same factor.")] = 1.0,
-    overwrite: Overwrite = False,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
-    one_at_a_time(ctx.obj, len(runs))
+    shared.one_at_a_time(ctx.obj, len(runs))
     settings = sonification.Settings(kind, joint, link, speed)
     paths = sonification.output_paths(output, len(runs), overwrite=overwrite)
     recorded = [opened(run, ctx.obj).run for run in runs]
     for each in recorded:
-        say_warnings(each)
+        shared.say_warnings(each)
     sounds = [sonification.sonify(each, settings) for each in recorded]
     level = sonification.common_gain(sounds) if gain is None else gain
     sonification.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
@@ -438,16 +418,16 @@ LiveReference = Annotated[
 def live(
     rate: LiveRate,
     robot: LiveRobot = None,
-    package_root: PackageRoot = None,
-    limit: Limits = None,
+    package_root: shared.PackageRoot = None,
+    limit: shared.Limits = None,
     names: Names = "",
     save: SaveLive = None,
     connect: Connect = None,
     format: LiveFormat = "text",  # noqa: A002
     fail_fast: FailFast = False,
     reference: LiveReference = None,
-    model: ModelFiles = None,
-    overwrite: Overwrite = False,
+    model: shared.ModelFiles = None,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Show samples from standard input as they arrive.
 

@@ -8,14 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from typer.core import TyperGroup
 
-from inspector.commands.shared import (
-    AsJson,
-    Dask,
-    Overwrite,
-    argument,
-    jobs_or_dask,
-    option,
-)
+from inspector.commands import shared
+from inspector.commands.shared import argument, option
 
 if TYPE_CHECKING:
     from noiseclassifier.scenarios.dataset import Folder
@@ -53,7 +47,7 @@ def run(
     duration: Seconds = None,
     output: Annotated[Path, option("The file.", "--output", "-o")] = Path("run.npz"),
     list_: List = False,
-    overwrite: Overwrite = False,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Simulate one run, with its failures annotated."""
     from noiseclassifier import scenarios
@@ -86,8 +80,8 @@ def dataset(
     ] = 10_000.0,
     duration: Seconds = None,
     jobs: Jobs = 1,
-    dask: Dask = "",
-    as_json: AsJson = False,
+    dask: shared.Dask = "",
+    as_json: shared.AsJson = False,
 ) -> None:
     """Simulate a data set; resumes if killed: only missing runs are made."""
     from noiseclassifier.scenarios.dataset import (
@@ -97,7 +91,7 @@ def dataset(
         statistics,
     )
 
-    where = jobs_or_dask(jobs, dask)
+    where = shared.jobs_or_dask(jobs, dask)
     names, numbers = _listed(robots), _listed(scenarios)
     tasks = scenario_tasks(names, numbers, first=first_seed, seeds=seeds)
     folder = Folder.opened(output, duration=duration, rate=rate)

@@ -5,23 +5,13 @@ from typing import Annotated, Literal
 
 import typer
 
-from inspector.commands.shared import (
-    AsJson,
-    Dask,
-    InPart,
-    Inputs,
-    NumberOfJobs,
-    Output,
-    Overwrite,
-    argument,
-    jobs_or_dask,
-    option,
-)
+from inspector.commands import shared
+from inspector.commands.shared import argument, option
 
 
 def train(
-    inputs: Inputs,
-    output: Output,
+    inputs: shared.Inputs,
+    output: shared.Output,
     profile: Annotated[
         str,
         option(
@@ -36,8 +26,8 @@ def train(
             min=1.0,
         ),
     ] = None,
-    part: InPart = "all",
-    overwrite: Overwrite = False,
+    part: shared.InPart = "all",
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Train a model on annotated runs."""
     from inspector.training.train import train as train_model
@@ -74,14 +64,14 @@ GridPicture = Annotated[
 
 
 def tune(
-    training: Inputs,
+    training: shared.Inputs,
     output: Annotated[
         Path,
         option("Results file, one line of JSON per point; resumes if it exists.", "--output", "-o"),
     ],
     validation: Validation = None,
     folds: Folds = None,
-    part: InPart = "all",
+    part: shared.InPart = "all",
     profile: ProfileName = "noisytest-rbf",
     rate: Annotated[
         float, option("Rate of the model in [Hz]; faster runs are decimated.", min=1.0)
@@ -96,10 +86,10 @@ def tune(
     ] = None,
     picture: GridPicture = None,
     rows: Annotated[int, option("Number of points to print.", min=1)] = 10,
-    as_json: AsJson = False,
-    jobs: NumberOfJobs = 1,
-    dask: Dask = "",
-    overwrite: Overwrite = False,
+    as_json: shared.AsJson = False,
+    jobs: shared.NumberOfJobs = 1,
+    dask: shared.Dask = "",
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Tune a profile's settings by grid search; resumes if killed."""
     if validation and folds:
@@ -123,7 +113,7 @@ def tune(
         rate=rate,
         grid=grid or ("paper",),
     )
-    where = jobs_or_dask(jobs, dask)
+    where = shared.jobs_or_dask(jobs, dask)
     tuned = tune_profile(search, output, model=train, jobs=where, overwrite=overwrite)
     report = dumps(tuned.as_dict(criterion, rows=rows), indent=2)
     typer.echo(report if as_json else tuned.table(criterion, rows=rows))
@@ -136,10 +126,10 @@ def tune(
 
 def evaluate(
     model: Annotated[Path, argument("A model file, or the name of a shipped one.")],
-    inputs: Inputs,
-    as_json: AsJson = False,
+    inputs: shared.Inputs,
+    as_json: shared.AsJson = False,
     output: Annotated[Path | None, option("Write JSON to this file.", "--output", "-o")] = None,
-    part: InPart = "all",
+    part: shared.InPart = "all",
     by: Annotated[
         Literal["robot", "domain", "scenario"] | None,
         option("Print one whole table: by robot, domain or scenario."),
@@ -148,7 +138,7 @@ def evaluate(
         bool,
         option("Accept runs that the model was trained on; the report lists them.", "--seen-too"),
     ] = False,
-    overwrite: Overwrite = False,
+    overwrite: shared.Overwrite = False,
 ) -> None:
     """Evaluate a model on annotated runs that it was not trained on."""
     from inspector.library import model_files

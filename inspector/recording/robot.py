@@ -230,7 +230,7 @@ FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute"
 
 def _not_drawn(mesh: str, problem: str) -> InspectorError:
     """A mesh that is missing, lies outside of the robot's folders, or cannot be read."""
-    return InspectorError(f"mesh {mesh}: {problem}; `--no-robot` shows the run without the robot")
+    return InspectorError(f"mesh {mesh}: {problem}; `--robot none` shows the run without the robot")
 
 
 def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:

@@ -28,7 +28,7 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 from urllib.parse import quote
 
 import noisemodel as nm
-from inspector.errors import InspectorError, OptionError
+from inspector.errors import InspectorError
 from noisemodel.files import refuse_existing, replacing
 
 if TYPE_CHECKING:
@@ -376,14 +376,6 @@ def check_recording(path: Path) -> None:
         raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
     if head != MAGIC:
         raise InspectorError(f"{path}: not a recording; name an .rrd file, or a run file (.npz)")
-
-
-def parse_size(text: str) -> tuple[int, int]:
-    """Read the size of a picture."""
-    numbers = re.fullmatch(r"(\d{3,4})x(\d{3,4})", text)
-    if numbers is None:
-        raise OptionError(f"a size of {text!r}, expected width and height such as 1440x900")
-    return int(numbers[1]), int(numbers[2])
 
 
 @contextmanager
