@@ -121,8 +121,6 @@ def test_gaps_are_left_out(tmp_path):
     np.testing.assert_array_equal(table["time"].to_numpy(), run.time[valid])
     export(run, tmp_path / "run.mcap", LIBRARY)
     assert len(messages(tmp_path / "run.mcap", "/noise")) == 1800
-    classes = [each["label"] for _, each in messages(tmp_path / "run.mcap", "/class")]
-    assert classes == ["ok", "", "ok", ""]
 
 
 # --- MCAP
@@ -142,9 +140,7 @@ def test_mcap_has_a_summary_schemas_and_all_messages(exported, demo):
         "/noise": len(demo.time),
         "/level": round(demo.duration / 0.05),
         "/labels": len(content.analysis.labels),
-        "/class": len(content.analysis.lane) + 1,
         "/findings": len(content.analysis.findings),
-        "/log": len(content.analysis.findings),
         "/annotations": len(demo.blocks),
     }
     for channel in summary.channels.values():
@@ -171,18 +167,9 @@ def test_an_exported_run_is_imported_again_to_the_bit(exported, demo, tmp_path):
         np.testing.assert_array_equal(getattr(back, name), getattr(demo, name))
 
 
-def test_mcap_holds_classes_lines_and_levels_where_they_are_known(exported, tmp_path):
+def test_mcap_holds_levels_where_they_are_known(exported, tmp_path):
     folder, content = exported
-    path, lane = folder / "demo.mcap", content.analysis.lane
-    changes = messages(path, "/class")
-    assert [each["label"] for _, each in changes] == [*(name for _, _, name in lane), ""]
-    np.testing.assert_allclose(
-        [at * 1e-9 for at, _ in changes], [*(start for start, _, _ in lane), lane[-1][1]]
-    )
-    (event,) = content.analysis.findings
-    ((at, line),) = messages(path, "/log")
-    assert line["timestamp"] == {"sec": at // 10**9, "nsec": at % 10**9}
-    assert line["message"] == f"impact from {event.start:.2f} s to {event.stop:.2f} s"
+    path = folder / "demo.mcap"
     stamps, found = zip(*messages(path, "/level"), strict=True)
     start, level = content.analysis.noise_level
     assert [each["level"] for each in found] == level[:, 0].tolist()

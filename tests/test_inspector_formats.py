@@ -8,10 +8,12 @@ import pytest
 
 from inspector.errors import Status, Unknown
 from inspector.localisation.stage import Localisation
-from inspector.report.formats import ANNOTATIONS, COMMENT, FORMATS, MARKER, as_json, sarif, text
+from inspector.report.formats import ANNOTATIONS, COMMENT, FORMATS, MARKER, as_json, text
 from inspector.verdict import Evidence, Finding, Missing, Ruling, Verdict, exit_status
 
-github, junit, markdown = (FORMATS[name] for name in ("github", "junit", "markdown"))
+github, junit, markdown, sarif = (
+    FORMATS[name] for name in ("github", "junit", "markdown", "sarif")
+)
 BLOW, RATTLE = Finding("impact", 1.0, 1.5, 0.9), Finding("oscillations", 2.0, 3.0, 0.8, novel=True)
 QUIET = Verdict(Path("quiet.npz"), Status.OK, "general")
 LOUD = Verdict(
@@ -372,19 +374,6 @@ def test_markdown_is_a_table_with_the_worst_first_and_one_picture():
     assert "Picture of `loud.npz`: `r/pictures/loud.png`." in markdown(
         [replace(drawn, picture_url="")]
     )
-
-
-def test_markdown_draws_the_worst_run_as_text_where_no_picture_shows():
-    long = replace(LOUD, duration=6.0, events=(BLOW, RATTLE, replace(BLOW, start=5.5, stop=6.1)))
-    lines = markdown([long]).splitlines()
-    assert lines[-5:] == [
-        "`loud.npz` over time:",
-        "```",
-        f"impact        |{'.' * 10}{'#' * 6}{'.' * 39}{'#' * 5}| 6.0 s",
-        f"oscillations  |{'.' * 20}{'#' * 11}{'.' * 29}| 6.0 s",
-        "```",
-    ]
-    assert "over time:" not in markdown([replace(long, picture=Path("a"), picture_url="https://x")])
 
 
 def test_markdown_fits_into_a_comment():

@@ -138,8 +138,8 @@ def test_a_slow_log_has_no_sound_and_gaps_and_silence_are_drawn(tmp_path):
 def test_findings_are_listed_with_their_scores(tmp_path):
     events = (Event("impact", 1.0, 1.5, 0.9), Event("wobble", 3.0, 3.5, 0.7, novel=True))
     words = Page(html.page(inspected(short_run(), tmp_path, findings=events, spans=events))).words
-    assert "impact 1.00 1.50 0.90" in words
-    assert "wobble, out of distribution 3.00 3.50 0.70" in words
+    assert "impact, 1.00 s to 1.50 s, score 0.90" in words
+    assert "wobble, 3.00 s to 3.50 s, score 0.70, out of distribution" in words
     # Amplitudes of 1 and 0.2: powers of 25 to 1.
     assert re.search(r"elbow 96\.\d% .* wrist 3\.\d%", words)
 

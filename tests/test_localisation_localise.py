@@ -8,7 +8,6 @@ from inspector.library import demo_run, load_library, model_files
 from inspector.localisation.localise import Localisation, band, localise
 from inspector.localisation.stage import quiet_stretches
 from inspector.report.findings import report, sentence, words
-from inspector.report.html import found as tables
 from inspector.verdict import Finding, classify_file
 from noisemodel import Block, Run
 
@@ -121,11 +120,3 @@ def test_a_run_without_desired_velocities_has_one_remark_on_missing_stages(tmp_p
     analysis = inspected(shaken_run(velocity_desired=None, blocks=blocks), tmp_path)
     assert all(known.stage == "" for known in analysis.localisations.values())
     assert report(analysis).count("No stages") == 1
-    (annotated,) = tables(analysis)
-    assert annotated.note.startswith("No stages")
-
-
-def test_the_page_has_the_same_columns_without_marks(tmp_path):
-    (annotated,) = tables(inspected(shaken_run(), tmp_path))
-    assert annotated.head[3:7] == ("found", "shows first in", "by joints", "band")
-    assert annotated.rows[0][4] == "measured"

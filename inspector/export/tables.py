@@ -2,10 +2,9 @@
 
 /joint_states and /joint_states/desired of an MCAP are ROS 2 JointStates, a message for each sample,
 which `inspector import` reads as well. The other topics are JSON: /noise for each sample, /level
-each 50 ms, /labels at the middle of each frame, /class where the class changes, /findings and
-/annotations at their start, and /log with a line for each finding. Times are the run's,
-added to the first stamp in its ``meta``. MCAP has no negative times: a run that starts before 0 is
-shifted.
+each 50 ms, /labels at the middle of each frame, /findings and /annotations at their start. Times
+are the run's, added to the first stamp in its ``meta``. MCAP has no negative times: a run that
+starts before 0 is shifted.
 """
 
 import csv
@@ -159,9 +158,7 @@ def _framed(time: Array, labels: nc.Labels) -> Iterator[tuple[str, Any]]:
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 MEASURED, DESIRED = "/joint_states", "/joint_states/desired"
-LOG_WARNING = 3  # level of a ``foxglove.Log``
-NUMBER, INTEGER, TEXT = {"type": "number"}, {"type": "integer"}, {"type": "string"}
-STAMP = {"type": "object", "properties": {"sec": INTEGER, "nsec": INTEGER}}
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 SPAN = {"label": TEXT, "start": NUMBER, "stop": NUMBER}
 NANOSECONDS = 10**9
 LATEST = 2**63  # stamps from here on are not valid, in [ns]
@@ -178,19 +175,18 @@ def write_mcap(content: Content, path: Path) -> None:
         raise InspectorError(
             f"MCAP needs the extra `mcap` ({error}); pip install 'noise-inspector[mcap]'"
         ) from error
-    ros, zero = get_typestore(Stores.ROS2_HUMBLE), start_stamp(content)
+    ros, zero = get_typestore(Stores.ROS2_HUMBLE), _start_stamp(content)
     with path.open("wb") as stream:
         writer: Any = Writer(stream)
         writer.start(profile="ros2", library="noise-inspector")
         channels, messages = {}, list[Iterator[Message]]()
-        if joints := joint_signals(content):
+        if joints := _joint_signals(content):
             definition, _ = ros.generate_msgdef(JOINT_STATE, ros_version=2)
             schema = writer.register_schema(JOINT_STATE, "ros2msg", definition.encode())
             channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in joints}
         for topic, (fields, rows) in _topics(content).items():
             data = json.dumps({"type": "object", "properties": fields}).encode()
-            name = "foxglove.Log" if topic == "/log" else f"noise.{topic[1:]}"
-            schema = writer.register_schema(name, "jsonschema", data)
+            schema = writer.register_schema(f"noise.{topic[1:]}", "jsonschema", data)
             channels[topic] = writer.register_channel(topic, "json", schema)
             messages.append(_serialised(topic, rows, zero))
         messages += [_states(content, topic, *each, ros) for topic, each in joints.items()]
@@ -201,7 +197,7 @@ def write_mcap(content: Content, path: Path) -> None:
         writer.finish()
 
 
-def joint_signals(content: Content) -> dict[str, tuple[tuple[str, ...], dict[str, Array]]]:
+def _joint_signals(content: Content) -> dict[str, tuple[tuple[str, ...], dict[str, Array]]]:
     """What the JointStates hold: by topic the joints, and by field an array (samples, joints)."""
     run = content.analysis.run
     if content.analysis.audit is None:  # a scalar noise has no joints
@@ -221,7 +217,7 @@ def joint_signals(content: Content) -> dict[str, tuple[tuple[str, ...], dict[str
     return known
 
 
-def start_stamp(content: Content) -> int:
+def _start_stamp(content: Content) -> int:
     """Time in the MCAP file of the run's time 0, in [ns]."""
     try:
         start = int(Decimal(str(content.analysis.run.meta.get("start", 0))) * NANOSECONDS)
@@ -247,12 +243,8 @@ def _topics(content: Content) -> dict[str, tuple[dict[str, Any], Iterator[Row]]]
         if analysis.alarm is not None:
             parts["alarm"] = NUMBER
         topics["/labels"] = SPAN | parts, _frames(analysis.labels, analysis.alarm)
-        topics["/class"] = {"label": TEXT}, _classes(analysis)
     if analysis.findings:
-        fields = {"timestamp": STAMP, "level": INTEGER, "line": INTEGER}
-        fields |= dict.fromkeys(("message", "name", "file"), TEXT)
         topics["/findings"] = SPAN | {"score": NUMBER}, _spans(analysis.findings, "score")
-        topics["/log"] = fields, _lines(analysis, start_stamp(content))
     if analysis.run.blocks:
         topics["/annotations"] = SPAN, _spans(analysis.run.blocks)
     return topics
@@ -289,30 +281,9 @@ def _frames(labels: nc.Labels, alarm: float | None) -> Iterator[Row]:
         yield (start + stop) / 2, message | {"failure": 1.0 - each["ok"], "scores": each}
 
 
-def _classes(analysis: Analysis) -> Iterator[Row]:
-    """The class where it changes, and none where frames end."""
-    end = None
-    for start, stop, label in analysis.lane:
-        if end is not None and start > end:
-            yield end, {"label": ""}
-        yield start, {"label": label}
-        end = stop
-    if end is not None:
-        yield end, {"label": ""}
-
-
 def _spans(spans: Any, *more: str) -> Iterator[Row]:
     for each in spans:
         yield each.start, {name: getattr(each, name) for name in ("label", "start", "stop", *more)}
-
-
-def _lines(analysis: Analysis, zero: int) -> Iterator[Row]:
-    """A ``foxglove.Log`` for each finding."""
-    for each in analysis.findings:
-        sec, nsec = divmod(_stamp(zero, each.start), NANOSECONDS)
-        message = f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s"
-        log = {"timestamp": {"sec": sec, "nsec": nsec}, "level": LOG_WARNING, "line": 0}
-        yield each.start, log | {"message": message, "name": "noise-inspector", "file": ""}
 
 
 def _states(
@@ -325,7 +296,7 @@ def _states(
     )
     none = np.zeros((len(content.time), 0))
     columns = {name: parts.get(name, none) for name in ("position", "velocity", "effort")}
-    zero = start_stamp(content)
+    zero = _start_stamp(content)
     for sample, at in enumerate(content.time.tolist()):
         stamp = _stamp(zero, at)
         sec, nanosec = divmod(stamp, NANOSECONDS)

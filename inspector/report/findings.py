@@ -5,7 +5,7 @@ of which some may not count. Both are localised by the same words.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -33,8 +33,6 @@ WORDS = {
 }
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}  # how people count them
 LEAST = 0.05  # joints with a smaller share are left out
-# Names of the columns of a localisation.
-LOCALISATION = ("shows first in", "by joints", "band", "links, shares of the excess")
 # Classes of NoisyTest whose names people read as two words.
 SPOKEN = {"highaccelerations": "high accelerations"}
 Item = TypeVar("Item")
@@ -63,31 +61,44 @@ def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
 
 def report(analysis: Analysis) -> str:
     """The report of an analysed run, in Markdown."""
-    run, remark = analysis.run, note(analysis)
-    facts = [
+    found = [sentence(analysis, event, bold="**") for event in analysis.findings]
+    parts = [f"### {spoken(analysis.headline)}", *_bullets(found), facts(analysis)]
+    if analysis.run.blocks:
+        parts += ["**Annotated**", *_bullets(annotated(analysis, bold="**") or ["no failure"])]
+    parts += [note(analysis)]
+    if analysis.remarks:
+        parts += ["**Remarks**", *_bullets(map(spoken, analysis.remarks))]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def _bullets(lines: Iterable[str]) -> list[str]:
+    return ["\n".join(f"- {line}" for line in lines)]
+
+
+def facts(analysis: Analysis) -> str:
+    """What a run is, in a line."""
+    run = analysis.run
+    parts = [
         f"{run.duration:.2f} s at {run.rate:g} Hz",
         counted(len(run.joint_names), "joint"),
         run.robot or "robot not named",
         f"model {analysis.model or 'none'}",
         *(f"{key} {run.meta[key]}" for key in ("scenario", "seed") if key in run.meta),
     ]
-    parts = [
-        f"### {spoken(analysis.headline)}",
-        "\n".join(f"- {sentence(analysis, event, bold='**')}" for event in analysis.findings),
-        f"{analysis.name}: {', '.join(facts)}",
-    ]
-    if run.blocks:
-        lines = [f"- {_annotation(analysis, each)}" for each in run.blocks if each.label != "ok"]
-        parts += ["**Annotated**", "\n".join(lines) or "- no failure"]
-    parts += [remark]
-    if analysis.remarks:
-        parts += ["**Remarks**", "\n".join(f"- {spoken(each)}" for each in analysis.remarks)]
-    return "\n\n".join(filter(None, parts)) + "\n"
+    return f"{analysis.name}: {', '.join(parts)}"
 
 
-def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "") -> str:
-    """Class, time, score, novelty and localisation of an event, in a line of Markdown."""
-    stage, joints, band, links = localised(analysis, event, quote="`")
+def sentence(
+    analysis: Analysis, event: Event | Block, *, bold: str = "", quote: str = "`", found: str = ""
+) -> str:
+    """Class, time, score, novelty and localisation of an event, in a line.
+
+    Args:
+        bold: Mark about the class.
+        quote: Mark about names of stages.
+        found: What became of an annotated failure.
+    """
+    stage, joints, band, links = localised(analysis, event, quote=quote)
     named = {"joints": joints, "loudest links": links, "": band, "first in": stage}
     where = "; ".join(f"{name} {part}".strip() for name, part in named.items() if part)
     sure = ""
@@ -95,7 +106,9 @@ def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "") -> str
         measured = analysis.labels is not None and analysis.labels.novel is not None
         sure = f", score {event.score:.2f}"
         sure += event.novelty or (", in distribution" if measured else "")
-    when = f"{interval(event.start, event.stop)}{sure}"
+    if isinstance(event, Finding) and event.evidence.db is not None:
+        sure += f", {event.evidence}"
+    when = f"{interval(event.start, event.stop)}{found}{sure}"
     return f"{bold}{spoken(event.label)}{bold}, {when}{where and f': {where}'}"
 
 
@@ -106,13 +119,20 @@ def brief(analysis: Analysis, event: Event | Block) -> str:
     return ", ".join(filter(None, [f"{spoken(event.label)} {when}", first]))
 
 
-def _annotation(analysis: Analysis, block: Block) -> str:
-    """An annotated failure and what became of it; where it was found, that says the rest."""
-    when, became = interval(block.start, block.stop), matched(analysis, block)
-    if finding_of(analysis, block) is not None:
-        return f"**{spoken(block.label)}**, {when}: found, {became}"
-    found = f", found {became}" if became not in ("", "no") else ", not found" if became else ""
-    return sentence(analysis, block, bold="**").replace(when, f"{when}{found}", 1)
+def annotated(analysis: Analysis, *, bold: str = "", quote: str = "`") -> list[str]:
+    """Annotated failures and what became of them; where one was found, that says the rest."""
+    lines = []
+    for block in analysis.run.blocks:
+        became = matched(analysis, block)
+        if block.label == "ok":
+            continue
+        if finding_of(analysis, block) is not None:
+            when = interval(block.start, block.stop)
+            lines.append(f"{bold}{spoken(block.label)}{bold}, {when}: found, {became}")
+            continue
+        found = f", found {became}" if became not in ("", "no") else ", not found" if became else ""
+        lines.append(sentence(analysis, block, bold=bold, quote=quote, found=found))
+    return lines
 
 
 def finding_of(analysis: Analysis, block: Block) -> Event | None:
@@ -214,22 +234,6 @@ def failing(verdict: Verdict) -> list[str]:
 def excused(verdict: Verdict) -> list[str]:
     """Sentences on findings that do not."""
     return [told(event, verdict.beside) for event in verdict.excused]
-
-
-def timeline(verdict: Verdict, width: int = 60) -> str:
-    """The findings that fail a run over time as text, a line for each class and joint."""
-    if not verdict.duration:
-        return ""
-    lines: dict[tuple[str, str], list[str]] = {}
-    for event in verdict.failing:
-        where = event.localisation
-        joint = where.joints[0][0] if where and where.joints else event.evidence.joint
-        marks = lines.setdefault((event.label, joint), ["."] * width)
-        times = (event.start - verdict.begin, event.stop - verdict.begin)
-        first, last = (int(width * time / verdict.duration) for time in times)
-        marks[max(first, 0) : last + 1] = "#" * (min(last + 1, width) - max(first, 0))
-    rows = [(*of, f"|{''.join(marks)}| {verdict.duration:.1f} s") for of, marks in lines.items()]
-    return "\n".join(table(rows, gap="  "))
 
 
 # --- of several runs

@@ -1,7 +1,7 @@
 """Verdicts and differences as text, JSON, JUnit XML, GitHub annotations, SARIF and Markdown.
 
-JUnit, GitHub and Markdown are written from a job of cases: a run, a scenario, or a file that cannot
-be read, of verdicts and of differences alike.
+JUnit, GitHub, SARIF and Markdown are written from a job of cases: a run, a scenario, or a file that
+cannot be read, of verdicts and of differences alike.
 """
 
 import hashlib
@@ -9,7 +9,7 @@ import json
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import accumulate
@@ -33,11 +33,10 @@ from inspector.report.findings import (
     groups,
     row,
     table,
-    timeline,
     told,
 )
 from inspector.text import counted, program_version
-from inspector.verdict import UNREAD, Verdict, counts, exit_status
+from inspector.verdict import UNREAD, Finding, Verdict, counts, exit_status
 
 ANNOTATIONS = 10  # GitHub silently drops what goes beyond ten of a kind per step
 COMMENT = 60_000  # most characters of the Markdown: GitHub refuses comments of more than 65,536
@@ -94,7 +93,7 @@ class Case:
     quiet: bool = False  # whether tables leave it out
     picture: Path | None = None
     picture_url: str = ""  # where it will be published
-    timeline: str = ""  # as text, for where there is no picture
+    rules: tuple[tuple[str, dict[str, float]], ...] = ()  # of each sentence, and when, in [s]
 
     @property
     def told(self) -> str:
@@ -110,6 +109,7 @@ class Job:
     summary: str
     counts: Mapping[str, Mapping[str, int]]
     cases: Sequence[Case]
+    exit_status: int
     remarks: tuple[str, ...] = ()
 
     @property
@@ -206,6 +206,81 @@ def _escaped(value: str) -> str:
     return value.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
+def sarif(job: Job) -> str:
+    """Write what fails cases as SARIF 2.1.0, the worst first.
+
+    A result lies in the first line of its case's file: GitHub shows no result without a location.
+    Files that cannot be read and what cannot be told are notifications of the tool.
+    """
+    results = [result for case in job.ranked for result in _results(case)][:RESULTS]
+    rules = [
+        {
+            "id": rule,
+            "shortDescription": {"text": RULES.get(rule) or _described(rule)},
+            "defaultConfiguration": {"level": "error"},
+        }
+        for rule in dict.fromkeys(result["ruleId"] for result in results)
+    ]
+    notes = [
+        {
+            "level": "error" if case.outcome is Outcome.ERROR else "warning",
+            "message": {"text": f"{case.status}: {case.message}"},
+            "locations": [_location(case.path)],
+        }
+        for case in job.ranked
+        if case.outcome in (Outcome.ERROR, Outcome.SKIPPED)
+    ]
+    invocation = {
+        "executionSuccessful": all(case.outcome is not Outcome.ERROR for case in job.cases),
+        "exitCode": job.exit_status,
+        "toolExecutionNotifications": notes,
+    }
+    driver = {"name": "noise-inspector", "version": program_version(), "rules": rules}
+    remark = {"remark": job.remarks[0]} if job.remarks else {}
+    run = {
+        "tool": {"driver": driver},
+        "invocations": [invocation],
+        "results": results,
+        "properties": {"counts": job.counts, **remark},
+    }
+    return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
+
+
+def _results(case: Case) -> Iterator[dict[str, Any]]:
+    """What fails a case, as results of SARIF."""
+    known = _uri(case.path) if case.name == str(case.path) else case.name
+    number = Counter[str]()
+    for sentence, (rule, span) in zip(case.sentences, case.rules, strict=True):
+        number[rule] += 1
+        same = hashlib.sha256(f"{known}:{rule}:{number[rule]}".encode()).hexdigest()[:16]
+        yield {
+            "ruleId": rule,
+            "level": "error",
+            "message": {"text": f"{case.name}: {sentence}"},
+            "locations": [_location(case.path)],
+            "partialFingerprints": {"primaryLocationLineHash": same},
+            "properties": span,
+        }
+
+
+def _location(path: Path) -> dict[str, object]:
+    place = {"artifactLocation": {"uri": _uri(path)}, "region": {"startLine": 1}}
+    return {"physicalLocation": place}
+
+
+def _uri(path: Path) -> str:
+    """Address of a file, relative to the folder of the job if it lies there."""
+    full, here = path.absolute(), Path.cwd()
+    return quote(full.relative_to(here).as_posix()) if full.is_relative_to(here) else full.as_uri()
+
+
+def _described(rule: str) -> str:
+    label = rule.removeprefix("missing-")
+    if label != rule:
+        return f"A required finding of class {label.replace('-', ' ')} was not found."
+    return f"The noise of the joints shows a failure of class {label}."
+
+
 def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
     """Write a job for its summary or a comment: a table, the worst first, and a linked picture.
 
@@ -222,9 +297,6 @@ def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
         named = f"Picture of {_code(worst.name)}: {_code(worst.picture)}."
         drawn = f"![{_cell(worst.name)} over time]({worst.picture_url})"
         tail += [drawn if worst.picture_url else named]
-    sketched = next((case for case in ranked if case.timeline), None)
-    if sketched is not None and (worst is None or not worst.picture_url):
-        tail += ["", f"{_code(sketched.name)} over time:", "```", sketched.timeline, "```"]
     rows = [f"| {_code(case.name)} | {case.words} | {_cell(case.told)} |" for case in shown]
     left = [f"- {_code(case.name)}: {_cell(note)}" for case in ranked for note in case.notes]
     if rows:
@@ -380,96 +452,6 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
     return json.dumps(whole, indent=2)
 
 
-def sarif(verdicts: Sequence[Verdict]) -> str:
-    """Write the findings that count as SARIF 2.1.0, the worst runs first.
-
-    A finding lies in the first line of its run's file: GitHub shows no result without a location.
-    Bad input and what cannot be told are notifications of the tool.
-    """
-    job = _job(verdicts, ())
-    ranked = sorted(each_missing(verdicts), key=lambda verdict: verdict.severity)
-    cases = [(verdict, _case(verdict)) for verdict in ranked]
-    results = [
-        result
-        for verdict, case in cases
-        if case.outcome is Outcome.FAILURE
-        for result in _results(verdict, case)
-    ]
-    rules = [
-        {
-            "id": rule,
-            "shortDescription": {"text": RULES.get(rule) or _described(rule)},
-            "defaultConfiguration": {"level": "error"},
-        }
-        for rule in dict.fromkeys(result["ruleId"] for result in results)
-    ]
-    notes = [
-        {
-            "level": "error" if case.outcome is Outcome.ERROR else "warning",
-            "message": {"text": f"{case.status}: {case.message}"},
-            "locations": [_location(case.path)],
-        }
-        for _, case in cases
-        if case.outcome in (Outcome.ERROR, Outcome.SKIPPED)
-    ]
-    driver = {"name": "noise-inspector", "version": program_version(), "rules": rules}
-    invocation = {
-        "executionSuccessful": all(case.outcome is not Outcome.ERROR for _, case in cases),
-        "exitCode": exit_status(verdicts),
-        "toolExecutionNotifications": notes,
-    }
-    run = {
-        "tool": {"driver": driver},
-        "invocations": [invocation],
-        "results": results[:RESULTS],
-        "properties": {"counts": job.counts, **({"remark": IGNORED} if job.remarks else {})},
-    }
-    return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
-
-
-def _results(verdict: Verdict, case: Case) -> Iterator[dict[str, Any]]:
-    """What fails a run, as results of SARIF."""
-    known, number = _uri(verdict.path) if verdict.of_run else case.name, Counter[str]()
-    facts: list[tuple[str, str, dict[str, float]]] = [
-        (
-            each.label,
-            told(each, verdict.beside),
-            {"start": round(each.start, 6), "stop": round(each.stop, 6)},
-        )
-        for each in verdict.failing
-    ]
-    facts += [(each.rule, str(each), {}) for each in verdict.missing]
-    for rule, sentence, span in facts:
-        number[rule] += 1
-        same = hashlib.sha256(f"{known}:{rule}:{number[rule]}".encode()).hexdigest()[:16]
-        yield {
-            "ruleId": rule,
-            "level": "error",
-            "message": {"text": f"{case.name}: {sentence}"},
-            "locations": [_location(verdict.path)],
-            "partialFingerprints": {"primaryLocationLineHash": same},
-            "properties": span,
-        }
-
-
-def _location(path: Path) -> dict[str, object]:
-    place = {"artifactLocation": {"uri": _uri(path)}, "region": {"startLine": 1}}
-    return {"physicalLocation": place}
-
-
-def _uri(path: Path) -> str:
-    """Address of a file, relative to the folder of the job if it lies there."""
-    full, here = path.absolute(), Path.cwd()
-    return quote(full.relative_to(here).as_posix()) if full.is_relative_to(here) else full.as_uri()
-
-
-def _described(rule: str) -> str:
-    label = rule.removeprefix("missing-")
-    if label != rule:
-        return f"A required finding of class {label.replace('-', ' ')} was not found."
-    return f"The noise of the joints shows a failure of class {label}."
-
-
 def _case(verdict: Verdict) -> Case:
     """A run as a case, or a scenario that has no log."""
     absent = None if verdict.of_run else verdict.missing[0]
@@ -485,6 +467,10 @@ def _case(verdict: Verdict) -> Case:
         rank=verdict.severity,
         kind=kind,
         sentences=tuple(failing(verdict)),
+        rules=(
+            *((each.label, _span(each)) for each in verdict.failing),
+            *((each.rule, {}) for each in verdict.missing),
+        ),
         message=verdict.message,
         notes=tuple(excused(verdict)),
         trace=verdict.trace,
@@ -493,6 +479,10 @@ def _case(verdict: Verdict) -> Case:
         picture=verdict.picture,
         picture_url=verdict.picture_url,
     )
+
+
+def _span(event: Finding) -> dict[str, float]:
+    return {"start": round(event.start, 6), "stop": round(event.stop, 6)}
 
 
 def _of_group(group: Group) -> Case:
@@ -504,27 +494,31 @@ def _of_group(group: Group) -> Case:
         words=group.words,
         sentences=(*(told(*each) for each in group.found(fails=True)), *group.missing),
         notes=tuple(told(*each) for each in group.found(fails=False)),
-        timeline=timeline(group.worst),
         picture=drawn.picture,
         picture_url=drawn.picture_url,
     )
 
 
-def _job(verdicts: Sequence[Verdict], cases: Sequence[Case]) -> Job:
-    ignoring = any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
-    return Job("Noise", summary(verdicts), counts(verdicts), cases, (IGNORED,) if ignoring else ())
+def _job(verdicts: Sequence[Verdict], cases: Iterable[Case]) -> Job:
+    remarks = (IGNORED,) if any(each.unknown is Unknown.IGNORE for each in verdicts) else ()
+    number, status = counts(verdicts), exit_status(verdicts)
+    return Job("Noise", summary(verdicts), number, tuple(cases), status, remarks)
+
+
+def _by_run(verdicts: Sequence[Verdict]) -> Job:
+    return _job(verdicts, map(_case, each_missing(verdicts)))
 
 
 def _by_scenario(verdicts: Sequence[Verdict]) -> Job:
-    return _job(verdicts, [_of_group(group) for group in groups(verdicts)])
+    return _job(verdicts, map(_of_group, groups(verdicts)))
 
 
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
     "text": text,
     "json": as_json,
-    "junit": lambda verdicts: junit(_job(verdicts, list(map(_case, each_missing(verdicts))))),
+    "junit": lambda verdicts: junit(_by_run(verdicts)),
     "github": lambda verdicts: github(_by_scenario(verdicts)),
-    "sarif": sarif,
+    "sarif": lambda verdicts: sarif(_by_run(verdicts)),
     "markdown": lambda verdicts: markdown(
         _by_scenario(verdicts),
         head="| scenario | status | findings |",
@@ -700,7 +694,8 @@ def _of_difference(found: Difference) -> Job:
         )
         for each in found.failed
     ]
-    return Job("Noise beside the runs before", _diff_summary(found), _diff_counts(found), cases)
+    number, status = _diff_counts(found), found.exit_status
+    return Job("Noise beside the runs before", _diff_summary(found), number, cases, status)
 
 
 def _of_row(found: Difference, of: diff.Row, place: int) -> Case:

@@ -7,8 +7,8 @@ import hashlib
 import re
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -16,27 +16,16 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from inspector.analysis import Analysis
-from inspector.colors import of_classes
 from inspector.errors import Status
 from inspector.export.sound import clip, worst_time
 from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
-from inspector.report.findings import (
-    COUNTED,
-    LOCALISATION,
-    excused,
-    failing,
-    localised,
-    matched,
-    note,
-    spoken,
-)
+from inspector.report import findings
+from inspector.report.findings import COUNTED, excused, failing, spoken
 from inspector.report.formats import summary
 from inspector.report.picture import picture, require
-from inspector.verdict import Finding, Verdict
-from noiseclassifier import Event
-from noisemodel import Block
-from noisemodel.files import replacing
+from inspector.verdict import Verdict
+from noisemodel.files import write_whole
 from noisemodel.noise import REFERENCE_POWER, decibel, vibrating_pieces
 from noisemodel.types import Array
 
@@ -57,29 +46,15 @@ audio { width: 100%; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid #d0d7de; }
 th { font-weight: 600; }
-td.number, th.number { text-align: right; }
 li { margin: .2rem 0; }
 """
 MOST = 20  # links and joints that are listed, the loudest first
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table: title, head and the note below may be empty; `numbers` are columns of numbers."""
-
-    title: str
-    head: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-    numbers: tuple[int, ...] = ()
-    note: str = ""
-
-
 def write(analysis: Analysis, path: Path, *, overwrite: bool = False, **shown: Any) -> None:
     """Write the page of an inspected run, whole or not at all; see `page`."""
     require("a report")
-    text = page(analysis, **shown)
-    with replacing(path, overwrite=overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_whole(path, page(analysis, **shown), overwrite=overwrite)
 
 
 def page(
@@ -90,7 +65,7 @@ def page(
     beside: Comparison | None = None,
     floor: float | None = None,
 ) -> str:
-    """Write the page of an inspected run.
+    """Write the page of an inspected run; it says the same as `findings.report`.
 
     Args:
         audit: What the log can show, a line each; may be empty.
@@ -100,20 +75,23 @@ def page(
     html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
     add_text(body, "p", spoken(analysis.headline), "verdict")
+    add_text(body, "p", findings.facts(analysis), "note")
     if verdict is not None and verdict.beside is not None:
         add_text(body, "p", f"Reference: {verdict.beside.path}, {verdict.beside.words}.", "note")
-    for table in (facts(analysis), *found(analysis)):
-        _add_table(body, table)
+    found = [findings.sentence(analysis, event, quote="") for event in analysis.findings]
+    _add_list(body, "Findings", found)
+    _add_list(body, "Annotated", findings.annotated(analysis, quote=""))
+    if remark := findings.note(analysis):
+        add_text(body, "p", remark, "note")
     if verdict is not None:
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
         _add_list(body, "Does not count", excused(verdict))
     add_text(body, "h2", "Over time")
     image = f"data:image/png;base64,{_encoded(picture(analysis, beside, floor=floor))}"
     described = f"Noise, classes and spectrograms over {analysis.run.duration:.2f} s"
-    ET.SubElement(body, "img", src=image, alt=f"{described}; the tables have the findings")
+    ET.SubElement(body, "img", src=image, alt=f"{described}; the lists have the findings")
     _add_sound(body, analysis)
-    for table in parts(analysis):
-        _add_table(body, table)
+    _add_parts(body, analysis)
     _add_list(body, "What the log can show", audit.splitlines())
     _add_list(body, "Remarks", [spoken(remark) for remark in analysis.remarks])
     made = (
@@ -152,23 +130,16 @@ def written(html: ET.Element) -> str:
     return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
 
 
-def _add_table(body: ET.Element, table: Table) -> None:
-    if table.title:
-        add_text(body, "h2", table.title)
+def _add_table(body: ET.Element, head: Sequence[str], rows: Sequence[Sequence[str]]) -> ET.Element:
+    """Add a table; returns its body."""
     frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
-
-    def add_row(parent: ET.Element, tag: str, cells: Sequence[str]) -> None:
-        row = ET.SubElement(parent, "tr")
-        for place, cell in enumerate(cells):
-            add_text(row, tag, cell, "number" if place in table.numbers else "")
-
-    if any(table.head):
-        add_row(ET.SubElement(frame, "thead"), "th", table.head)
-    rows = ET.SubElement(frame, "tbody")
-    for cells in table.rows:
-        add_row(rows, "td", cells)
-    if table.note:
-        add_text(body, "p", table.note, "note")
+    parts = [ET.SubElement(frame, tag) for tag in ("thead", "tbody")]
+    for part, tag, lines in zip(parts, ("th", "td"), ([head], rows), strict=True):
+        for cells in lines:
+            row = ET.SubElement(part, "tr")
+            for cell in cells:
+                add_text(row, tag, cell)
+    return parts[1]
 
 
 def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
@@ -195,111 +166,48 @@ def _encoded(data: bytes) -> str:
     return b64encode(data).decode("ascii")
 
 
-# --- tables
+# --- links and joints
 
 
-def facts(analysis: Analysis) -> Table:
-    """List what the run is."""
-    run = analysis.run
-    rows = [
-        ("robot", run.robot or "not named"),
-        ("duration", f"{run.duration:.2f} s at {run.rate:g} Hz"),
-        ("joints", str(len(run.joint_names))),
-        ("model", analysis.model or "none"),
-    ]
-    for key in ("scenario", "seed", "source"):
-        if key in run.meta:
-            value = run.meta[key]
-            rows.append(
-                (key, ", ".join(map(str, value)) if isinstance(value, list) else str(value))
-            )
-    return Table("", ("", ""), rows)
-
-
-def found(analysis: Analysis) -> Iterator[Table]:
-    """List findings and annotated blocks, those that there are."""
-    remark, times = note(analysis), ("class", "from [s]", "to [s]")
-    if analysis.findings:
-        findings = []
-        for event in analysis.findings:
-            evidence = [str(event.evidence)] if isinstance(event, Finding) else []
-            cells = (*_span(event), f"{event.score:.2f}", *localised(analysis, event), *evidence)
-            findings.append((f"{spoken(event.label)}{event.novelty}", *cells))
-        beside = ("evidence",) if isinstance(analysis.findings[0], Finding) else ()
-        head = (*times, "score", *LOCALISATION, *beside)
-        yield Table("Findings", head, findings, (1, 2, 3), remark)
-    if analysis.run.blocks:
-        annotated = [
-            (spoken(each.label), *_span(each), matched(analysis, each), *localised(analysis, each))
-            for each in analysis.run.blocks
-        ]
-        head = (*times, "found", *LOCALISATION)
-        yield Table("Annotated", head, annotated, (1, 2), "" if analysis.findings else remark)
-
-
-def _span(of: Event | Block) -> tuple[str, str]:
-    return f"{of.start:.2f}", f"{of.stop:.2f}"
-
-
-def parts(analysis: Analysis) -> Iterator[Table]:
-    """List links and joints by what vibrates in them."""
-    links = analysis.links
+def _add_parts(body: ET.Element, analysis: Analysis) -> None:
+    """Rank links and joints by what vibrates in them."""
+    run, links = analysis.run, analysis.links
     if links is not None:
         peaks = links.vibration.max(axis=0, initial=0.0)
         levels = decibel(np.maximum(peaks, REFERENCE_POWER) / REFERENCE_POWER)
-        when = links.time[links.vibration.argmax(axis=0)]
-        yield _ranked(
-            "Links",
-            ("link", "share", "peak [dB re 1 pW]", "at [s]"),
-            links.links,
-            links.vibration.sum(axis=0),
-            [(f"{level:.1f}", f"{time:.2f}") for level, time in zip(levels, when, strict=True)],
-            "Sound power of the measured motion above 10 Hz, normal to the surface.",
-        )
-    run = analysis.run
-    energy, highest, places = (np.zeros(len(run.joint_names)) for _ in range(3))
-    for rows, fast in vibrating_pieces(run.velocity, run.mask, run.rate):
-        power = np.square(fast)
-        energy += power.sum(axis=0)
-        louder = power.max(axis=0) > highest
-        places = np.where(louder, rows.start + power.argmax(axis=0), places)
-        highest = np.maximum(highest, power.max(axis=0))
-    each = zip(
-        np.sqrt(energy / len(run.time)),
-        np.sqrt(highest),
-        run.time[places.astype(int)],
-        strict=True,
-    )
-    yield _ranked(
-        "Joints",
-        ("joint", "share", "rms [rad/s]", "peak [rad/s]", "at [s]"),
-        run.joint_names,
-        energy,
-        [(f"{rms:.3g}", f"{peak:.3g}", f"{time:.3f}") for rms, peak, time in each],
-        "Measured velocity above 10 Hz; of joints that slide in [m/s].",
-    )
+        power, head = links.vibration.sum(axis=0), ("link", "share", "peak [dB re 1 pW]")
+        told = "Sound power of the measured motion above 10 Hz, normal to the surface."
+        _add_ranked(body, "Links", links.links, power, [f"{each:.1f}" for each in levels], head)
+        add_text(body, "p", told, "note")
+    energy = np.zeros(len(run.joint_names))
+    for _, fast in vibrating_pieces(run.velocity, run.mask, run.rate):
+        energy += np.square(fast).sum(axis=0)
+    rms = [f"{each:.3g}" for each in np.sqrt(energy / len(run.time))]
+    _add_ranked(body, "Joints", run.joint_names, energy, rms, ("joint", "share", "rms [rad/s]"))
+    add_text(body, "p", "Measured velocity above 10 Hz; of joints that slide in [m/s].", "note")
 
 
-def _ranked(
+def _add_ranked(
+    body: ET.Element,
     title: str,
-    head: tuple[str, ...],
     names: Sequence[str],
     power: Array,
-    facts: Sequence[tuple[str, ...]],
-    note: str,
-) -> Table:
-    """Rows of parts by their power, and how many are left out."""
+    levels: Sequence[str],
+    head: Sequence[str],
+) -> None:
+    """Add a table of parts, the loudest first, and how many are left out."""
     share = power / (power.sum() or 1.0)
     order = np.argsort(-power, kind="stable")[:MOST]
-    rows = [(names[i], f"{share[i]:.1%}", *facts[i]) for i in order]
-    left = len(names) - len(order)
-    note = f"{note} {left} quieter ones are left out." if left else note
-    return Table(title, head, rows, tuple(range(1, len(head))), note)
+    add_text(body, "h2", title)
+    _add_table(body, head, [(names[i], f"{share[i]:.1%}", levels[i]) for i in order])
+    if left := len(names) - len(order):
+        add_text(body, "p", f"{left} quieter ones are left out.", "note")
 
+
+# --- the page of many runs
 
 PAGE = "index.html"
 PICTURES = "pictures"
-WIDTH = 1000  # width of a timeline, in units of its own
 # Policy for browsers: nothing but the pictures is fetched, also from a page on a disk.
 INDEX_POLICY = "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'"
 ROWS = """
@@ -312,8 +220,6 @@ body { max-width: 82rem; color: var(--ink); background: var(--back); }
 th, td { border-color: var(--line); vertical-align: top; }
 td:last-child, th:last-child { padding-right: 0; }
 a { color: inherit; text-underline-offset: .15em; }
-.counts a { display: inline-block; margin: 0 .6rem .6rem 0; text-decoration: none; }
-.counts strong { font-size: 1.5rem; margin-right: .3rem; font-variant-numeric: tabular-nums; }
 .status { display: inline-block; border: 2px solid; border-radius: .4rem; padding: 0 .5rem;
   font-weight: 600; white-space: nowrap; }
 .internal-error, .bad-input { color: var(--bad); border-style: dashed; }
@@ -321,19 +227,12 @@ a { color: inherit; text-underline-offset: .15em; }
 .ok { color: var(--good); }
 table { width: 100%; }
 td.run, td.told { overflow-wrap: anywhere; }
-td.told { max-width: 26rem; }
-td.line { width: 15rem; }
-svg { display: block; width: 15rem; height: 1.1rem; margin-top: .2rem;
-  border: 1px solid var(--dim); }
-svg .missing { fill: none; stroke: var(--ink); stroke-width: 2; stroke-dasharray: 4 3; }
-svg .excused { opacity: .45; }
-svg line, svg rect { vector-effect: non-scaling-stroke; }
 section { display: grid; grid-template-columns: minmax(0, 2fr) minmax(0, 3fr); gap: 0 1.5rem;
   border-top: 1px solid var(--line); padding: 1rem 0; break-inside: avoid; }
 section h2 { margin: 0 0 .4rem; overflow-wrap: anywhere; }
 section p { margin: .2rem 0; overflow-wrap: anywhere; }
 section img { background: #fff; border-radius: .2rem; }
-@media (max-width: 60rem) { section { display: block; } td.line, th.line { display: none; } }
+@media (max-width: 60rem) { section { display: block; } }
 """
 
 
@@ -346,8 +245,7 @@ def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, fol
     name = re.sub(r"[^\w.-]", "_", path.stem)[:80]
     (folder / PICTURES).mkdir(exist_ok=True)
     target = folder / PICTURES / f"{name}-{hashlib.sha256(str(path).encode()).hexdigest()[:8]}.png"
-    with replacing(target, overwrite=True) as temporary:
-        temporary.write_bytes(picture(analysis, beside))
+    write_whole(target, picture(analysis, beside), overwrite=True)
     return target
 
 
@@ -358,17 +256,13 @@ def with_picture(verdict: Verdict, folder: Path) -> Verdict:
         return replace(verdict, picture=None)
     (folder / PICTURES).mkdir(exist_ok=True)
     target = folder / PICTURES / picture.name
-    with replacing(target, overwrite=True) as temporary:
-        temporary.write_bytes(picture.read_bytes())
+    write_whole(target, picture.read_bytes(), overwrite=True)
     return replace(verdict, picture=target)
 
 
-def write_index(verdicts: Sequence[Verdict], folder: Path) -> Path:
+def write_index(verdicts: Sequence[Verdict], folder: Path) -> None:
     """Write the page, whole or not at all."""
-    path = folder / PAGE
-    with replacing(path, overwrite=True) as temporary:
-        temporary.write_text(index_page(verdicts), encoding="utf-8")
-    return path
+    write_whole(folder / PAGE, index_page(verdicts), overwrite=True)
 
 
 def index_page(verdicts: Sequence[Verdict]) -> str:
@@ -377,35 +271,18 @@ def index_page(verdicts: Sequence[Verdict]) -> str:
     add_text(body, "h1", "Noise of the joints")
     add_text(body, "p", summary(verdicts), "verdict")
     ranked = sorted(verdicts, key=lambda each: each.severity)
-    _add_counts(body, ranked)
     # What is so of all runs that a model could label, if they are several, is said once.
     first, *others = [_facts(each) for each in ranked if each.model] or [[]]
     shared = [fact for fact in first if others and all(fact in facts for facts in others)]
     for fact in shared:
         add_text(body, "p", fact, "note")
-    table = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
-    head = ET.SubElement(ET.SubElement(table, "thead"), "tr")
-    for name, kind in (("status", ""), ("run", ""), ("findings", ""), ("over time", "line")):
-        add_text(head, "th", name, kind)
-    rows = ET.SubElement(table, "tbody")
+    rows = _add_table(body, ("status", "run", "findings"), ())
     for number, verdict in enumerate(ranked, 1):
         _add_row(rows, verdict, number)
     add_text(body, "h2", "Pictures")
     for number, verdict in enumerate(ranked, 1):
         _add_run(body, verdict, number, shared)
     return written(html)
-
-
-def _add_counts(body: ET.Element, ranked: Sequence[Verdict]) -> None:
-    """Add the number of runs of each status, a link to the first of them."""
-    line = ET.SubElement(body, "p", {"class": "counts"})
-    runs = [(number, each.status) for number, each in enumerate(ranked, 1) if each.of_run]
-    first = {status: number for number, status in reversed(runs)}
-    for status, number in sorted(first.items(), key=lambda item: item[1]):
-        link = ET.SubElement(line, "a", href=f"#run-{number}")
-        badge = ET.SubElement(link, "span", {"class": f"status {status}"})
-        number_of = str(sum(each is status for _, each in runs))
-        add_text(badge, "strong", number_of).tail = COUNTED[status]
 
 
 def _facts(verdict: Verdict) -> list[str]:
@@ -435,35 +312,6 @@ def _add_row(rows: ET.Element, verdict: Verdict, number: int) -> None:
     cell = add_text(row, "td", verdict.message if failed else ", ".join(told), "told")
     if verdict.beside is not None:
         add_text(cell, "p", _judged_by(verdict), "note")
-    _add_timeline(ET.SubElement(row, "td", {"class": "line"}), verdict)
-
-
-def _add_timeline(cell: ET.Element, verdict: Verdict) -> None:
-    """Draw the findings of a run from its start to its end."""
-    if not verdict.duration or not verdict.model:
-        return
-    shades = of_classes(tuple(dict.fromkeys(event.label for event in verdict.events)))
-    box = {"viewBox": f"0 0 {WIDTH} 10", "preserveAspectRatio": "none", "role": "img"}
-    drawn = ET.SubElement(cell, "svg", box)
-    sentences = [*failing(verdict), *excused(verdict)]
-    told = f"{verdict.duration:.2f} s: {'; '.join(sentences) or 'no finding'}"
-    add_text(drawn, "title", told)
-    scale = WIDTH / verdict.duration
-    spans = [
-        (event.start, event.stop, "" if event.fails else "excused", event.label)
-        for event in verdict.events
-    ]
-    spans += [
-        (each.start, each.stop or each.start, "missing", "")
-        for each in verdict.missing
-        if each.start is not None
-    ]
-    for start, stop, kind, label in spans:
-        left, width = (start - verdict.begin) * scale, max((stop - start) * scale, 4.0)
-        place = {"x": f"{left:.1f}", "width": f"{width:.1f}", "y": "0", "height": "10"}
-        place |= {"class": kind} if kind else {}
-        place |= {"fill": "#{:02x}{:02x}{:02x}".format(*shades[label][:3])} if label else {}
-        ET.SubElement(drawn, "rect", place)
 
 
 def _add_run(body: ET.Element, verdict: Verdict, number: int, shared: Sequence[str]) -> None:
