@@ -120,11 +120,11 @@ def test_findings_are_those_that_classify_reports(folder, tmp_path):
 
 def test_runs_below_the_rate_of_the_model_are_listed_as_not_answered(folder, tmp_path):
     slow = simulated(tmp_path / "slow.npz", 40, robot="a1", rate=200)
-    report = tmp_path / "report.json"
-    status, out, err = call("evaluate", folder / "model.npz", folder / "test", slow, "-o", report)
+    both = "evaluate", folder / "model.npz", folder / "test", slow
+    status, out, err = call(*both)
     assert (status, err) == (0, "")
     assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of 1 robot (a1)" in out
-    (listed,) = json.loads(report.read_text())["protocol"]["unanswered"]
+    (listed,) = json.loads(call(*both, "--json")[1])["protocol"]["unanswered"]
     assert (listed["run"], listed["robot"]) == ("slow", "a1")
     status, _, err = call("evaluate", folder / "model.npz", slow)
     assert (status, err.count("\n")) == (3, 1)

@@ -114,9 +114,9 @@ def test_the_best_points_are_printed_as_a_table(whole):
 
 
 def test_json_is_printed_for_programs(data, whole):
-    status, out, _ = tune(data, whole[0], "--json", "--rows", 3)
+    status, out, _ = tune(data, whole[0], "--json")
     report = json.loads(out)
-    assert (status, report["points"], len(report["best"])) == (0, 12, 3)
+    assert (status, report["points"], len(report["best"])) == (0, 12, 10)
     assert report["best"][0] in lines(whole[0])
     assert report["profile"]["gamma"] == report["best"][0]["gamma"]
 
@@ -241,17 +241,10 @@ def refused(data, output, *more, grid=GRID, code=3):
     return err
 
 
-@pytest.mark.parametrize(
-    ("more", "reason"),
-    [
-        (("--grid", "C=1"), "holds results of another grid (regularization differs)"),
-        (("--grid", "floor=1e-3"), "holds results of another grid (floor differs)"),
-    ],
-)
-def test_results_of_another_grid_are_refused(data, whole, tmp_path, more, reason):
-    output = tmp_path / "tuned.jsonl"
+def test_results_of_another_grid_are_refused(data, whole, tmp_path):
+    output, more = tmp_path / "tuned.jsonl", ("--grid", "C=1")
     output.write_bytes(whole[0].read_bytes())
-    assert reason in refused(data, output, *more)
+    assert "holds results of another grid;" in refused(data, output, *more)
     assert output.read_bytes() == whole[0].read_bytes()
     assert tune(data, output, *more, "--overwrite")[0] == 0
 
@@ -264,7 +257,7 @@ def test_results_of_other_annotations_are_refused(data, whole, tmp_path):
     arguments = ("--validation", tmp_path, *OPTIONS, *GRID, "-o", whole[0])
     status, _, err = call("tune", data / "training", *arguments)
     assert status == 3
-    assert "holds results of another validation set (walk5 differs)" in err
+    assert "holds results of another validation set;" in err
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,6 @@ from inspector.commands import shared
 from inspector.commands.shared import argument, opened, option
 from inspector.errors import EXIT, InspectorError, Status
 from inspector.export import sound as sonification
-from inspector.export.sound import of_recording, worst_time
 from inspector.library import Library, demo_run, load_library
 from inspector.logs.read import Opened, Reading
 from inspector.reference.judging import Comparison
@@ -161,7 +160,7 @@ def _picture(run: Path, output: Path, request: Request) -> None:
                 )
             found, _, beside = _analysed(source, request)
             recording = Path(folder) / "run.rrd"
-            seconds = worst_time(found) if at is None else at
+            seconds = sonification.worst_time(found) if at is None else at
             write(found, recording, floor=request.floor, beside=beside)
         complaints = viewer.shoot(recording, output, seconds, overwrite=request.overwrite)
     typer.echo(f"{output}: {run} at {seconds:.2f} s")
@@ -219,7 +218,7 @@ def _one(runs: list[Opened], target: Path, request: Request) -> float:
 
     (run,) = runs
     found, verdict, beside = _analysed(run, request)
-    floor, overwrite, sound = request.floor, request.overwrite, of_recording(found)
+    floor, overwrite, sound = request.floor, request.overwrite, sonification.of_recording(found)
     write(found, target, overwrite=overwrite, sound=sound, floor=floor, beside=beside)
     typer.echo(f"{run.source.shown}: {found.headline}")
     if verdict is None:
@@ -229,7 +228,7 @@ def _one(runs: list[Opened], target: Path, request: Request) -> float:
         lines += [f"beside {verdict.beside.path}: {verdict.beside.words}"] if verdict.beside else []
     for line in (*lines, *found.remarks):
         typer.echo(f"  {line}")
-    return worst_time(found)
+    return sonification.worst_time(found)
 
 
 def _two(runs: list[Opened], target: Path, request: Request) -> None:
@@ -365,24 +364,21 @@ def listen(
     output: Annotated[
         Path, option("WAV file; several get .a, .b ... in its name.", "--output", "-o")
     ],
-    kind: Annotated[str, option("simplified (of joints), normal or rms (of links).")] = "",
     joint: Annotated[str, option("The noise of this joint only.")] = "",
-    link: Annotated[str, option("The noise of this link only.")] = "",
     gain: Annotated[
         float | None,
-        option("In dB; at 0, full scale is 1 rad/s (or √W). By default, the peak fits."),
+        option("In dB; at 0, full scale is 1 rad/s. By default, the peak fits."),
     ] = None,
     speed: Annotated[float, option("Playback speed; the pitch changes by the same factor.")] = 1.0,
     overwrite: shared.Overwrite = False,
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
     shared.one_at_a_time(ctx.obj, len(runs))
-    settings = sonification.Settings(kind, joint, link, speed)
     paths = sonification.output_paths(output, len(runs), overwrite=overwrite)
     recorded = [opened(run, ctx.obj).run for run in runs]
     for each in recorded:
         shared.say_warnings(each)
-    sounds = [sonification.sonify(each, settings) for each in recorded]
+    sounds = [sonification.sonify(each, joint=joint, speed=speed) for each in recorded]
     level = sonification.common_gain(sounds) if gain is None else gain
     sonification.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
     for run, path, sound in zip(runs, paths, sounds, strict=True):

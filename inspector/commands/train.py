@@ -1,5 +1,6 @@
 """Commands on models: `train`, `tune` and `evaluate`."""
 
+from json import dumps
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -7,6 +8,12 @@ import typer
 
 from inspector.commands import shared
 from inspector.commands.shared import argument, option
+from inspector.library import model_files
+from inspector.report.picture import require
+from inspector.training import train as training
+from inspector.training import tune as tuning
+from noiseclassifier.assessment import table
+from noisemodel.files import refuse_existing
 
 
 def train(
@@ -30,22 +37,13 @@ def train(
     overwrite: shared.Overwrite = False,
 ) -> None:
     """Train a model on annotated runs."""
-    from inspector.training.train import train as train_model
-
-    measures, left_out = train_model(inputs, profile, rate, output, part=part, overwrite=overwrite)
+    measures, left_out = training.train(
+        inputs, profile, rate, output, part=part, overwrite=overwrite
+    )
     typer.echo(f"{measures}\n{left_out}")
     typer.echo(f"{output}: written; the measures above are of the training frames")
 
 
-# Options of tune, which has too many to be read between its name and what it does.
-Validation = Annotated[
-    list[Path] | None, option("Runs of a validation set, instead of folds; repeatable.")
-]
-Folds = Annotated[int | None, option("Folds of the cross-validation.", min=2, show_default="5")]
-ProfileName = Annotated[
-    str,
-    option("logbands, noisytest-rbf, noisytest-linear, paper-rbf or paper-linear."),
-]
 Grid = Annotated[
     list[str] | None,
     option(
@@ -54,6 +52,8 @@ Grid = Annotated[
         show_default="paper",
     ),
 ]
+
+
 GridPicture = Annotated[
     Path | None,
     option(
@@ -69,10 +69,16 @@ def tune(
         Path,
         option("Results file, one line of JSON per point; resumes if it exists.", "--output", "-o"),
     ],
-    validation: Validation = None,
-    folds: Folds = None,
+    validation: Annotated[
+        list[Path] | None, option("Runs of a validation set, instead of folds; repeatable.")
+    ] = None,
+    folds: Annotated[
+        int | None, option("Folds of the cross-validation.", min=2, show_default="5")
+    ] = None,
     part: shared.InPart = "all",
-    profile: ProfileName = "noisytest-rbf",
+    profile: Annotated[
+        str, option("logbands, noisytest-rbf, noisytest-linear, paper-rbf or paper-linear.")
+    ] = "noisytest-rbf",
     rate: Annotated[
         float, option("Rate of the model in [Hz]; faster runs are decimated.", min=1.0)
     ] = 10000.0,
@@ -85,7 +91,6 @@ def tune(
         Path | None, option("Train the best point on all training runs, write the model.")
     ] = None,
     picture: GridPicture = None,
-    rows: Annotated[int, option("Number of points to print.", min=1)] = 10,
     as_json: shared.AsJson = False,
     jobs: shared.NumberOfJobs = 1,
     dask: shared.Dask = "",
@@ -94,17 +99,10 @@ def tune(
     """Tune a profile's settings by grid search; resumes if killed."""
     if validation and folds:
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
-    from json import dumps
-
-    from inspector.report.picture import require
-    from inspector.training.tune import Search
-    from inspector.training.tune import tune as tune_profile
-    from noisemodel.files import refuse_existing
-
     if picture:
         refuse_existing(picture, overwrite=overwrite)
         require()
-    search = Search(
+    search = tuning.Search(
         training=training,
         validation=validation or (),
         part=part,
@@ -114,9 +112,8 @@ def tune(
         grid=grid or ("paper",),
     )
     where = shared.jobs_or_dask(jobs, dask)
-    tuned = tune_profile(search, output, model=train, jobs=where, overwrite=overwrite)
-    report = dumps(tuned.as_dict(criterion, rows=rows), indent=2)
-    typer.echo(report if as_json else tuned.table(criterion, rows=rows))
+    tuned = tuning.tune(search, output, model=train, jobs=where, overwrite=overwrite)
+    typer.echo(dumps(tuned.as_dict(criterion), indent=2) if as_json else tuned.table(criterion))
     if picture:
         tuned.draw(picture, criterion, overwrite=overwrite)
     if train:
@@ -128,7 +125,6 @@ def evaluate(
     model: Annotated[Path, argument("A model file, or the name of a shipped one.")],
     inputs: shared.Inputs,
     as_json: shared.AsJson = False,
-    output: Annotated[Path | None, option("Write JSON to this file.", "--output", "-o")] = None,
     part: shared.InPart = "all",
     by: Annotated[
         Literal["robot", "domain", "scenario"] | None,
@@ -138,19 +134,8 @@ def evaluate(
         bool,
         option("Accept runs that the model was trained on; the report lists them.", "--seen-too"),
     ] = False,
-    overwrite: shared.Overwrite = False,
 ) -> None:
     """Evaluate a model on annotated runs that it was not trained on."""
-    from inspector.library import model_files
-    from inspector.training import train as training
-    from noiseclassifier.assessment import table
-    from noisemodel.files import refuse_existing, write_whole
-
-    if output:
-        refuse_existing(output, overwrite=overwrite)
     (file,) = model_files([model])
     report = training.evaluate(file, inputs, part=part, seen_too=seen_too)
-    text = training.as_json(report, file)
-    if output:
-        write_whole(output, f"{text}\n", overwrite=overwrite)
-    typer.echo(text if as_json else table(report, by or ""))
+    typer.echo(training.as_json(report, file) if as_json else table(report, by or ""))

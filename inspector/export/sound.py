@@ -2,13 +2,8 @@
 
 The noise itself cannot be played. It is a norm, p_hat = sqrt(sum of v²), and always positive: a
 joint that oscillates about zero at 100 Hz would sound at 200 Hz, and one that oscillates about a
-steady motion at 100 Hz. The signals under the root are played instead, with their signs:
-
-- *simplified*: the velocities of the joints, measured and desired, and of a floating base;
-- *rms*, *normal*: a link's power is a quadratic form of its twist, P = rho c S nu' M nu. With
-  M = W' W the six signals sqrt(rho c S) W nu have squares that add up to it.
-
-The other kinds of the extended noise are sums of norms and have no such signals.
+steady motion at 100 Hz. The signals under the root are played instead, with their signs: the
+velocities of the joints, measured and desired, and of a floating base.
 
 In a plain sum two joints that oscillate in antiphase would cancel, but not in the noise. So the
 powers of the signals are added in every window and frequency bin, with the phase of the loudest
@@ -27,18 +22,16 @@ import numpy as np
 from numpy import fft
 
 import noisemodel as nm
-from inspector.analysis import Analysis, robot_known, worst
+from inspector.analysis import Analysis, worst
 from inspector.errors import InspectorError, OptionError
 from inspector.text import plain
-from noisemodel.files import refuse_existing, replacing
-from noisemodel.noise import DENSITY, SOUND_SPEED
+from noisemodel.files import refuse_existing, write_whole
 from noisemodel.run import part, stretches
 from noisemodel.types import Array, Mask
 
-PLAYABLE = ("simplified", "normal", "rms")  # kinds of noise that have signed signals
 # Sampling rates of a sound file and of an embedded sound, enough for a log of 10 kHz, in [Hz].
 RATE, SMALL_RATE = 48_000, 16_000
-# Peak below which a sound is silent, in [rad/s] or [√W]: quantisation noise is larger.
+# Peak below which a sound is silent, in [rad/s]: quantisation noise is larger.
 SILENCE = 1e-6
 FULL_SCALE = 32767  # full scale of 16 bits
 HEADROOM_DB = 1.0
@@ -47,21 +40,8 @@ LOWEST_AUDIBLE = 20.0  # lowest audible frequency, in [Hz]
 WINDOW = 0.0256  # length of a window, in [s]: short enough to keep the time of an impact
 FADE = 0.05  # fade at both ends of a stretch without gaps, in [s]: the motion beyond is unknown
 ORDER = 4  # order of the high-pass filter
-CHUNK = 65_536  # number of samples whose twists are computed at once
-# Number of links whose signals are in memory at once: all of 60 links would not fit.
-LINKS_AT_ONCE = 4
 # Largest number of velocities in a clip: 6 s of 32 joints at 10 kHz, within 0.25 s.
 MOST_VELOCITIES = 4_000_000
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What is made audible."""
-
-    kind: str = ""  # of `PLAYABLE`; empty takes "normal" with a link, else "simplified"
-    joint: str = ""  # one joint, of the simplified noise; all if empty
-    link: str = ""  # one link, of the extended noise; all if empty
-    speed: float = 1.0  # factor of the playing speed, and of all frequencies
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +49,16 @@ class Sound:
     """A signed noise signal that can be played."""
 
     what: str
-    signal: Array  # shape (samples,), in [unit]
+    signal: Array  # shape (samples,), in [rad/s]
     rate: float  # of the signal, in [Hz]
     start: float  # of its first sample in the run, in [s]
-    speed: float  # factor of the playing speed
-    unit: str  # "rad/s" or "√W"
+    speed: float  # factor of the playing speed, and of all frequencies
     remarks: tuple[str, ...] = ()  # what is inaudible and why, a sentence each
     playing: int = RATE  # sampling rate of the file, in [Hz]
 
     @cached_property
     def played(self) -> Array:
-        """The signal at playing speed, band-limited and resampled to ``playing``, in [unit]."""
+        """The signal at playing speed, band-limited and resampled to ``playing``, in [rad/s]."""
         size = max(1, round(len(self.signal) * self.playing / (self.rate * self.speed)))
         shared = min(size, len(self.signal)) // 2 + 1  # bins of both; the others are 0
         spectrum = np.zeros(size // 2 + 1, dtype=np.complex128)
@@ -88,7 +67,7 @@ class Sound:
 
     @property
     def peak(self) -> float:
-        """Largest value, in [unit]."""
+        """Largest value, in [rad/s]."""
         return float(np.abs(self.played).max(initial=0.0))
 
     @property
@@ -99,18 +78,18 @@ class Sound:
     def description(self, gain: float) -> str:
         """Duration and gain in [dB] of the sound, and whether it is silent or clipped."""
         factor, seconds = _factor(gain), len(self.signal) / self.rate / self.speed
-        scale = f"gain {gain:+.1f} dB: full scale is {1.0 / factor:.3g} {self.unit}"
+        scale = f"gain {gain:+.1f} dB: full scale is {1.0 / factor:.3g} rad/s"
         over = 20.0 * np.log10(max(self.peak * factor, SILENCE))
         state = f"; clipped: it exceeds full scale by {over:.1f} dB" if over > 0.0 else ""
         if self.silent:
-            state = f"; silent: nothing reaches {SILENCE:g} {self.unit}"
+            state = f"; silent: nothing reaches {SILENCE:g} rad/s"
         return f"{seconds:.2f} s, {scale}{state}"
 
     def file(self, gain: float, *, lead: float = 0.0) -> bytes:
         """WAV file of one channel of 16 bits, clipped above full scale.
 
         Args:
-            gain: At 0 dB, full scale is 1 of the unit, in [dB].
+            gain: At 0 dB, full scale is 1 rad/s, in [dB].
             lead: Duration of silence before it, in [s].
         """
         scaled = np.clip(self.played * _factor(gain), -1.0, 1.0) * FULL_SCALE
@@ -126,7 +105,7 @@ class Sound:
 
     def __str__(self) -> str:
         rms = float(np.sqrt(np.mean(np.square(self.signal))))
-        level = f"peak {self.peak:.3g} {self.unit}, rms {rms:.3g} {self.unit}"
+        level = f"peak {self.peak:.3g} rad/s, rms {rms:.3g} rad/s"
         lines = [f"{self.what}: {'silent' if self.silent else level}"]
         return "\n".join([*lines, *(f"  {remark}" for remark in self.remarks)])
 
@@ -141,22 +120,25 @@ class Clip:
     description: str  # what it is, at which gain
 
 
-def sonify(run: nm.Run, settings: Settings | None = None) -> Sound:
-    """Noise of a run as a sound, with remarks on what is inaudible."""
-    settings = settings or Settings()
-    return replace(sound_of(run, settings), remarks=tuple(_remarks(run, settings.speed)))
+def sonify(run: nm.Run, *, joint: str = "", speed: float = 1.0) -> Sound:
+    """Noise of a run as a sound, with remarks on what is inaudible.
+
+    Args:
+        joint: The only joint that is played; all of them, and the base, if empty.
+        speed: Factor of the playing speed, and of all frequencies.
+    """
+    found = sound_of(run, joint=joint, speed=speed)
+    return replace(found, remarks=tuple(_remarks(run, speed)))
 
 
-def sound_of(run: nm.Run, settings: Settings | None = None, *, playing: int = RATE) -> Sound:
+def sound_of(run: nm.Run, *, joint: str = "", speed: float = 1.0, playing: int = RATE) -> Sound:
     """Noise of a run as a sound without remarks; see `sonify`."""
-    settings = settings or Settings()
-    if not 0.01 <= settings.speed <= 1000.0:
-        raise OptionError(f"a speed of {settings.speed:g}, expected 0.01 to 1000")
-    what, unit, signals = _components(run, settings)
-    lowest = LOWEST_AUDIBLE / settings.speed
-    signal = mix(signals, valid=run.mask, rate=run.rate, lowest=lowest)
-    start = float(run.time[0])
-    return Sound(what, signal, run.rate, start, settings.speed, unit, playing=playing)
+    if not 0.01 <= speed <= 1000.0:
+        raise OptionError(f"a speed of {speed:g}, expected 0.01 to 1000")
+    lowest = LOWEST_AUDIBLE / speed
+    signal = mix(_velocities(run, joint), valid=run.mask, rate=run.rate, lowest=lowest)
+    what = f"simplified noise of {joint}" if joint else "simplified noise"
+    return Sound(what, signal, run.rate, float(run.time[0]), speed, playing=playing)
 
 
 def common_gain(sounds: Sequence[Sound]) -> float:
@@ -180,12 +162,8 @@ def output_paths(path: Path, count: int, *, overwrite: bool = False) -> tuple[Pa
 
 def save(sounds: Mapping[Path, Sound], gain: float, *, overwrite: bool = False) -> None:
     """Write sounds as WAV files, all at the same gain in [dB]."""
-    units = {sound.unit for sound in sounds.values()}
-    if len(units) > 1:
-        raise InspectorError(f"sounds in {' and '.join(sorted(units))} have no gain in common")
     for path, sound in sounds.items():
-        with replacing(path, overwrite=overwrite) as temporary:
-            temporary.write_bytes(sound.file(gain))
+        write_whole(path, sound.file(gain), overwrite=overwrite)
 
 
 def of_recording(analysis: Analysis) -> bytes:
@@ -297,25 +275,8 @@ def _high_passed(signal: Array, rate: float, lowest: float) -> Array:
     return high_passed[reach : reach + len(signal)]
 
 
-def _components(run: nm.Run, settings: Settings) -> tuple[str, str, Iterator[Array]]:
-    """What is played, its unit, and the signals, each of shape (samples,), one by one."""
-    joint, link = settings.joint, settings.link
-    kind = settings.kind or ("normal" if link else "simplified")
-    if kind not in PLAYABLE:
-        raise OptionError(
-            f"kind {kind!r} has no signed signals to play; there are {', '.join(PLAYABLE)}"
-        )
-    if (joint and link) or (link if kind == "simplified" else joint):
-        raise OptionError(
-            f"kind {kind!r}: name a joint of simplified noise, or a link of kinds normal and rms"
-        )
-    if kind == "simplified":
-        what = f"simplified noise of {joint}" if joint else "simplified noise"
-        return what, "rad/s", _velocities(run, joint)
-    return f"{kind} noise of {link or 'all links'}", "√W", _weighted_twists(run, kind, link)
-
-
 def _velocities(run: nm.Run, joint: str) -> Iterator[Array]:
+    """What is played: a signal for each joint and axis of the base, shape (samples,)."""
     sides = [(run.joint_names, run.velocity)]
     if run.velocity_desired is not None:
         sides.append((run.desired_joint_names, run.velocity_desired))
@@ -326,35 +287,6 @@ def _velocities(run: nm.Run, joint: str) -> Iterator[Array]:
     base = () if joint or run.base_velocity is None else run.base_velocity.T
     chosen = [signal for name, signal in named if joint in ("", name)]
     return (np.asarray(signal, dtype=np.float64) for signal in (*chosen, *base))
-
-
-def _weighted_twists(run: nm.Run, kind: str, link: str) -> Iterator[Array]:
-    """Twists of links, weighted so that their squares are powers."""
-    if run.robot is None or not robot_known(run):
-        raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {run.robot!r}")
-    robot = nm.Robot.load(run.robot, floating_base=True if run.base_pose is not None else None)
-    surface = nm.Surface.of(robot, "auto")
-    noisy = [name for name in surface.names if name not in surface.without_geometry]
-    if link and link not in noisy:
-        raise InspectorError(f"no link {link!r} that makes noise; there are {', '.join(noisy)}")
-    links = [surface.names.index(name) for name in ([link] if link else noisy)]
-    motions = [robot.configuration(run)]
-    if (desired := robot.desired(run)) is not None:
-        motions.append(desired)
-    forms = surface.mean_square if kind == "rms" else surface.mean_square_normal
-    for first in range(0, len(links), LINKS_AT_ONCE):
-        group = links[first : first + LINKS_AT_ONCE]
-        for q, v in motions:
-            chunks = [slice(start, start + CHUNK) for start in range(0, len(q), CHUNK)]
-            twists = np.concatenate(
-                [nm.link_twists(robot, q[at], v[at])[:, surface.joint[group]] for at in chunks]
-            )
-            for place, each in enumerate(group):
-                # W with W' W = M, also of a form M that is singular
-                values, vectors = np.linalg.eigh(forms[each])
-                root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
-                weights = root * np.sqrt(DENSITY * SOUND_SPEED * surface.area[each])
-                yield from weights @ twists[:, place].T
 
 
 def _remarks(run: nm.Run, speed: float) -> Iterator[str]:

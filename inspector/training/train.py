@@ -180,10 +180,12 @@ class LeftOut:
     ) -> Iterator[nc.Recording]:
         """Recordings that have all signals of a profile, at its rate; notes the others."""
         for each in found:
-            if reason := lacking(each, profile):
-                self.runs.setdefault(reason, []).append(each.name)
-            elif isinstance(each, nc.Recording):
+            if isinstance(each, nc.Recording) and each.blocks:
                 yield each
+                continue
+            below = isinstance(each, nc.Unanswered)
+            reason = f"below {profile.rate:g} Hz" if below else "without annotated blocks"
+            self.runs.setdefault(reason, []).append(each.name)
 
     def __str__(self) -> str:
         if not self.runs:
@@ -255,13 +257,6 @@ def profile_at(name: str, rate: float) -> nc.Profile:
     if found.rate != rate:
         raise OptionError(f"profile {name} exists at {found.rate:g} Hz only, not {rate:g}")
     return found
-
-
-def lacking(each: nc.Recording | nc.Unanswered, profile: nc.Profile) -> str:
-    """Why a profile cannot be trained on a run, in a few words; empty if it can."""
-    if isinstance(each, nc.Unanswered):
-        return f"below {profile.rate:g} Hz"
-    return "" if each.blocks else "without annotated blocks"
 
 
 def evaluate(

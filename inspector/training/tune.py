@@ -54,6 +54,7 @@ HEADS = {
     "subset_accuracy": ("subset", "accuracy"),
 }
 WIDTH = 10  # least width of a column, in characters
+ROWS = 10  # best points that are printed; the results file has all
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,10 +99,10 @@ class Tuned:
         trained = nc.Classifier.train(examples, best, validation=validation)
         trained.save(output, overwrite=overwrite)
 
-    def table(self, criterion: Criterion, *, rows: int = 10) -> str:
+    def table(self, criterion: Criterion) -> str:
         """The best points as a table, with remarks."""
         names = list(self.grid.axes)
-        ranked, points = self.ranked(criterion)[:rows], list(self.grid.points())
+        ranked, points = self.ranked(criterion)[:ROWS], list(self.grid.points())
         untuned = {name: getattr(self.untuned, name) for name in names}
         cells = [
             ["", *("" for _ in names), *(upper for upper, _ in HEADS.values())],
@@ -113,13 +114,13 @@ class Tuned:
         lines = ["".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
         return "\n".join([self._basis(), "", *lines, *self._ends(criterion)])
 
-    def as_dict(self, criterion: Criterion, *, rows: int = 10) -> dict[str, Any]:
+    def as_dict(self, criterion: Criterion) -> dict[str, Any]:
         """The best points as JSON can hold them."""
         points, ranked = list(self.grid.points()), self.ranked(criterion)
         return {
             "points": len(points),
             "criterion": criterion,
-            "best": [{**points[i], **self.measures[i].as_dict()} for i in ranked[:rows]],
+            "best": [{**points[i], **self.measures[i].as_dict()} for i in ranked[:ROWS]],
             "profile": self.profiles[ranked[0]].as_dict(),
             "untuned": self.reference.measures()[0].as_dict(),
         }
@@ -331,14 +332,8 @@ def _check_header(path: Path, line: bytes, settings: Mapping[str, Any]) -> None:
     if not isinstance(there, dict) or not str(there.get("format")).startswith("noise-tuning/"):
         raise _refused(path, "holds no results of tuning")
     for topic, mine in settings.items():
-        other = there.get(topic)
-        if other == mine:
-            continue
-        difference = f"{other}, not {mine}"
-        if isinstance(other, dict) and isinstance(mine, dict):
-            name = next(name for name in [*mine, *other] if other.get(name) != mine.get(name))
-            difference = f"{name} differs"
-        raise _refused(path, f"holds results of another {topic.replace('_', ' ')} ({difference})")
+        if there.get(topic) != mine:
+            raise _refused(path, f"holds results of another {topic.replace('_', ' ')}")
 
 
 def _measures(path: Path, rows: Sequence[bytes], points: Sequence[Point]) -> list[Measures]:
