@@ -285,8 +285,7 @@ def help_(
 
 # --- settings of a project
 
-FILES = ("inspector.toml", "pyproject.toml")
-TABLE = "noise-inspector"
+FILE = "inspector.toml"
 MOST_BYTES = 2**20
 SHARED = frozenset(("model", "jobs"))  # settings of all commands, besides those on reading logs
 # Settings that are paths, which are meant from the folder of the file.
@@ -298,39 +297,28 @@ def find_settings() -> tuple[Path, dict[str, Any]] | None:
 
     Keys are the long names of options, without dashes before them. Options on reading logs, `model`
     and `jobs` stand at the top and hold for all commands that have them; a table such as
-    ``[tool.noise-inspector.classify]`` is for one command, with its arguments (``runs``). The
-    command line wins. Nothing that is written can be set here: a file must not replace others.
+    ``[classify]`` is for one command, with its arguments (``runs``). The command line wins.
+    Nothing that is written can be set here: a file must not replace others.
     """
-    start = Path.cwd().absolute()
-    for folder in (start, *start.parents):
-        for path in (folder / name for name in FILES):
-            if path.is_file() and (content := _read_settings(path)) is not None:
-                return path, content
-        if (folder / ".git").exists():
-            break
-    return None
-
-
-def _read_settings(path: Path) -> dict[str, Any] | None:
-    """The settings of a file; None of a pyproject.toml without any, or that is wrong elsewhere."""
     import tomllib
 
+    start = Path.cwd().absolute()
+    for folder in (start, *start.parents):
+        path = folder / FILE
+        if path.is_file():
+            break
+        if (folder / ".git").exists():
+            return None
+    else:
+        return None
     with path.open("rb") as stream:
         data = stream.read(MOST_BYTES + 1)
     try:
         if len(data) > MOST_BYTES:
             raise ValueError("more than 1 MB")
-        content: Any = tomllib.loads(data.decode())
+        return path, tomllib.loads(data.decode())
     except (ValueError, RecursionError) as error:
-        if path.name == FILES[0] or f"[tool.{TABLE}".encode() in data:
-            raise OptionError(f"{path}: cannot be read ({error})") from error
-        return None
-    if path.name == FILES[1]:
-        tools = content.get("tool")
-        content = tools.get(TABLE) if isinstance(tools, dict) else None
-    if content is not None and not isinstance(content, dict):
-        raise OptionError(f"{path}: [tool.{TABLE}] is no table")
-    return content
+        raise OptionError(f"{path}: cannot be read ({error})") from error
 
 
 def settings_of(name: str, path: Path, content: Mapping[str, Any]) -> dict[str, Any]:

@@ -31,10 +31,10 @@ def project(tmp_path, monkeypatch):
 
 def test_settings_hold_for_commands_and_the_command_line_wins(project):
     assert call("audit", "../log.csv")[0] == 3  # which signal is elbow?
-    (project / "pyproject.toml").write_text(
-        '[tool.noise-inspector]\nmap = ["velocity.elbow=elbow"]\nrate = 90.0\n'
-        '[tool.noise-inspector.audit]\nformat = "json"\n'
-        '[tool.noise-inspector.classify]\nruns = ["log.csv"]\nmin-duration = 0.5\n'
+    (project / "inspector.toml").write_text(
+        'map = ["velocity.elbow=elbow"]\nrate = 90.0\n'
+        '[audit]\nformat = "json"\n'
+        '[classify]\nruns = ["log.csv"]\nmin-duration = 0.5\n'
     )
     _, out, err = call("audit", "../log.csv")
     assert json.loads(out), err
@@ -45,36 +45,27 @@ def test_settings_hold_for_commands_and_the_command_line_wins(project):
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "problem"),
+    ("text", "problem"),
     [
-        ("inspector.toml", 'robto = "ur5e"', "no setting 'robto' (did you mean 'robot'?)"),
-        (
-            "inspector.toml",
-            "[audit]\nfrmat = 1",
-            "[audit] no setting 'frmat' (did you mean 'format'?)",
-        ),
-        ("inspector.toml", "[audits]\nformat = 1", "no command 'audits'"),
-        ("inspector.toml", '[view]\noutput = "~/.bashrc"', "[view] no setting 'output'"),
-        ("inspector.toml", "robot =", "cannot be read (Invalid value"),
-        ("pyproject.toml", "[tool.noise-inspector]\n'", "cannot be read (Expected "),
-        ("pyproject.toml", "[tool]\nnoise-inspector = 3", "[tool.noise-inspector] is no table"),
+        ('robto = "ur5e"', "no setting 'robto' (did you mean 'robot'?)"),
+        ("[audit]\nfrmat = 1", "[audit] no setting 'frmat' (did you mean 'format'?)"),
+        ("[audits]\nformat = 1", "no command 'audits'"),
+        ('[view]\noutput = "~/.bashrc"', "[view] no setting 'output'"),
+        ("robot =", "cannot be read (Invalid value"),
     ],
 )
-def test_settings_that_are_not_known_are_one_line(project, name, text, problem):
-    (project / name).write_text(text)
+def test_settings_that_are_not_known_are_one_line(project, text, problem):
+    (project / "inspector.toml").write_text(text)
     status, out, err = call("view" if "[view]" in text else "audit", "../log.csv")
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith(f"inspector: {project}/{name}:")
+    assert err.startswith(f"inspector: {project}/inspector.toml:")
     assert problem in err
 
 
-def test_files_of_others_and_beyond_the_repository_are_no_settings(project):
+def test_settings_beyond_the_repository_do_not_hold(project):
     (project.parent / "inspector.toml").write_text("robto = 1")
-    for text in ("[tool.other]\na = 1\n", "not = = toml", "[project]\nname = 'x'"):
-        (project / "pyproject.toml").write_text(text)
-        status, _, err = call("audit", "../log.csv")
-        assert (status, "setting" in err) == (3, False)
-    (project.parent / "inspector.toml").unlink()
+    status, _, err = call("audit", "../log.csv")
+    assert (status, "setting" in err) == (3, False)
 
 
 def test_a_setting_of_a_wrong_type_is_wrong_usage(project):
