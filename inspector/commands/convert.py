@@ -10,11 +10,11 @@ from inspector.analysis import analyse
 from inspector.commands import shared
 from inspector.commands.shared import argument, opened, option
 from inspector.errors import EXIT, OUTPUT_LOST, Status, worst
+from inspector.export import tables
 from inspector.export.labels import read_labels, write_labels
-from inspector.library import Library, load_library
+from inspector.library import load_library
 from inspector.logs.read import import_logs, listing
 from inspector.text import counted, printable, progress
-from noisemodel import Run
 from noisemodel.files import refuse_existing
 
 
@@ -97,34 +97,22 @@ def export(
     if labels and annotate:
         raise typer.BadParameter("name one of --labels and --annotate")
     refuse_existing(output, overwrite=overwrite)
-    if annotate:
-        _annotate(opened(run, ctx.obj).run, annotate, output, overwrite=overwrite)
-        return
-    library = load_library(model)
+    library = {} if annotate else load_library(model)
     recorded = opened(run, ctx.obj).run
-    if labels:
-        _labels(recorded, library, labels, output, overwrite=overwrite)
-        return
-    from inspector.export.tables import export as write
-
-    written = write(recorded, output, library, kind=kind, overwrite=overwrite)
-    typer.echo(f"{run}: {written.analysis.headline}")
-    for remark in written.remarks:
-        typer.echo(f"  {remark}")
-    typer.echo(f"{output}: {written}")
-
-
-def _annotate(run: Run, labels: Path, output: Path, *, overwrite: bool) -> None:
-    """Write a run with the labels of a file."""
-    blocks = read_labels(labels, run)
-    replace(run, blocks=blocks).save(output, overwrite=overwrite)
-    typer.echo(f"{output}: {counted(len(blocks), 'label')}")
-
-
-def _labels(run: Run, library: Library, kind: str, output: Path, *, overwrite: bool) -> None:
-    """Write the findings of a run, or its annotated blocks, as a label file."""
-    spans = analyse(run, library).findings if kind == "findings" else run.blocks
-    write_labels(spans, output, overwrite=overwrite)
-    for each in spans:
-        typer.echo(f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s")
-    typer.echo(f"{output}: {counted(len(spans), 'label')}")
+    if annotate:
+        blocks = read_labels(annotate, recorded)
+        replace(recorded, blocks=blocks).save(output, overwrite=overwrite)
+        told = counted(len(blocks), "label")
+    elif labels:
+        spans = analyse(recorded, library).findings if labels == "findings" else recorded.blocks
+        write_labels(spans, output, overwrite=overwrite)
+        for each in spans:
+            typer.echo(f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s")
+        told = counted(len(spans), "label")
+    else:
+        written = tables.export(recorded, output, library, kind=kind, overwrite=overwrite)
+        typer.echo(f"{run}: {written.analysis.headline}")
+        for remark in written.remarks:
+            typer.echo(f"  {remark}")
+        told = str(written)
+    typer.echo(f"{output}: {told}")

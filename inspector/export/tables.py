@@ -87,7 +87,29 @@ def arrow_table(content: Content) -> Any:
     """
     import pyarrow as pa
 
-    columns = {name: pa.array(values) for name, values in _table_columns(content)}
+    time, labels = content.time, content.analysis.labels
+    found: dict[str, Any] = {"time": time, "simplified": content.simplified}
+    if content.extended is not None:
+        found["extended"] = content.extended
+    if content.analysis.run.blocks:
+        annotated: list[str | None] = [None] * len(time)
+        for block in content.analysis.run.blocks:
+            first, last = np.searchsorted(time, (block.start, block.stop))
+            annotated[first:last] = [block.label] * int(last - first)
+        found["annotated"] = annotated
+    if labels is not None:
+        middles = (labels.start + labels.stop) / 2
+        steps = np.diff(middles) if len(middles) > 1 else labels.stop - labels.start
+        nearest = np.searchsorted((middles[1:] + middles[:-1]) / 2, time)
+        outside = np.abs(time - middles[nearest]) > np.median(steps) / 2
+        framed: dict[str, Any] = {"frame_start": labels.start, "frame_stop": labels.stop}
+        framed["label"] = labels.debounced.astype(object)
+        framed |= {
+            f"score_{name}": each
+            for name, each in zip(labels.classes, labels.scores.T, strict=True)
+        }
+        found |= {name: pa.array(each[nearest], mask=outside) for name, each in framed.items()}
+    columns = {name: pa.array(values) for name, values in found.items()}
     units = {name: {"unit": UNITS[name]} if name in UNITS else None for name in columns}
     fields = [pa.field(name, each.type, metadata=units[name]) for name, each in columns.items()]
     about = {"format": "noise-export/1", "model": content.analysis.model, "extended": content.kind}
@@ -116,44 +138,6 @@ def write_csv(content: Content, path: Path) -> None:
         csv.writer(file, lineterminator="\n").writerow(table.column_names)
     with path.open("ab") as stream:
         pyarrow.csv.write_csv(table, stream, pyarrow.csv.WriteOptions(include_header=False))
-
-
-def _table_columns(content: Content) -> Iterator[tuple[str, Any]]:
-    yield "time", content.time
-    yield "simplified", content.simplified
-    if content.extended is not None:
-        yield "extended", content.extended
-    if content.analysis.run.blocks:
-        yield "annotated", _annotated(content)
-    if content.analysis.labels is not None:
-        yield from _framed(content.time, content.analysis.labels)
-
-
-def _annotated(content: Content) -> list[str | None]:
-    labels: list[str | None] = [None] * len(content.time)
-    for block in content.analysis.run.blocks:
-        first, last = np.searchsorted(content.time, (block.start, block.stop))
-        labels[first:last] = [block.label] * int(last - first)
-    return labels
-
-
-def _framed(time: Array, labels: nc.Labels) -> Iterator[tuple[str, Any]]:
-    """Columns of the frame whose middle is nearest to each sample, null outside of all shares."""
-    import pyarrow as pa
-
-    middles = (labels.start + labels.stop) / 2
-    share = np.median(np.diff(middles)) if len(middles) > 1 else labels.stop[0] - labels.start[0]
-    nearest = np.searchsorted((middles[1:] + middles[:-1]) / 2, time)
-    outside = np.abs(time - middles[nearest]) > share / 2
-
-    def column(values: Any) -> Any:
-        return pa.array(values[nearest], mask=outside)
-
-    yield "frame_start", column(labels.start)
-    yield "frame_stop", column(labels.stop)
-    yield "label", column(labels.debounced.astype(object))
-    for place, name in enumerate(labels.classes):
-        yield f"score_{name}", column(labels.scores[:, place])
 
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
