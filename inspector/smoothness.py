@@ -350,16 +350,14 @@ def default_order(episodes: Sequence[Episode]) -> str:
     """
     actions = all(episode.episode for episode in episodes)
     names = ORDERS if actions else sorted(ORDERS, key=lambda name: name.startswith("action"))
-
-    def values(name: str) -> set[float | None]:
-        return {episode.scores[name] for episode in episodes}
-
-    def comparable(name: str) -> bool:
+    known = []
+    for name in names:
+        values = {episode.scores[name] for episode in episodes}
         kinds = {episode.quantities.get(name) for episode in episodes}
-        return len(kinds) == 1 and None not in values(name)
-
-    names = [name for name in names if comparable(name)] or ["level"]
-    return next((name for name in names if len(values(name)) > 1), names[0])
+        if len(kinds) == 1 and None not in values:
+            known.append((len(values) == 1, name))
+    # The first that tells episodes apart, else the first that all have.
+    return min(known, key=lambda each: each[0], default=(True, "level"))[1]
 
 
 def ranked(found: Iterable[Episode | Failed], *, by: str = "") -> Ranking:
@@ -395,12 +393,13 @@ def as_text(ranking: Ranking) -> str:
         ]
         for rank, name, episode in zip(ranking.ranks, names, episodes, strict=True)
     ]
-    columns = list(zip(*([list(head) for head in zip(*heads, strict=True)] + rows), strict=True))
-    widths = [max(len(cell) for cell in column) for column in columns]
+    rows = [[title for title, _ in heads], [unit for _, unit in heads], *rows]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
-    for row in zip(*columns, strict=True):
-        rank, name, *others = (each.rjust(width) for each, width in zip(row, widths, strict=True))
-        lines.append("  ".join((rank, row[1].ljust(len(name)), *others)).rstrip())
+    for row in rows:
+        cells = [each.rjust(width) for each, width in zip(row, widths, strict=True)]
+        cells[1] = row[1].ljust(widths[1])
+        lines.append("  ".join(cells).rstrip())
     meaning = SCORES[ranking.by].meaning
     head = f"{counted(len(episodes), 'episode')}, the smoothest first by {meaning}"
     return "\n".join([head, "", *lines, "", *_notes(ranking)])
@@ -488,12 +487,8 @@ def _notes(ranking: Ranking) -> Iterator[str]:
     if len(rates) > 1:
         yield (f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only.")
     yield f"SPARC: cut-off {CUTOFF:g} Hz. SPARC and LDLJ: higher is smoother; others: lower."
-    yield from _roughest(ranking)
-
-
-def _roughest(ranking: Ranking) -> Iterator[str]:
-    """What to look at: the roughest episode by the score of the order, or that all are equal."""
-    ordered = [each for each in ranking.episodes if each.scores[ranking.by] is not None]
+    # What to look at: the roughest episode, or that all are equal.
+    ordered = [each for each in episodes if each.scores[ranking.by] is not None]
     if len(ordered) < 2:
         return
     title, last = SCORES[ranking.by].title, ordered[-1]

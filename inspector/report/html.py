@@ -90,7 +90,14 @@ def page(
     image = f"data:image/png;base64,{_encoded(picture(analysis, beside, floor=floor))}"
     described = f"Noise, classes and spectrograms over {analysis.run.duration:.2f} s"
     ET.SubElement(body, "img", src=image, alt=f"{described}; the lists have the findings")
-    _add_sound(body, analysis)
+    add_text(body, "h2", "Sound")
+    if (sound := clip(analysis.run, around=worst_time(analysis))) is None:
+        add_text(body, "p", "The log's rate is too low for audible frequencies.", "note")
+    else:
+        source = f"data:audio/wav;base64,{_encoded(sound.data)}"
+        ET.SubElement(body, "audio", controls="controls", src=source)
+        span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.description}."
+        add_text(body, "p", f"{span} {AUDIBLE}", "note")
     _add_parts(body, analysis)
     _add_list(body, "What the log can show", audit.splitlines())
     _add_list(body, "Remarks", [spoken(remark) for remark in analysis.remarks])
@@ -148,18 +155,6 @@ def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
         items = ET.SubElement(body, "ul")
         for line in lines:
             add_text(items, "li", line.strip())
-
-
-def _add_sound(body: ET.Element, analysis: Analysis) -> None:
-    sound = clip(analysis.run, around=worst_time(analysis))
-    add_text(body, "h2", "Sound")
-    if sound is None:
-        add_text(body, "p", "The log's rate is too low for audible frequencies.", "note")
-        return
-    source = f"data:audio/wav;base64,{_encoded(sound.data)}"
-    ET.SubElement(body, "audio", controls="controls", src=source)
-    span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.description}."
-    add_text(body, "p", f"{span} {AUDIBLE}", "note")
 
 
 def _encoded(data: bytes) -> str:
