@@ -28,15 +28,6 @@ def many(*arguments):
     return ("simulate", "dataset", "--robots", "panda", *arguments)
 
 
-def test_help_explains_one_run_and_many():
-    status, out, _ = inspector("simulate", "--help")
-    assert status == 0
-    assert "dataset" in out
-    assert "inspector simulate run talos --scenario 7" in " ".join(out.split())
-    status, out, _ = inspector("simulate", "dataset", "--help")
-    assert {"--robots", "--seeds", "--scenarios", "--first-seed"} <= set(out.split())
-
-
 def test_scenarios_are_listed_with_numbers_and_families():
     status, out, _ = inspector("simulate", "--list")
     assert status == 0

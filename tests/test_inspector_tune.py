@@ -283,26 +283,6 @@ def test_a_damaged_file_is_named_and_left_alone(data, whole, tmp_path, damage, r
     assert output.read_bytes() == before
 
 
-def test_two_processes_do_not_write_one_file(data, tmp_path):
-    import fcntl
-
-    output = tmp_path / "tuned.jsonl"
-    with output.open("ab") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        assert "is being written by another process" in refused(data, output)
-
-
-@pytest.mark.parametrize(
-    ("more", "reason"),
-    [
-        (("--profile", "mfcc"), "no profile 'mfcc' of one rate; there are logbands, noisytest-rbf"),
-        (("--profile", "paper-rbf"), "profile paper-rbf exists at 10000 Hz only, not 1000"),
-    ],
-)
-def test_a_profile_that_does_not_exist_is_named(data, tmp_path, more, reason):
-    assert reason in refused(data, tmp_path / "tuned.jsonl", *more, code=2)
-
-
 def test_recordings_of_the_training_set_do_not_validate(data, tmp_path):
     arguments = ("--validation", data / "training", *OPTIONS, *GRID, "-o", tmp_path / "a.jsonl")
     status, _, err = call("tune", data / "training", *arguments)

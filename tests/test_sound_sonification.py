@@ -9,7 +9,7 @@ from commandline import call as inspector
 
 import noisemodel as nm
 from inspector.errors import InspectorError
-from inspector.export.sound import clip, common_gain, mix, sonify
+from inspector.export.sound import clip, common_gain, sonify
 from noisemodel import Run
 
 RATE = 10_000.0
@@ -207,15 +207,3 @@ def test_sounds_need_no_library_that_is_slow_to_import():
     code = "import sys, inspector.export.sound; print('scipy.signal' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
-
-
-def test_mixing_takes_signals_one_by_one():
-    made = []
-
-    def signals():
-        for hertz in (100, 200, 300):
-            made.append(hertz)
-            yield tone(hertz)
-
-    mix(signals(), valid=np.ones(20_000, dtype=bool), rate=RATE)
-    assert made == [100, 200, 300]
