@@ -169,7 +169,7 @@ def _picture(run: Path, output: Path, request: Request) -> None:
 
 
 def _page(run: Path, output: Path, request: Request) -> None:
-    """Write one HTML page about a run: pictures, tables, sound."""
+    """Write one HTML page about a run: findings, picture, sound."""
     require("a report")
     found, verdict, beside = _analysed(opened(run, request.reading), request)
     assert found.audit is not None
