@@ -155,15 +155,6 @@ def test_an_interrupted_search_resumes_to_the_same_bytes(data, whole, tmp_path, 
     assert output.read_bytes() == content
 
 
-def test_the_accuracy_along_each_setting_is_drawn(data, whole, tmp_path):
-    pytest.importorskip("matplotlib")
-    picture = tmp_path / "tuned.png"
-    status, out, _ = tune(data, whole[0], "--picture", picture)
-    assert (status, out) == (0, whole[1])
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert "exists already" in tune(data, whole[0], "--picture", picture)[2]
-
-
 @pytest.mark.slow
 def test_two_jobs_give_the_same_results(data, whole, tmp_path):
     output = tmp_path / "tuned.jsonl"

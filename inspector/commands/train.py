@@ -9,11 +9,9 @@ import typer
 from inspector.commands import shared
 from inspector.commands.shared import argument, option
 from inspector.library import model_files
-from inspector.report.picture import require
 from inspector.training import train as training
 from inspector.training import tune as tuning
 from noiseclassifier.assessment import table
-from noisemodel.files import refuse_existing
 
 
 def train(
@@ -54,15 +52,6 @@ Grid = Annotated[
 ]
 
 
-GridPicture = Annotated[
-    Path | None,
-    option(
-        "Draw the accuracy along each setting around the best point, as PNG (needs the"
-        " extra `report`)."
-    ),
-]
-
-
 def tune(
     training: shared.Inputs,
     output: Annotated[
@@ -90,7 +79,6 @@ def tune(
     train: Annotated[
         Path | None, option("Train the best point on all training runs, write the model.")
     ] = None,
-    picture: GridPicture = None,
     as_json: shared.AsJson = False,
     jobs: shared.NumberOfJobs = 1,
     dask: shared.Dask = "",
@@ -99,9 +87,6 @@ def tune(
     """Tune a profile's settings by grid search; resumes if killed."""
     if validation and folds:
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
-    if picture:
-        refuse_existing(picture, overwrite=overwrite)
-        require()
     search = tuning.Search(
         training=training,
         validation=validation or (),
@@ -114,8 +99,6 @@ def tune(
     where = shared.jobs_or_dask(jobs, dask)
     tuned = tuning.tune(search, output, model=train, jobs=where, overwrite=overwrite)
     typer.echo(dumps(tuned.as_dict(criterion), indent=2) if as_json else tuned.table(criterion))
-    if picture:
-        tuned.draw(picture, criterion, overwrite=overwrite)
     if train:
         tuned.train(train, criterion, overwrite=overwrite)
         typer.echo(f"{train}: written, the best point trained on all training runs", err=as_json)

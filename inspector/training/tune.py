@@ -19,7 +19,6 @@ from typing import Any, NoReturn
 
 import noiseclassifier as nc
 from inspector.errors import InspectorError
-from inspector.report.picture import require
 from inspector.text import progress
 from inspector.training.train import LeftOut, classified, profile_at
 from inspector.verdict import resumed
@@ -39,7 +38,7 @@ from noiseclassifier.tuning import (
     order,
     validate,
 )
-from noisemodel.files import refuse_existing, replacing
+from noisemodel.files import refuse_existing
 from noisemodel.parallel import DIED, Jobs, in_order
 
 FORMAT = "noise-tuning/1"
@@ -124,37 +123,6 @@ class Tuned:
             "profile": self.profiles[ranked[0]].as_dict(),
             "untuned": self.reference.measures()[0].as_dict(),
         }
-
-    def draw(self, path: Path, criterion: Criterion, *, overwrite: bool = False) -> None:
-        """Draw the accuracy along each setting around the best point, as a PNG file."""
-        require()
-        from matplotlib.figure import Figure
-
-        points = list(self.grid.points())
-        best = points[self.ranked(criterion)[0]]
-        figure = Figure(figsize=(4.0 * len(best), 3.4), dpi=100, layout="constrained")
-        row = figure.subplots(1, len(best), squeeze=False, sharey=True)[0]
-        for axes, name in zip(row, best, strict=True):
-            others = {key: value for key, value in best.items() if key != name}
-            along = [i for i, point in enumerate(points) if others.items() <= point.items()]
-            values = [points[i][name] for i in along]
-            words = isinstance(values[0], str)
-            places: list[Any] = list(range(len(values))) if words else values
-            for measure_name in ("balanced_accuracy", "subset_accuracy"):
-                shares = [getattr(self.measures[i], measure_name) for i in along]
-                axes.plot(places, shares, ".-", label=measure_name.replace("_", " "))
-            axes.axvline(places[values.index(best[name])], color="0.6", ls=":")
-            if words:
-                axes.set_xticks(places, values)
-            elif min(places) > 0 and max(places) >= 100 * min(places):
-                axes.set_xscale("log")
-            axes.set_xlabel(f"{name}, best: {_text(best[name])}")
-            axes.grid(alpha=0.4)
-        row[0].set_ylabel("share of frames, or mean recall")
-        row[0].legend(fontsize=8)
-        figure.suptitle(f"{self.search.profile}: accuracy along each setting, others at the best")
-        with replacing(path, overwrite=overwrite) as temporary:
-            figure.savefig(temporary, format="png")
 
     def _basis(self) -> str:
         splits = self.trial.splits
