@@ -78,11 +78,10 @@ def test_the_words_for_a_localisation_are_stage_lead_joints_and_band():
     joints = (("knee", 0.8), ("hip", 0.04))
     found = Localisation("commanded", "measured", 0.003, joints=joints, band=(85.0, 130.0))
     assert words(found) == ("commanded, 3.0 ms before measured", "knee 80%", "85-130 Hz")
-    assert words(found, quote="`")[0] == "`commanded`, 3.0 ms before `measured`"
     slow = dataclasses.replace(found, lag=0.0123)
     assert words(slow)[0] == "commanded, 12.3 ms before measured"
     assert words(Localisation("measured", band=(20.0, 20.0))) == ("measured", "", "20 Hz")
-    assert words(Localisation(), quote="`") == ("", "", "")
+    assert words(Localisation()) == ("", "", "")
 
 
 def test_every_failure_is_localised_and_what_is_ok_is_not():
@@ -107,10 +106,10 @@ def test_the_report_states_stage_and_band_of_each_failure(tmp_path):
     low, high = analysis.localisations[SHAKE].band
     assert (
         "- **oscillations**, 2.00 s to 3.50 s: joints knee 100%;"
-        f" {low:.0f}-{high:.0f} Hz; first in `measured`\n" in report(analysis)
+        f" {low:.0f}-{high:.0f} Hz; first in measured\n" in report(analysis)
     )
     assert sentence(analysis, SHAKE).startswith(
-        f"oscillations, 2.00 s to 3.50 s: joints knee 100%; {low:.0f}-{high:.0f} Hz; first in `meas"
+        f"oscillations, 2.00 s to 3.50 s: joints knee 100%; {low:.0f}-{high:.0f} Hz; first in meas"
     )
     assert "No stages" not in report(analysis)
 

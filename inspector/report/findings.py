@@ -33,23 +33,19 @@ WORDS = {
 }
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}  # how people count them
 LEAST = 0.05  # joints with a smaller share are left out
-# Classes of NoisyTest whose names people read as two words.
-SPOKEN = {"highaccelerations": "high accelerations"}
 Item = TypeVar("Item")
 
 
 def spoken(text: str) -> str:
-    """A class as people read it, or a text with classes in it."""
-    for name, said in SPOKEN.items():
-        text = text.replace(name, said)
-    return text
+    """A class of NoisyTest as people read it, or a text with classes in it."""
+    return text.replace("highaccelerations", "high accelerations")
 
 
-def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
+def words(found: Localisation) -> tuple[str, str, str]:
     """Stage with its lead over the next, joints with their shares, and band; empty if not known."""
-    stage = f"{quote}{found.stage}{quote}" if found.stage else ""
+    stage = found.stage
     if found.lag > 0.0:
-        stage = f"{stage}, {1e3 * found.lag:.1f} ms before {quote}{found.following}{quote}"
+        stage = f"{stage}, {1e3 * found.lag:.1f} ms before {found.following}"
     joints = ", ".join(f"{joint} {share:.0%}" for joint, share in found.joints if share >= LEAST)
     low, high = (f"{frequency:.0f}" for frequency in found.band or (0.0, 0.0))
     band = f"{low} Hz" if low == high else f"{low}-{high} Hz"
@@ -62,17 +58,17 @@ def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
 def report(analysis: Analysis) -> str:
     """The report of an analysed run, in Markdown."""
     found = [sentence(analysis, event, bold="**") for event in analysis.findings]
-    parts = [f"### {spoken(analysis.headline)}", *_bullets(found), facts(analysis)]
+    parts = [f"### {spoken(analysis.headline)}", _bullets(found), facts(analysis)]
     if analysis.run.blocks:
-        parts += ["**Annotated**", *_bullets(annotated(analysis, bold="**") or ["no failure"])]
+        parts += ["**Annotated**", _bullets(annotated(analysis, bold="**") or ["no failure"])]
     parts += [note(analysis)]
     if analysis.remarks:
-        parts += ["**Remarks**", *_bullets(map(spoken, analysis.remarks))]
+        parts += ["**Remarks**", _bullets(map(spoken, analysis.remarks))]
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def _bullets(lines: Iterable[str]) -> list[str]:
-    return ["\n".join(f"- {line}" for line in lines)]
+def _bullets(lines: Iterable[str]) -> str:
+    return "\n".join(f"- {line}" for line in lines)
 
 
 def facts(analysis: Analysis) -> str:
@@ -88,17 +84,14 @@ def facts(analysis: Analysis) -> str:
     return f"{analysis.name}: {', '.join(parts)}"
 
 
-def sentence(
-    analysis: Analysis, event: Event | Block, *, bold: str = "", quote: str = "`", found: str = ""
-) -> str:
+def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "", found: str = "") -> str:
     """Class, time, score, novelty and localisation of an event, in a line.
 
     Args:
         bold: Mark about the class.
-        quote: Mark about names of stages.
         found: What became of an annotated failure.
     """
-    stage, joints, band, links = localised(analysis, event, quote=quote)
+    stage, joints, band, links = localised(analysis, event)
     named = {"joints": joints, "loudest links": links, "": band, "first in": stage}
     where = "; ".join(f"{name} {part}".strip() for name, part in named.items() if part)
     sure = ""
@@ -119,7 +112,7 @@ def brief(analysis: Analysis, event: Event | Block) -> str:
     return ", ".join(filter(None, [f"{spoken(event.label)} {when}", first]))
 
 
-def annotated(analysis: Analysis, *, bold: str = "", quote: str = "`") -> list[str]:
+def annotated(analysis: Analysis, *, bold: str = "") -> list[str]:
     """Annotated failures and what became of them; where one was found, that says the rest."""
     lines = []
     for block in analysis.run.blocks:
@@ -131,7 +124,7 @@ def annotated(analysis: Analysis, *, bold: str = "", quote: str = "`") -> list[s
             lines.append(f"{bold}{spoken(block.label)}{bold}, {when}: found, {became}")
             continue
         found = f", found {became}" if became not in ("", "no") else ", not found" if became else ""
-        lines.append(sentence(analysis, block, bold=bold, quote=quote, found=found))
+        lines.append(sentence(analysis, block, bold=bold, found=found))
     return lines
 
 
@@ -168,9 +161,7 @@ def classes_of(analysis: Analysis) -> tuple[str, ...]:
     return (*(name for name in every if name not in last), *last)
 
 
-def localised(
-    analysis: Analysis, failure: Event | Block, *, quote: str = ""
-) -> tuple[str, str, str, str]:
+def localised(analysis: Analysis, failure: Event | Block) -> tuple[str, str, str, str]:
     """Localisation of a failure in words: stage, joints, band (with its order), and links."""
     if failure.label == "ok":
         return "", "", "", ""
@@ -182,7 +173,7 @@ def localised(
         failures: list[Event | Block] = [*analysis.findings, *annotated]
         named = fault_links(analysis.links, failure, failures, known=known)
         links = ", ".join(f"{link} {share:.0%}" for link, share in named)
-    stage, joints, band = words(known, quote=quote)
+    stage, joints, band = words(known)
     order = analysis.orders.get(failure) if isinstance(failure, Event) else None
     return stage, joints, "; ".join(str(part) for part in (band, order) if part), links
 

@@ -78,9 +78,9 @@ def page(
     add_text(body, "p", findings.facts(analysis), "note")
     if verdict is not None and verdict.beside is not None:
         add_text(body, "p", f"Reference: {verdict.beside.path}, {verdict.beside.words}.", "note")
-    found = [findings.sentence(analysis, event, quote="") for event in analysis.findings]
+    found = [findings.sentence(analysis, event) for event in analysis.findings]
     _add_list(body, "Findings", found)
-    _add_list(body, "Annotated", findings.annotated(analysis, quote=""))
+    _add_list(body, "Annotated", findings.annotated(analysis))
     if remark := findings.note(analysis):
         add_text(body, "p", remark, "note")
     if verdict is not None:
