@@ -35,7 +35,6 @@ FILES = {
     "import": ("import", "log.csv", "-o", "out/run.npz"),
     "noise": ("noise", "run.npz", "--csv", "out/noise.csv"),
     "compare csv": ("noise", "--compare", "run.npz", "--csv", "out/compare.csv"),
-    "compare picture": ("noise", "--compare", "run.npz", "--picture", "out/compare.png"),
     "listen": ("listen", "run.npz", "-o", "out/run.wav"),
     "labels": ("export", "run.npz", "--labels", "annotated", "-o", "out/labels.txt"),
     "classify": ("classify", "good", "--write", "json=out/verdicts.json"),

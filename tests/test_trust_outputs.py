@@ -28,7 +28,6 @@ TABLE = [
     ("view", RUN, "-o {}.png", OF_RUN),
     ("noise", RUN[:1], "--csv {}", OF_RUN[:1]),
     ("noise", ("--compare", "run.npz"), "--csv {}", OF_RUN[:1]),
-    ("noise", ("--compare", "run.npz"), "--picture {}.png", OF_RUN[:1]),
     ("listen", RUN[:1], "-o {}.wav", OF_RUN[:1]),
     ("live", ("--rate", "100", "--model", "model.npz"), "--save {}.rrd", ("model.npz",)),
     ("classify", RUN, "--write json={}", OF_RUN),
