@@ -23,9 +23,9 @@ from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.clocks import counted_stamps, counting, stamps_of
-from inspector.logs.log import SAMPLES, Entry, Field, Log, LogReader, Stamps
-from inspector.logs.mapping import ReadOptions, pose_of
+from inspector.logs.clocks import counting, stamps_of
+from inspector.logs.log import Entry, Field, Log, LogReader, Stamps
+from inspector.logs.mapping import COMMAND, ReadOptions, pose_of
 from inspector.logs.names import (
     SIGNALS,
     TIMES,
@@ -40,7 +40,7 @@ from noisemodel.run import check_time
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 from noisemodel.types import Real
 
-COMMAND, COPY = "command", "copy"
+COPY = "copy"
 QPOS, QVEL, FORCE = "qpos", "qvel", "qfrc_actuator"
 
 # What arrays hold, by their names (in any case); the first row that fits counts.
@@ -61,13 +61,13 @@ TABLE: tuple[tuple[str, str], ...] = (
     (r"(.*/)?qpos", QPOS),
     (r"(.*/)?qvel", QVEL),
     (r"(.*/)?qfrc_actuator", FORCE),
-    # PyBullet's getJointStates, by the names of its documentation, and in the plural
+    # PyBullet's joint states, by the names of its documentation, and in the plural
     (r"(.*/)?joint_?positions?", "position"),
     (r"(.*/)?joint_?velocit(y|ies)", "velocity"),
     (r"(.*/)?(appliedjointmotortorques?|joint_torques|torques)", "effort"),
     (r"(.*/)?(targetpositions?|(joint_)?target_positions?)", "position_desired"),
     (r"(.*/)?(targetvelocit(y|ies)|(joint_)?target_velocit(y|ies))", "velocity_desired"),
-    # What a policy says: positions, or anything else; decided by the values (`followed`)
+    # What a policy says: positions, or anything else; decided by the values (`mapping.followed`)
     (r"processed_actions", COMMAND),
     (r"(.*/)?(ctrl|actions?|(joint_)?targets?|commands?)", COMMAND),
 )
@@ -86,18 +86,8 @@ RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampl
 STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
 MOTION = {*SIGNALS, QPOS, QVEL} - {"effort"}
 
-JOINT_STATES = ("joint_states", "joint_state", "jointstates", "states")
-# Names of what PyBullet's getJointStates returns, stacked to (samples, joints, numbers): with or
-# without the motor's torque; nine numbers have the six reaction forces between.
-PARTS: Mapping[int, Mapping[str, int]] = {
-    2: {"position": 0, "velocity": 1},
-    3: {"position": 0, "velocity": 1, "effort": 2},
-    9: {"position": 0, "velocity": 1, "effort": 8},
-}
-# Least correlation of a position with its target, and the range of its slope.
-FOLLOWS, SLOPES = 0.9, (0.5, 2.0)
-# What moves less does not move; largest mean distance of its target, both in [rad] or [m].
-STILL, NEARBY = 1e-3, 0.1
+# What moves less does not move, in [rad] or [m].
+STILL = 1e-3
 Arrays = Mapping[str, NDArray[Any]]
 
 
@@ -124,46 +114,58 @@ def log_of(
         stated: What states the rate, and the rate, in [Hz].
         joints: Names of the columns of measured signals, by "", and of desired ones, by "_desired".
     """
-    arrays = dict(_unpacked(arrays))
-    options = options.for_columns(path, [*arrays])
-    mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
-    roles = _roles(arrays, mapped)
+    every = arrays
+    arrays = {
+        n: each[:, 0] if each.shape[1:] == (1,) and n.rpartition("/")[2].lower() in TIMES else each
+        for n, each in arrays.items()
+        if each.ndim in (1, 2) and len(each) > 1
+    }
+    entries = options.for_columns(path, [*arrays]).entries
+    mapped = {entry.part()[0] for entry in entries if entry.signal != "time"}
+    naming = Naming.of((n for n, e in arrays.items() if e.ndim == 1), options.known_joints)
+    columns = {  # that say in their names what they hold
+        n
+        for n, each in arrays.items()
+        if each.ndim == 1 and (column_signal(n, naming) or array_signal(n))
+    }
+    roles = _roles(arrays, mapped, naming)
     motion = [name for name, what in roles.items() if what in MOTION or name in mapped]
     if not motion:
-        raise LogError(path, _nothing(episode, arrays))
-    time, arrays = _time(arrays, options)
+        raise LogError(path, _nothing(episode, every))
+    time, arrays = _time(arrays, options, columns)
     arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
     samples = len(arrays[motion[0]])
-    state, targets, remarks, measured = _state(arrays, roles, options)
-    stamps = stamps_of(path, time, arrays[time], options.rate) if time else Stamps.counted(samples)
-    columns = any(arrays[name].ndim == 1 for name in motion)  # whose rate is found later
-    if stamps.unit == SAMPLES and (not columns or (stated[1] and not options.rate)):
-        measured = (None, None) if columns else measured
-        stamps = counted_stamps(path, stamps, options, *measured, stated)
-    suggested = (*state, *_base_of_isaac(arrays, roles, stamps), *targets)
-    rows = [name for name, each in arrays.items() if each.ndim == 1]
-    single = {name for name in rows if column_signal(name) or array_signal(name)}
-    fields = tuple(
-        Field(
-            name,
-            floats(each.reshape(samples, -1)),
-            stamps,
-            joints=_joints(joints or {}, name, roles, each.size // samples, suggested),
-            signal=roles[name] if roles[name] in SIGNALS and name not in single else "",
-            source=path.name,
-            rank=0 if STATES.fullmatch(name) else 1,
+    stamps = Stamps.counted(samples, stated)
+    if time:
+        stamps = replace(stamps_of(path, time, arrays[time], options.rate), stated=stated)
+    arms = {match["arm"] for name in roles if (match := ARMS.fullmatch(name))}
+    fields = []
+    for name, what in roles.items():
+        each = arrays[name]
+        if len(each) != samples or name == time:
+            continue
+        desired = what.endswith("_desired")
+        names = (joints or {}).get("_desired" if desired else "", (joints or {}).get("", ()))
+        if len(arms) > 1 and (match := ARMS.fullmatch(name)):
+            names = tuple(f"{match['arm']}_joint_{n}" for n in range(each.size // samples))
+        fields.append(
+            Field(
+                name,
+                floats(each.reshape(samples, -1)),
+                stamps,
+                joints=names,
+                signal=what if what in (*SIGNALS, COMMAND) and name not in columns else "",
+                source=path.name,
+                rank=0 if STATES.fullmatch(name) else 1,
+            )
         )
-        for name, each in arrays.items()
-        if name in roles and len(each) == samples and each.ndim <= 2 and name != time
-    )
     read = {time, *(each.name for each in fields)}
     return Log(
         path,
-        fields,
+        tuple(fields),
         episode,
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
-        remarks=(*_taken(fields, suggested, options), *remarks),
-        suggested=suggested,
+        suggested=(*_of_mujoco(arrays, roles), *_base_of_isaac(arrays, roles, samples)),
         time=time,
     )
 
@@ -179,20 +181,16 @@ def gathered(log: Log, options: ReadOptions) -> Log:
         del groups[name]
     if not {QPOS, QVEL} & set(groups):
         return log
-    arrays: dict[str, NDArray[Any]] = {
-        name: np.hstack([columns[number].values for number in sorted(columns)])
-        for name, columns in groups.items()
-    }
-    state, targets, remarks, measured = _state(arrays, {n: meaning(n) for n in arrays}, options)
-    suggested = (*state, *targets)
     columns = {id(each) for members in groups.values() for each in members.values()}
-    stamps = log.fields[0].stamps
-    if stamps.unit == SAMPLES:
-        stamps = counted_stamps(log.path, stamps, options, *measured)
-    fields = [replace(each, stamps=stamps) for each in log.fields if id(each) not in columns]
-    fields += [Field(name, each, stamps, source=log.path.name) for name, each in arrays.items()]
-    remarks = [*log.remarks, *_taken((), suggested, options), *remarks]
-    return replace(log, fields=tuple(fields), suggested=suggested, remarks=tuple(remarks))
+    fields = [each for each in log.fields if id(each) not in columns]
+    arrays: dict[str, Real] = {}
+    for name, members in groups.items():
+        arrays[name] = np.hstack([members[number].values for number in sorted(members)])
+        signal = COMMAND if meaning(name) == COMMAND else ""
+        stamps = log.fields[0].stamps
+        fields.append(Field(name, arrays[name], stamps, signal=signal, source=log.path.name))
+    suggested = _of_mujoco(arrays, {name: meaning(name) for name in arrays})
+    return replace(log, fields=tuple(fields), suggested=tuple(suggested))
 
 
 def floats(values: NDArray[Any]) -> Real:
@@ -231,85 +229,46 @@ def stated_rate(items: Mapping[str, Any]) -> tuple[str, float | None]:
     return "", None
 
 
-def followed(command: Real, position: Real) -> int:
-    """Number of leading columns of a command that are targets of the positions beside them."""
-    count = moving = 0
-    for wanted, actual in zip(command.T, position.T, strict=False):
-        extent, asked = float(np.ptp(actual)), float(np.ptp(wanted))
-        moves = min(extent, asked) > STILL
-        if not moves and max(extent, asked) > NEARBY:
-            break
-        if abs(float(np.mean(wanted) - np.mean(actual))) > max(extent, NEARBY):
-            break
-        if moves:
-            deviation = float(np.std(wanted)), float(np.std(actual))
-            common = float(np.mean((wanted - wanted.mean()) * (actual - actual.mean())))
-            correlation, slope = common / (deviation[0] * deviation[1]), common / deviation[0] ** 2
-            if correlation < FOLLOWS or not SLOPES[0] <= slope <= SLOPES[1]:
-                break
-        count, moving = count + 1, moving + moves
-    return count if moving and 2 * count >= position.shape[1] else 0
-
-
-def _unpacked(arrays: Arrays) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Arrays, with PyBullet's joint states taken apart, and stamps in a column as a row."""
-    for name, each in arrays.items():
-        last = name.rpartition("/")[2].lower()
-        if each.ndim == 3 and last in JOINT_STATES and each.shape[2] in PARTS:
-            for part, column in PARTS[each.shape[2]].items():
-                yield f"{name}/{part}", each[:, :, column]
-        elif each.ndim == 2 and each.shape[1] == 1 and last in TIMES:
-            yield name, each[:, 0]
-        elif each.ndim in (1, 2) and len(each) > 1:
-            yield name, each
-
-
-def _roles(arrays: Arrays, mapped: set[str]) -> dict[str, str]:
+def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
     """Meaning of the arrays, without those for which another one stands."""
-    naming = Naming.of(name for name, each in arrays.items() if each.ndim == 1)
     roles = {name: "" if name in mapped else meaning(name) for name in arrays}
     for name, each in arrays.items():  # columns that name their joint
         if name not in mapped and not roles[name] and each.ndim == 1:
             roles[name] = (column_signal(name, naming) or ("",))[0]
+        elif roles[name] == COMMAND and each.ndim == 1:
+            roles[name] = ""
     robots = {match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
-    chosen = "robot" if "robot" in robots else min(robots, default="")
-    dropped = []
-    for name, what in roles.items():
-        match = STATES.fullmatch(name)
-        others = [n for n in roles if n != name and roles[n] == what and n not in dropped]
-        if (match and match["robot"] != chosen and name not in mapped) or (
-            what in (QPOS, QVEL, FORCE) and others and name != min((name, *others), key=len)
-        ):
-            dropped.append(name)
-    return {n: what for n, what in roles.items() if what != COPY and n not in dropped}
+    chosen = {"robot"} & robots or {min(robots, default="")}
+    first: dict[str, str] = {}  # of MuJoCo's arrays the one of the shortest name
+    for name in sorted(roles, key=len):
+        if roles[name] in (QPOS, QVEL, FORCE):
+            first.setdefault(roles[name], name)
+    return {
+        name: what
+        for name, what in roles.items()
+        if what != COPY
+        and first.get(what, name) == name
+        and (name in mapped or not (match := STATES.fullmatch(name)) or match["robot"] in chosen)
+    }
 
 
-def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
+def _time(arrays: Arrays, options: ReadOptions, columns: set[str]) -> tuple[str, Arrays]:
     """Name of the array with the stamps, empty without; a part of one is an array then."""
-    rows = [name for name, each in arrays.items() if each.ndim == 1]
-    if not options.time:
-        samples = max((len(each) for each in arrays.values()), default=0)
-        counters = {
-            name: arrays[name]
-            for name in rows
-            if len(arrays[name]) == samples and not (column_signal(name) or array_signal(name))
-        }
-        return time_column(rows) or counting(counters), arrays
-    values = _part(arrays, options.time)
-    if values is None:
-        return time_column(rows), arrays
-    return (options.time, {**arrays, options.time: values[:, 0]}) if values.size else ("", arrays)
-
-
-def _part(arrays: Arrays, source: str) -> NDArray[Any] | None:
-    """An array or a part of it, shape (samples, columns); None if there is no such array."""
+    source = options.time
     name, part = (source, slice(None)) if source in arrays else Entry("", "", source).part()
-    return arrays[name].reshape(len(arrays[name]), -1)[:, part] if name in arrays else None
+    if name in arrays:
+        values = arrays[name].reshape(len(arrays[name]), -1)[:, part]
+        if values.size:
+            return source, {**arrays, source: values[:, 0]}
+    samples = max((len(each) for each in arrays.values()), default=0)
+    rows = {name: each for name, each in arrays.items() if each.ndim == 1}
+    counters = {n: each for n, each in rows.items() if len(each) == samples and n not in columns}
+    return time_column([*rows]) or counting(counters), arrays
 
 
 def _of_one_length(
     path: Path, arrays: Arrays, names: Sequence[str], roles: Mapping[str, str]
-) -> dict[str, NDArray[Any]]:
+) -> Arrays:
     """Arrays of as many samples as there are stamps.
 
     Of an episode with one state more than actions the last state is left out.
@@ -317,53 +276,15 @@ def _of_one_length(
     commands = [name for name, what in roles.items() if what == COMMAND]
     lengths = {len(arrays[name]) for name in (*names, *commands)}
     if max(lengths) - min(lengths) == 1:
-        shortest = min(lengths)
-        arrays = {n: each[:-1] if len(each) == shortest + 1 else each for n, each in arrays.items()}
+        longest = max(lengths)
+        arrays = {n: each[:-1] if len(each) == longest else each for n, each in arrays.items()}
     samples = len(arrays[names[0]])
     for name in names:
         each = arrays[name]
         if len(each) != samples:
             problem = f"{name!r} has shape {each.shape}; expected {samples} samples, as stamps"
             raise LogError(path, f"{problem}, along its first axis")
-    return dict(arrays)
-
-
-def _state(
-    arrays: Arrays, roles: Mapping[str, str], options: ReadOptions
-) -> tuple[list[Entry], list[Entry], list[str], tuple[Real | None, Real | None]]:
-    """What holds the state, and what the positions follow: mappings of both, and remarks.
-
-    Besides, the positions and velocities, by the options, the format or names; None without.
-    """
-    state = [*_of_mujoco(arrays, roles)]
-    measured: dict[str, Real | None] = {}
-    place = ""
-    for signal in ("velocity", "position"):
-        entries = (e for e in (*options.entries, *state) if e.signal == signal and not e.joint)
-        named = (name for name, what in roles.items() if what == signal)
-        isaac_first = sorted(named, key=lambda name: not STATES.fullmatch(name))
-        place = (*(entry.source for entry in entries), *isaac_first, "")[0]
-        values = _part(arrays, place)
-        measured[signal] = None if values is None else floats(values)
-    position, velocity = measured["position"], measured["velocity"]
-    targets, remarks = list[Entry](), list[str]()
-    commands = [n for n, what in roles.items() if what == COMMAND and arrays[n].ndim == 2]
-    if "position_desired" in {*roles.values(), *(entry.signal for entry in options.entries)}:
-        commands = []
-    for name in sorted(commands, key=lambda name: "processed" not in name):
-        command = arrays[name]
-        if position is None or len(command) != len(position):
-            continue
-        if count := followed(command, position):
-            part = name if count == command.shape[1] else f"{name}[0:{count}]"
-            targets.append(Entry("position_desired", "", part))
-            break
-    if commands and position is not None and not targets:
-        remarks.append(
-            f"{listed(commands)} not taken as desired positions: {place} does not follow;"
-            f" --map position_desired={commands[0]} takes it"
-        )
-    return state, targets, remarks, (position, velocity)
+    return arrays
 
 
 def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
@@ -412,11 +333,11 @@ def _floating(qpos: Real, count: int) -> list[int]:
     return places
 
 
-def _base_of_isaac(arrays: Arrays, roles: Mapping[str, str], stamps: Stamps) -> Iterator[Entry]:
+def _base_of_isaac(arrays: Arrays, roles: Mapping[str, str], samples: int) -> Iterator[Entry]:
     """Mapping of a root that moves; that of a robot on a table is left out."""
     found = {match["what"]: name for name in roles if (match := STATES.fullmatch(name))}
     pose = arrays.get(found.get("root_pose", ""))
-    if pose is None or pose.shape != (len(stamps.time), 7):
+    if pose is None or pose.shape != (samples, 7):
         return
     velocity = arrays.get(found.get("root_velocity", ""), np.empty(0))
     if max(np.ptp(pose, axis=0).max(), np.abs(velocity).max(initial=0)) < STILL:
@@ -425,57 +346,18 @@ def _base_of_isaac(arrays: Arrays, roles: Mapping[str, str], stamps: Stamps) -> 
         yield Entry("base_pose", "wxyz", found["root_pose"])
         return
 
-    def error(order: str) -> float:
-        """Distance of the logged angular velocities from the turns of the pose, in world axes."""
+    def agreement(order: str) -> float:
+        """Cosine of the logged angular velocities and the turns of the pose, in world axes."""
         turned = pose_of(pose, order)[:, 3:]
-        rate = np.gradient(turned, stamps.time, axis=0)
+        rate = np.gradient(turned, axis=0)
         vector, scalar = turned[:, :3], turned[:, 3:]
         # omega = 2 vec(q_dot conj(q))
         omega = scalar * rate[:, :3] - rate[:, 3:] * vector - np.cross(rate[:, :3], vector)
-        return float(np.linalg.norm(2 * omega - velocity[:, 3:]))
+        return float(np.vdot(omega, velocity[:, 3:])) / max(float(np.linalg.norm(omega)), 1e-12)
 
-    order = min(("wxyz", "xyzw"), key=error)  # Isaac Lab 3.0 changed it
+    order = max(("wxyz", "xyzw"), key=agreement)  # Isaac Lab 3.0 changed it
     yield Entry("base_velocity", "world", found["root_velocity"])
     yield Entry("base_pose", order, found["root_pose"])
-
-
-def _joints(
-    joints: Mapping[str, tuple[str, ...]],
-    name: str,
-    roles: Mapping[str, str],
-    width: int,
-    suggested: Sequence[Entry],
-) -> tuple[str, ...]:
-    """Names of an array's columns, if the file has them; empty for those without."""
-    arms = {match["arm"] for each in roles if (match := ARMS.fullmatch(each))}
-    if len(arms) > 1 and (match := ARMS.fullmatch(name)):
-        return tuple(f"{match['arm']}_joint_{number}" for number in range(width))
-    parts = [entry for entry in suggested if entry.part()[0] == name]
-    signal = parts[-1].signal if parts else roles[name]
-    desired = signal.endswith("_desired")
-    names = joints.get("_desired" if desired else "", joints.get("", ()))
-    first, stop, _ = (parts[-1].part()[1] if parts else slice(None)).indices(width)
-    if desired and parts:
-        names = names[: stop - first]
-    if not names or len(names) != stop - first:
-        return ()
-    return (*("",) * first, *names, *("",) * (width - stop))
-
-
-def _taken(
-    fields: Sequence[Field], suggested: Sequence[Entry], options: ReadOptions
-) -> Iterator[str]:
-    """Say what is taken as what, if anything is that the options do not map."""
-    targets = {entry.signal for entry in options.entries}
-    named = [each for each in fields if each.signal]
-    best = {each.signal: each.rank for each in sorted(named, key=lambda each: -each.rank)}
-    known = [(each.signal, each.name) for each in named if each.rank == best[each.signal]]
-    for each in suggested:
-        why = "position follows it" if each.signal == "position_desired" else each.joint
-        known.append((each.signal, f"{each.source} ({why})" if why else each.source))
-    order = sorted(known, key=lambda each: SIGNALS.index(each[0]))
-    if taken := [f"{signal} = {name}" for signal, name in order if signal not in targets]:
-        yield f"taken: {', '.join(taken)}"
 
 
 def _nothing(episode: str, arrays: Arrays) -> str:

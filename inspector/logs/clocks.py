@@ -144,7 +144,6 @@ def counted_stamps(
     options: ReadOptions,
     position: Real | None,
     velocity: Real | None,
-    stated: tuple[str, float | None] = ("", None),
 ) -> Stamps:
     """Stamps in seconds of samples that are only counted: at a rate that is known or found."""
     found = None
@@ -152,7 +151,7 @@ def counted_stamps(
         holes = np.concatenate(([False], np.diff(stamps.time) != 1))
         found = rate_of(np.where(holes[:, None], np.nan, position), velocity)
     what = f"{stamps.name!r} counts samples" if stamps.name else "there are no stamps"
-    name, number = stated
+    name, number = stamps.stated
     if options.rate:
         rate, by = options.rate, "as --rate says"
         if found and abs(found / rate - 1) > DISAGREE and not options.force:

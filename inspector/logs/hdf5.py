@@ -20,7 +20,6 @@ from inspector.errors import LogError
 from inspector.logs.arrays import (
     COPY,
     EPISODE_ENDS,
-    JOINT_STATES,
     RATES,
     STATES,
     STEPS,
@@ -189,10 +188,9 @@ def _wanted(group: Any, options: ReadOptions) -> tuple[dict[str, Any], list[str]
     found: dict[str, Any] = {}
     left_out: list[str] = []
     for name, each in _datasets(group, mapped).items():
-        last = name.rpartition("/")[2].lower()
         if each.dtype.kind not in "iufb" or each.attrs.get("MATLAB_class") == b"char":
             continue
-        if 1 <= each.ndim <= 2 or (each.ndim == 3 and last in JOINT_STATES) or each.size == 1:
+        if 1 <= each.ndim <= 2 or each.size == 1:
             if _is_known(name, mapped) or each.nbytes <= SMALL:
                 found[name] = each
             else:

@@ -54,6 +54,7 @@ class Stamps:
     held: bool = False  # values apply between stamps however far apart, as in a planned trajectory
     rate: float | None = None  # that the log is said to have, in [Hz]
     name: str = ""  # of their column
+    stated: tuple[str, float | None] = ("", None)  # what else tells the rate, and that, in [Hz]
 
     @classmethod
     def of_nanoseconds(
@@ -66,9 +67,9 @@ class Stamps:
         )
 
     @classmethod
-    def counted(cls, samples: int) -> "Stamps":
+    def counted(cls, samples: int, stated: tuple[str, float | None] = ("", None)) -> "Stamps":
         """Stamps of a log that has none, until its rate is known."""
-        return cls(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES)
+        return cls(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES, stated=stated)
 
     @cached_property
     def clock(self) -> Clock:

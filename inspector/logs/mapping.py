@@ -18,6 +18,7 @@ from inspector.logs.log import JOINT, Entry, Field, Log, Track
 from inspector.logs.names import (
     BASE_SIGNALS,
     JOINT_SIGNALS,
+    SIGNALS,
     Naming,
     array_signal,
     column_signal,
@@ -35,6 +36,11 @@ from noisemodel.files import replacing
 from noisemodel.types import Array, Mask, Real
 
 FORMAT = "noise-mapping/1"
+COMMAND = "command"  # the signal of fields that may be desired positions: their values decide
+# Least correlation of a position with its target, and the range of its slope.
+FOLLOWS, SLOPES = 0.9, (0.5, 2.0)
+# What moves less does not move; largest mean distance of its target, both in [rad] or [m].
+STILL, NEARBY = 1e-3, 0.1
 # Units of angles; normalised is -100 to 100 of each joint's range, 0 to 100 of a gripper's.
 UNITS = ("radians", "degrees", "normalised")
 RATES = (1e-3, 1e9)  # rates that a log may be said to have, in [Hz]
@@ -234,13 +240,14 @@ class _Choice(NamedTuple):
     columns: slice
     signal: str
     joint: str  # or the convention of a base
-    explicit: bool = False  # by the options
+    source: str  # the entry of a mapping, or the name of the field
+    by: str = "name"  # what chose it: "options", "format" or its "name"
 
     @property
     def label(self) -> str:
         """Its name in the log."""
         if self.field.joints and not self.field.stamps.rows:
-            return f"{self.field.name} of {self.field.joints[self.columns.start]}"
+            return f"{self.field.name} of {self.joint}"
         alone = self.field.values.shape[1] == 1
         return self.field.name if alone else f"{self.field.name}[{self.columns.start}]"
 
@@ -253,29 +260,96 @@ class _Choice(NamedTuple):
 def tracks_of(
     log: Log, options: ReadOptions, robot: Robot | None
 ) -> tuple[tuple[Track, ...], tuple[str, ...], tuple[str, ...]]:
-    """Tracks of a log; the mapping takes precedence over the names of columns."""
+    """Tracks of a log, what is not read, and remarks; the mapping goes before names of columns."""
     log, converted = _without_units(log, options)
     names = [field.name for field in log.fields]
     options = options.for_columns(log.path, [name for name in names if name != log.time])
     joints = robot.joint_names if robot else ()
     naming = Naming.of((field.name for field in log.fields if _is_column(field)), joints)
-    found, unknown = _of_robot([*_choices(log, options, naming, joints)], robot)
+    found, unknown = _of_robot([*_choices(log, options, naming, options.joints or joints)], robot)
     kept = _unique(log, found)
     if not any(choice.signal.startswith(("position", "velocity")) for choice in kept):
         raise no_motion(log.path, [*names, *log.not_read])
+    targets, problem = _targets(log, kept)
+    kept += targets
+    remarks = [*_taken(log, kept), *problem]
     read = {id(choice.field) for choice in kept}
     not_read = tuple(field.name for field in log.fields if id(field) not in read)
-    remarks = []
     for unit, of_unit in converted.items():
         if taken := [name for name in of_unit if name not in not_read]:
             remarks.append(f"{listed(taken)}: converted from {unit}, as their names say")
     if naming.qd_is_desired:
         remarks.append("qd is the desired position, since dq is the velocity (else --map)")
-    if naming.remark and any(not c.explicit and c.field.name in naming.bare for c in kept):
+    if naming.remark and any(c.by == "name" and c.field.name in naming.bare for c in kept):
         remarks.append(naming.remark)
     if unknown and robot:
         remarks.append(f"left out, not joints of {robot.name!r}: {listed(unknown)}")
     return (*_base_tracks(log, kept), *_joint_tracks(kept)), (*log.not_read, *not_read), (*remarks,)
+
+
+def _targets(log: Log, choices: Sequence[_Choice]) -> tuple[list[_Choice], list[str]]:
+    """Columns of the first command that the positions follow, and a remark if there is none."""
+    signals = {each.signal for each in choices}
+    commands = [each for each in log.fields if each.signal == COMMAND]
+    if not commands or "position" not in signals or "position_desired" in signals:
+        return [], []
+    position = next(t for t in _joint_tracks(choices) if t.signal == "position")
+    for each in sorted(commands, key=lambda field: "processed" not in field.name):
+        count = 0
+        if each.stamps is position.stamps:
+            count = followed(each.values, position.values)
+        if count:
+            part = "" if count == each.values.shape[1] else f"[0:{count}]"
+            return [
+                _Choice(
+                    each,
+                    slice(column, column + 1),
+                    "position_desired",
+                    position.joints[column],
+                    f"{each.name}{part}",
+                    "format",
+                )
+                for column in range(count)
+            ], []
+    place = next(each.source for each in choices if each.signal == "position")
+    return [], [
+        f"{listed([each.name for each in commands])} not taken as desired positions: {place} does"
+        f" not follow; --map position_desired={commands[0].name} takes it"
+    ]
+
+
+def followed(command: Real, position: Real) -> int:
+    """Number of leading columns of a command that are targets of the positions beside them."""
+    count = moving = 0
+    for wanted, actual in zip(command.T, position.T, strict=False):
+        extent, asked = float(np.ptp(actual)), float(np.ptp(wanted))
+        moves = min(extent, asked) > STILL
+        if not moves and max(extent, asked) > NEARBY:
+            break
+        if abs(float(np.mean(wanted) - np.mean(actual))) > max(extent, NEARBY):
+            break
+        if moves:
+            deviation = float(np.std(wanted)), float(np.std(actual))
+            common = float(np.mean((wanted - wanted.mean()) * (actual - actual.mean())))
+            correlation, slope = common / (deviation[0] * deviation[1]), common / deviation[0] ** 2
+            if correlation < FOLLOWS or not SLOPES[0] <= slope <= SLOPES[1]:
+                break
+        count, moving = count + 1, moving + moves
+    return count if moving and 2 * count >= position.shape[1] else 0
+
+
+def _taken(log: Log, choices: Sequence[_Choice]) -> Iterator[str]:
+    """Say which arrays of a file are taken for what, if the options do not say it."""
+    found = set[tuple[int, str]]()
+    for each in choices:
+        field, why = each.field, each.joint if each.signal in BASE_SIGNALS else ""
+        named = field.source == log.path.name and not (_is_column(field) or field.stamps.rows)
+        if each.by == "format" or (each.by == "name" and named):
+            why = "position follows it" if field.signal == COMMAND else why
+            text = f"{each.signal} = {each.source}{f' ({why})' if why else ''}"
+            found.add((SIGNALS.index(each.signal), text))
+    if found:
+        yield f"taken: {', '.join(text for _, text in sorted(found))}"
 
 
 def _without_units(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[str]]]:
@@ -313,7 +387,7 @@ def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice
     for each in choices:
         foreign = each.signal in JOINT_SIGNALS and each.joint not in robot.joint_names
         (unknown if foreign else known).append(each)
-    wrong = [each for each in unknown if each.explicit]
+    wrong = [each for each in unknown if each.by == "options"]
     if not any(each.signal in JOINT_SIGNALS for each in known):
         wrong = unknown
     if wrong:
@@ -327,7 +401,7 @@ def _unique(log: Log, choices: Sequence[_Choice]) -> list[_Choice]:
     for choice in choices:
         target = choice.signal, "" if choice.signal in BASE_SIGNALS else choice.joint
         other = found.setdefault(target, choice)
-        rank, before = ((not each.explicit, each.field.rank) for each in (choice, other))
+        rank, before = ((each.by != "options", each.field.rank) for each in (choice, other))
         if rank < before:
             found[target] = choice
         elif rank == before and other is not choice:
@@ -436,7 +510,6 @@ def _choices(
     log: Log, options: ReadOptions, naming: Naming, joints: Sequence[str]
 ) -> Iterator[_Choice]:
     """Columns and their signals: by the options, then by the format, then by their names."""
-    joints = options.joints or joints
     by_name = {field.name: field for field in log.fields}
     signals = {entry.signal for entry in options.entries if not entry.joint}
     sources = {entry.part()[0] for entry in options.entries}
@@ -463,18 +536,19 @@ def _choices(
                 f" {name}[0]",
             )
         if entry.signal != "time":
-            part = slice(start, stop)
-            for choice in _columns(log, field, part, entry.signal, entry.joint, options, joints):
-                yield choice._replace(explicit=entry in options.entries)
+            by = "options" if entry in options.entries else "format"
+            choice = _Choice(field, slice(start, stop), entry.signal, entry.joint, entry.source, by)
+            yield from _columns(log, choice, options, joints)
     known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
     named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
     numbered = {number_of(joint): joint for joint in reversed(named)}
     for each in log.fields:
         if id(each) not in mapped and each.name != options.time:
             signal, joint = _meaning(log, each, naming, numbered, joints)
-            if signal:
+            if signal and signal != COMMAND:
                 whole = slice(0, each.values.shape[1])
-                yield from _columns(log, each, whole, signal, joint, options, joints)
+                choice = _Choice(each, whole, signal, joint, each.name)
+                yield from _columns(log, choice, options, joints)
 
 
 def _meaning(
@@ -508,24 +582,21 @@ def _meaning(
 
 
 def _columns(
-    log: Log,
-    field: Field,
-    part: slice,
-    signal: str,
-    joint: str,
-    options: ReadOptions,
-    joints: Sequence[str],
+    log: Log, whole: _Choice, options: ReadOptions, joints: Sequence[str]
 ) -> Iterator[_Choice]:
     """Columns of a field: of one joint, of the base with its convention, or one for each joint."""
+    field, part, signal = whole.field, whole.columns, whole.signal
     width = part.stop - part.start
     if signal in BASE_SIGNALS and width != WIDTHS[signal]:
         raise LogError(
             log.path, f"{field.name!r} has {width} columns, a {signal} has {WIDTHS[signal]}"
         )
-    if signal in BASE_SIGNALS or joint:
-        yield _Choice(field, part, signal, joint)
+    if signal in BASE_SIGNALS or whole.joint:
+        yield whole
         return
-    names: Sequence[str] = field.joints[part]
+    names: Sequence[str] = ()
+    if len(field.joints) in (width, field.values.shape[1]):
+        names = field.joints if len(field.joints) == width else field.joints[part]
     if not names or len(options.joints) == width:
         names = joints
         other = options.joints and len(names) != width and not signal.endswith("_desired")
@@ -538,4 +609,4 @@ def _columns(
             )
     names = names or [f"joint_{number}" for number in range(width)]
     for column, name in zip(range(part.start, part.stop), names[:width], strict=True):
-        yield _Choice(field, slice(column, column + 1), signal, name)
+        yield whole._replace(columns=slice(column, column + 1), joint=name)
