@@ -39,6 +39,17 @@ def test_columns_of_lists_are_arrays_of_joints(tmp_path):
     assert np.array_equal(run.velocity, VELOCITY)
 
 
+def test_columns_of_mujocos_state_and_a_counter_are_read_as_in_other_tables(tmp_path):
+    columns = {f"qpos_{n}": POSITION[:, n] for n in range(3)}
+    columns |= {f"ctrl_{n}": POSITION[:, n] for n in range(3)}
+    imported = read_log(wide(tmp_path, step=np.arange(400), **columns), rate=100)
+    assert np.array_equal(imported.run.position_desired, POSITION)
+    assert imported.remarks[:2] == (
+        "log.parquet: 'step' counts samples: 100 Hz, as --rate says",
+        "log.parquet: taken: position = qpos[0:3], position_desired = ctrl (position follows it)",
+    )
+
+
 def test_what_does_not_fit_is_an_error_of_one_line(tmp_path):
     ragged = [row[: 2 + n % 2] for n, row in enumerate(POSITION)]
     with pytest.raises(
@@ -80,6 +91,13 @@ def test_one_episode_is_chosen_by_its_number(tmp_path):
         read_log(folder)
     with pytest.raises(LogError, match="there is no episode '7'; it has 0, 1"):
         read_log(folder, episode="7")
+
+
+def test_stamps_that_the_rate_contradicts_are_taken_as_logged(tmp_path):
+    folder = write_lerobot(tmp_path / "set", [STATE], names=list(JOINTS))
+    info = folder / "meta" / "info.json"
+    info.write_text(info.read_text().replace('"fps": 30', '"fps": 25'))
+    assert read_log(folder).run.rate == pytest.approx(30.0, rel=1e-5)
 
 
 def test_stamps_of_float32_do_not_make_a_long_episode_jitter(tmp_path):

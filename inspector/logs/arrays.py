@@ -160,7 +160,7 @@ def log_of(
             )
         )
     read = {time, *(each.name for each in fields)}
-    return Log(
+    log = Log(
         path,
         tuple(fields),
         episode,
@@ -168,6 +168,7 @@ def log_of(
         suggested=(*_of_mujoco(arrays, roles), *_base_of_isaac(arrays, roles, samples)),
         time=time,
     )
+    return gathered(log, options)
 
 
 def gathered(log: Log, options: ReadOptions) -> Log:

@@ -23,33 +23,36 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.arrays import floats
-from inspector.logs.clocks import counting, stamps_of
+from inspector.logs.arrays import CELLS, floats, log_of
+from inspector.logs.clocks import stamps_of
 from inspector.logs.log import Field, Log, LogReader, Stamps
-from inspector.logs.mapping import ReadOptions
+from inspector.logs.mapping import ReadOptions, no_motion
 from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
 from noisemodel.files import beyond, limit
 from noisemodel.runfile import ArchiveError, check_regular, check_unpacked, one_line
-from noisemodel.types import Real
 
 # Errors that pyarrow raises for damaged files.
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
 EPISODE = "episode_index"  # the column with the number of the episode, if there is one
 
 INFO = Path("meta", "info.json")  # the file that describes a LeRobot data set
-STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
-# Features that some data sets have besides (ALOHA's), and their signals.
-FURTHER = {"observation.velocity": "velocity", "observation.effort": "effort"}
+STATE, ACTION, STAMP = "observation.state", "action", "timestamp"
+# Features and their signals; some data sets (ALOHA's) have more than states and actions.
+FEATURES = {
+    STATE: "position",
+    ACTION: "position",
+    "observation.velocity": "velocity",
+    "observation.effort": "effort",
+}
 # Signals by the last part of a name: ``shoulder_pan.pos``.
 PARTS = {"pos": "position", "vel": "velocity", "effort": "effort", "torque": "effort"}
 # Column names of an end effector's pose.
 CARTESIAN = {"x", "y", "z", "roll", "pitch", "yaw", "rx", "ry", "rz", "qx", "qy", "qz", "qw"}
 SLOWEST, FASTEST = 1e-3, 1e6  # rates that a data set may have, in [Hz]
-LATEST = 9e9  # stamps and frame numbers lie before: in nanoseconds, these fit into 64 bits
-# Largest difference of a stamp from its frame number over the rate, in [s], as in LeRobot.
-TOLERANCE = 1e-4
+TOLERANCE = 1e-4  # largest difference of a stamp from the rate's, in [s], as in LeRobot
+IMAGES = "observation.images"  # beginning of the names of features that are videos
 UNKNOWN = (
     "LeRobot does not log the unit of its '.pos' features: specify --units degrees, normalised"
     " (-100 to 100 of each joint's range, needs --robot) or radians"
@@ -132,36 +135,36 @@ def _values(path: Path, table: Any, name: str) -> NDArray[Any] | None:
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     schema = _schema(path)
-    names = schema.names
-    time = options.time if options.time in names else time_column(names)
-    signals = [name for name in names if name not in (time, EPISODE)]
-    options = options.for_columns(path, signals)
-    mapped = {name for entry in options.entries for name in (entry.source, entry.part()[0])}
+    time = options.time or time_column(schema.names)
+    names = [name for name in schema.names if name not in (time, EPISODE)]
+    entries = options.for_columns(path, names).entries
+    mapped = {name for entry in entries for name in (entry.source, entry.part()[0])}
     naming = Naming.of(names, options.known_joints)
-    known = {n for n in signals if column_signal(n, naming) or array_signal(n)}
-    wanted = [name for name in names if name in mapped | known]
-    counters = [
-        each.name
-        for each in schema
-        if not time and pyarrow.types.is_integer(each.type) and each.name not in (*wanted, EPISODE)
+    wanted = [
+        name
+        for name in names
+        if name in mapped
+        or column_signal(name, naming)
+        or array_signal(name)
+        or CELLS.fullmatch(name)
     ]
-    table = _table([path], [*wanted, *counters, *({time} - {"", *wanted})], episode)
-    time = time or counting({name: table.column(name).to_numpy() for name in counters})
-    stamps = Stamps.counted(len(table))
-    if time:
-        column = _values(path, table, time)
-        if column is None or column.shape[1] != 1:
-            raise LogError(path, f"column {time!r} holds no stamps but {table.column(time).type}")
-        stamps = stamps_of(path, time, column[:, 0], options.rate)
-    arrays = {name: _values(path, table, name) for name in wanted}
-    fields = tuple(
-        Field(name, floats(values), stamps, source=path.name)
-        for name, values in arrays.items()
-        if values is not None and values.dtype.kind in "iuf"
-    )
-    read = {time, EPISODE, *(field.name for field in fields)}
-    not_read = tuple(name for name in names if name not in read)
-    return Log(path, fields, episode, not_read=not_read, time=time)
+    if not wanted:
+        raise no_motion(path, schema.names)
+    if time in schema.names:
+        wanted.append(time)
+    else:  # one of the columns of integers may count the samples
+        integers = [each.name for each in schema if pyarrow.types.is_integer(each.type)]
+        wanted += [name for name in integers if name not in (*wanted, EPISODE)]
+    table = _table([path], wanted, episode)
+    arrays = {
+        name: values[:, 0] if values.shape[1] == 1 else values
+        for name in wanted
+        if (values := _values(path, table, name)) is not None
+    }
+    if time in schema.names and time not in arrays:
+        raise LogError(path, f"column {time!r} holds no stamps but {table.column(time).type}")
+    not_read = [name for name in schema.names if name not in (*arrays, EPISODE)]
+    return log_of(path, arrays, options, episode=episode, not_read=not_read)
 
 
 # What columns unpack to
@@ -332,41 +335,44 @@ def _episode(
 ) -> Log:
     features, present = info["features"], _schema(files[0]).names
     mapped = {entry.part()[0] for entry in options.entries}
-    wanted = [name for name in present if name in (STATE, ACTION, *FURTHER) or name in mapped]
-    clock = [name for name in (STAMP, FRAME) if name in present]
-    table = _table(files, [*wanted, *clock], episode)
-    stamps = _stamps(path, info, table, options)
-    found: list[Field] = []
+    wanted = [name for name in present if name in {*FEATURES, *mapped, STAMP}]
+    table = _table(files, wanted, episode)
+    arrays = {n: v for n in wanted if n != STAMP and (v := _values(path, table, n)) is not None}
+    columns = {
+        name: names
+        if len(names := _names(features, name)) == each.shape[1]
+        else [""] * each.shape[1]
+        for name, each in arrays.items()
+    }
     remarks = []
-    for name in wanted:
-        values = _values(path, table, name)
-        if values is None:
-            continue
-        names = _names(features, name)
-        names = names if len(names) == values.shape[1] else []
-        if not names and name == STATE:
-            remarks.append(f"{STATE} has no names; it is read as joint positions")
-        found += _fields(name, floats(values), stamps, names, mapped=name in mapped)
-    fields = _checked(path, found, mapped)
-    if taken := [f"{each.signal} = {each.name}" for each in fields if each.signal]:
-        remarks.append(f"taken: {', '.join(taken)}")
-    sources = {each.source for each in fields}
-    if ACTION in {each.source for each in found} - sources:
+    state = [] if STATE in mapped else columns.get(STATE, [])
+    if CARTESIAN & {name.lower() for name in state}:
+        raise LogError(
+            path,
+            f"{STATE} holds {listed(state)}: the pose of an end effector, not joints; name the"
+            " columns that are joints, such as --map position=observation.state[6:12]",
+        )
+    if state and not any(state):
+        remarks.append(f"{STATE} has no names; it is read as joint positions")
+    if ACTION in arrays and ACTION not in mapped and columns[ACTION] != state:
+        del arrays[ACTION]
         remarks.append(
             f"{ACTION} not taken as desired positions: its columns are not those of {STATE};"
             f" --map position_desired={ACTION}[0:6] takes some"
         )
-    ends = [each.rpartition(".")[1:] for name in sources for each in _names(features, name)]
+    stamps = _stamps(path, info, table, options)
+    fields = [
+        field
+        for name, each in arrays.items()
+        for field in _fields(path, name, each, columns[name], stamps, mapped)
+    ]
     meta = {"robot_type": info.get("robot_type"), "dataset": info.get("codebase_version")}
+    ends = [column.rpartition(".")[1:] for name in arrays for column in columns[name]]
     return Log(
         path,
         tuple(fields),
         episode,
-        not_read=tuple(
-            name
-            for name in features
-            if name not in sources and not name.startswith("observation.images")
-        ),
+        not_read=tuple(n for n in features if n not in arrays and not n.startswith(IMAGES)),
         remarks=tuple(remarks),
         units=UNKNOWN if any(dot and end in PARTS for dot, end in ends) else "",
         meta={key: value for key, value in meta.items() if value},
@@ -374,67 +380,39 @@ def _episode(
 
 
 def _fields(
-    name: str, values: Real, stamps: Stamps, names: Sequence[str], *, mapped: bool
+    path: Path,
+    name: str,
+    values: NDArray[Any],
+    columns: Sequence[str],
+    stamps: Stamps,
+    mapped: Collection[str],
 ) -> Iterator[Field]:
     """Fields of a feature, one for each signal that its columns hold."""
-    ends = [each.rpartition(".") for each in names]
-    whole = FURTHER.get(name, "position")
-    kinds = ["position" if mapped else PARTS.get(end, whole) for _, _, end in ends]
-    known = name in (STATE, ACTION, *FURTHER) and not mapped
-    for kind in dict.fromkeys(kinds or [whole]):
-        columns = [place for place, each in enumerate(kinds) if each == kind]
-        alone = len(columns) in (0, values.shape[1])
-        signal = f"{kind}_desired" if name == ACTION else kind
+    ends = [column.rpartition(".") for column in columns]
+    held = "" if name in mapped else FEATURES[name]
+    kinds = [held and PARTS.get(end, held) for _, _, end in ends]
+    for kind in dict.fromkeys(kinds):
+        of_kind = [place for place, other in enumerate(kinds) if other == kind]
+        alone = len(of_kind) == len(kinds)
+        signal = f"{kind}_desired" if name == ACTION and kind else kind
         yield Field(
             name if alone else f"{name}/{kind}",
-            values if alone else values[:, columns],
+            floats(values if alone else values[:, of_kind]),
             stamps,
-            joints=tuple(ends[place][0] or ends[place][2] for place in columns),
-            signal=signal if known and signal != "effort_desired" else "",
-            source=name,
+            joints=tuple(filter(None, (ends[n][0] or ends[n][2] for n in of_kind))),
+            signal="" if signal == "effort_desired" else signal,
+            source=path.name,
         )
 
 
-def _checked(path: Path, fields: list[Field], mapped: set[str]) -> list[Field]:
-    """Fields without actions that do not match the state; an end effector's pose is refused."""
-    known = set()
-    for each in fields:
-        if each.source == STATE and STATE not in mapped:
-            if CARTESIAN & {name.lower() for name in each.joints}:
-                raise LogError(
-                    path,
-                    f"{STATE} holds {listed(each.joints)}: the pose of an end effector, not joints;"
-                    " name the columns that are joints, such as --map"
-                    " position=observation.state[6:12]",
-                )
-            known.add((each.signal, each.joints, each.values.shape[1]))
-    return [
-        each
-        for each in fields
-        if each.source != ACTION
-        or ACTION in mapped
-        or (each.signal.removesuffix("_desired"), each.joints, each.values.shape[1]) in known
-    ]
-
-
 def _stamps(path: Path, info: dict[str, Any], table: Any, options: ReadOptions) -> Stamps:
-    """Stamps from frame numbers if they agree: logged stamps are float32, too coarse."""
+    """Stamps at the rate, if the logged ones agree: these are float32, too coarse."""
     rate = options.rate or info.get("fps")
-    clock = {}
-    for name in (FRAME, STAMP):
-        if name in table.column_names:
-            values = _values(path, table, name)
-            if values is None or values.shape[1] != 1 or values.dtype.kind not in "iuf":
-                values = np.full((1, 1), np.nan)
-            clock[name] = values[:, 0].astype(np.float64)
-            if not (np.abs(clock[name]) < LATEST).all():
-                raise LogError(path, f"column {name!r} holds a value that is no time")
-    frames, logged = clock.get(FRAME), clock.get(STAMP)
-    if logged is not None and (
-        frames is None or not rate or (np.abs(logged - frames / rate) > TOLERANCE).any()
-    ):
-        return Stamps.of_nanoseconds(np.round(logged * 1e9).astype(np.int64))
-    if not rate:
-        raise LogError(path, "meta/info.json has no fps; specify the rate (--rate)")
-    stamps = Stamps.counted(len(table))
-    return replace(stamps, time=stamps.time * (1 / rate), unit="seconds")
+    even = Stamps.counted(len(table))
+    if rate:
+        even = replace(even, time=even.time * (1 / rate), unit="seconds")
+    if STAMP not in table.column_names:
+        return even
+    logged = stamps_of(path, STAMP, table.column(STAMP).to_numpy(), rate)
+    agrees = rate and (np.abs(logged.time - even.time) <= TOLERANCE).all()
+    return replace(logged, time=even.time) if agrees else logged
