@@ -101,15 +101,14 @@ class ReadOptions:
         for entry in sorted(patterns, key=lambda each: -len(each.source)):
             before, _, after = entry.source.partition(JOINT)
             form = re.compile(f"{re.escape(before)}(.+){re.escape(after)}")
-            found = [(name, match[1]) for name in names if (match := form.fullmatch(name))]
-            free = [(name, joint) for name, joint in found if name not in taken]
-            if not free and (not found or entry.source != JOINT):
+            free = {n: match[1] for n in names if n not in taken and (match := form.fullmatch(n))}
+            if not free:
                 raise LogError(
                     path,
                     f"the pattern {entry.target}={entry.source} fits no column that is free;"
                     f" columns are {listed(names)}",
                 )
-            for name, joint in free:
+            for name, joint in free.items():
                 new = Entry(entry.signal, entry.joint.replace(JOINT, joint), name)
                 if new.target in targets:
                     raise LogError(
@@ -146,14 +145,18 @@ class ReadOptions:
 
     def save(self, path: Path, *, overwrite: bool = False) -> None:
         """Write the options as TOML, to be loaded again."""
+
+        def toml(value: Any) -> str:  # JSON's values are TOML's, but for one character
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
         lines = [f'format = "{FORMAT}"']
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name != "entries" and value is not False and value not in (None, "", ()):
-                lines.append(f"{field.name} = {_toml(value)}")
+                lines.append(f"{field.name} = {toml(value)}")
         if self.entries:
             lines += ["", "[map]"]
-            lines += [f"{_toml(each.target)} = {_toml(each.source)}" for each in self.entries]
+            lines += [f"{toml(each.target)} = {toml(each.source)}" for each in self.entries]
         with replacing(path, overwrite=overwrite) as temporary:
             temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -213,24 +216,16 @@ def read_options(
 
 def _setting(name: str, value: Any) -> Any:
     """Setting of a saved mapping, its type checked."""
-    if name in ("joints", "topics", "columns"):
-        correct = isinstance(value, list) and all(isinstance(each, str) for each in value)
-        value = tuple(value) if correct else value
-    elif name in ("rate", "offset"):
-        correct = isinstance(value, int | float) and not isinstance(value, bool)
+    lists = name in ("joints", "topics", "columns")
+    kinds: Mapping[str, tuple[type, ...]] = {"rate": (int, float), "offset": (int, float)}
+    if name == "force":
+        correct = isinstance(value, bool)
     else:
-        correct = isinstance(value, bool if name == "force" else str)
-    if not correct:
+        wanted = kinds.get(name, (list,) if lists else (str,))
+        correct = isinstance(value, wanted) and not isinstance(value, bool)
+    if not correct or (lists and not all(isinstance(each, str) for each in value)):
         raise InspectorError(f"{name} = {toml_shown(value)} is of another type than expected")
-    return value
-
-
-def _toml(value: str | float | bool | tuple[str, ...]) -> str:
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if isinstance(value, str):  # JSON's strings are TOML's, but for one character
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return "true" if value is True else repr(float(value))
+    return tuple(value) if lists else value
 
 
 class _Choice(NamedTuple):
@@ -413,16 +408,15 @@ def _unique(log: Log, choices: Sequence[_Choice]) -> list[_Choice]:
 def _both(log: Log, joint: str, before: _Choice, after: _Choice) -> LogError:
     """Error of two columns that hold the same signal."""
     old, new = before.field, after.field
-    what = f"{after.signal} of " + (f"joint {joint!r}" if joint else "the base")
-    how = "" if JOINT in joint else f"; choose with --map '{after.signal}.{joint}={after.label}'"
-    names = f"{before.label!r} and {after.label!r}"
-    if new.source != old.source:
-        names, how = f"{old.source} and {new.source}", "; choose with --topic"
-    elif new.joints != old.joints:
+    if new.source == old.source and new.joints != old.joints:
         problem = f"{new.source}: the set of joints changes within the log; split it there"
         return LogError(log.path, problem)
-    row = 1 if new.stamps.rows is not None else None
-    return LogError(log.path, f"{names} both hold {what}{how}", row)
+    target = Entry(after.signal, joint, "").target
+    names, how = f"{before.label!r} and {after.label!r}", f"--map '{target}={after.label}'"
+    if new.source != old.source:
+        names, how = f"{old.source} and {new.source}", "--topic"
+    what = f"{after.signal} of " + (f"joint {joint!r}" if joint else "the base")
+    return LogError(log.path, f"{names} both hold {what}; choose with {how}")
 
 
 def _joint_tracks(choices: Sequence[_Choice]) -> Iterator[Track]:

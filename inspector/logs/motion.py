@@ -199,11 +199,10 @@ def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
     for stamps in {id(track.stamps): track.stamps for track in tracks}.values():
         ours = [track for track in tracks if track.stamps is stamps and track.joints]
         measured = [track for track in ours if not track.is_desired]
-        if not any(track.quantity == "position" for track in measured):
+        if "position" not in {track.signal for track in measured}:
             continue
-        same = np.ones(len(stamps.time) - 1, dtype=bool)
-        for track in measured:
-            same &= (track.values[1:] == track.values[:-1]).all(axis=1)
+        rows = [(track.values[1:] == track.values[:-1]).all(axis=1) for track in measured]
+        same = np.logical_and.reduce(rows)
         frozen = np.zeros(len(stamps.time), dtype=bool)
         for first, last, speed in _repeats(stamps.time, same, ours):
             frozen[first + 1 : last + 1] = True
@@ -269,28 +268,37 @@ def _in_si(
 ) -> tuple[list[Track], tuple[str, ...]]:
     """Tracks in radians that know which columns are angles, and what was found to be in degrees."""
     kinds = {joint.name: joint.kind for joint in robot.joints} if robot else {}
-    in_degrees: tuple[str, ...] = ()
-    found = list(tracks)
-    if units == "degrees":
-        found = [_to_radians(t, _angular(t, kinds) & ~_shares(log, t, units)) for t in tracks]
-    if units in ("degrees", "normalised"):
-        every = (_of_range(log, track, robot, units, remarks) for track in found)
-        found = [track for track in every if track is not None]
-    elif not units:
-        in_degrees = _in_degrees(tracks, kinds)
-        for place, track in enumerate(found):
-            if track.quantity in in_degrees:
-                found[place] = _to_radians(track, _angular(track, kinds))
-            _refuse_degrees(log.path, found[place], kinds)
+    in_degrees = () if units else _in_degrees(tracks, kinds)
     if in_degrees:
         plural = {"position": "positions", "velocity": "velocities"}
         remarks.append(
             f"{' and '.join(plural[each] for each in in_degrees)} look like degrees: converted to"
             " radians (if they are not, --units radians)"
         )
-    for place, track in enumerate(found):
+    found: list[Track] = []
+    for track in tracks:
+        shares = _shares(log, track, units)
+        if units == "degrees" or track.quantity in in_degrees:
+            angular = _angular(track, kinds) & ~shares
+            if angular.any():
+                values = np.where(angular, np.deg2rad(track.values), track.values)
+                track = replace(track, values=values)
+        if shares.any() and robot is None:
+            if units == "normalised":
+                problem = "normalised units are shares of the joints' ranges; name the robot"
+                raise LogError(log.path, f"{problem} (--robot)")
+            remark = "left out, since no robot tells their range: "
+            remark += listed(_chosen(track.joints, shares))
+            remarks += [] if remark in remarks else [remark]
+            if shares.all():
+                continue
+            track = _columns(track, np.flatnonzero(~shares).tolist())
+        elif shares.any() and robot:
+            track = _of_range(log.path, track, shares, robot)
+        if not units:
+            _refuse_degrees(log.path, track, kinds)
         angles = _angular(track, kinds) & track.signal.startswith("position")
-        found[place] = replace(track, angles=angles.tolist())
+        found.append(replace(track, angles=angles.tolist()))
     return found, in_degrees
 
 
@@ -356,52 +364,29 @@ def _ratio(position: Track, velocity: Track) -> float:
     return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
 
 
-def _to_radians(track: Track, angular: Mask) -> Track:
-    """Track with some columns converted from degrees."""
-    if not angular.any():
-        return track
-    return replace(track, values=np.where(angular, np.deg2rad(track.values), track.values))
-
-
 def _shares(log: Log, track: Track, units: str) -> Mask:
     """Whether each column is a share of its joint's range: grippers are whatever others are."""
-    grippers = bool(log.units)
-    every = (units == "normalised" or (grippers and _is_gripper(j)) for j in track.joints)
-    return np.array([*every], dtype=bool)
+    moves = track.signal.startswith(("position", "velocity"))
+    grippers = units == "degrees" and bool(log.units)
+    every = (units == "normalised" or (grippers and _is_gripper(joint)) for joint in track.joints)
+    return np.array([*every], dtype=bool) & moves
 
 
-def _of_range(
-    log: Log, track: Track, robot: Robot | None, units: str, remarks: list[str]
-) -> Track | None:
-    """Track in radians of one with shares of ranges; None if no column is left."""
-    shares = _shares(log, track, units)
-    if not shares.any():
-        return track
-    if robot is None and units == "degrees":
-        names = listed(_chosen(track.joints, shares))
-        remark = f"left out, since no robot tells their range: {names}"
-        remarks += [] if remark in remarks else [remark]
-        return None if shares.all() else _columns(track, np.flatnonzero(~shares).tolist())
-    if not track.signal.startswith(("position", "velocity")):
-        return track
-    if robot is None:
-        problem = "normalised units are shares of the joints' ranges; name the robot (--robot)"
-        raise LogError(log.path, problem)
+def _of_range(path: Path, track: Track, shares: Mask, robot: Robot) -> Track:
+    """Track in SI of one with shares of ranges: -100 to 100, of a gripper 0 to 100."""
     scales, zeros = np.ones(len(shares)), np.zeros(len(shares))
     for place in np.flatnonzero(shares).tolist():
-        scales[place], zeros[place] = _share_of_range(log.path, track.joints[place], robot)
+        name = track.joints[place]
+        joint = next(each for each in robot.joints if each.name == name)
+        lower = float(robot.model.lowerPositionLimit[joint.first_q])
+        span = float(robot.model.upperPositionLimit[joint.first_q]) - lower
+        if joint.kind == "continuous" or not 0 < span < 1e3:
+            raise LogError(path, f"normalised units: joint {name!r} of {robot.name!r} has no range")
+        is_gripper = _is_gripper(name)
+        scales[place] = span / 100 if is_gripper else span / 200
+        zeros[place] = lower if is_gripper else lower + span / 2
     moved = zeros if track.signal.startswith("position") else 0.0
     return replace(track, values=track.values * scales + moved)
-
-
-def _share_of_range(path: Path, name: str, robot: Robot) -> tuple[float, float]:
-    """What 1 of -100 to 100 of a joint's range is, and 0; of a gripper, of 0 to 100."""
-    joint = next(each for each in robot.joints if each.name == name)
-    lower = float(robot.model.lowerPositionLimit[joint.first_q])
-    span = float(robot.model.upperPositionLimit[joint.first_q]) - lower
-    if joint.kind == "continuous" or not 0 < span < 1e3:
-        raise LogError(path, f"normalised units: joint {name!r} of {robot.name!r} has no range")
-    return (span / 100, lower) if _is_gripper(name) else (span / 200, lower + span / 2)
 
 
 def _is_gripper(joint: str) -> bool:
@@ -526,10 +511,14 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
     covered, slack = float(own.time[-1]), UNIFORM / own.clock.rate
     logs.clear()
     del tracks, main  # each signal is freed when it has been resampled
-    parts: list[tuple[str, tuple[str, ...], Real]] = []
+    parts: dict[str, Track] = {}
     while kept:
         track = kept.pop(0)
-        parts.append((track.signal, track.joints, resampled(time, valid, track, slack)))
+        track = replace(track, values=resampled(time, valid, track, slack))
+        if before := parts.get(track.signal):
+            values = np.hstack((before.values, track.values))
+            track = replace(before, joints=before.joints + track.joints, values=values)
+        parts[track.signal] = track
     signals, differentiated, told = _signals_of(parts, time - time[0], valid)
     meta |= {"differentiated": differentiated} if differentiated else {}
     run = Run(time=time - time[0], valid=valid, robot=options.robot or None, meta=meta, **signals)
@@ -631,7 +620,7 @@ def _lost(before: float, after: float) -> str:
 
 
 def _signals_of(
-    parts: Sequence[tuple[str, tuple[str, ...], Real]], time: Array, valid: Mask
+    parts: dict[str, Track], time: Array, valid: Mask
 ) -> tuple[dict[str, Any], dict[str, str], list[str]]:
     """Signals of a run by joint, with missing velocities differentiated.
 
@@ -640,50 +629,34 @@ def _signals_of(
     signals: dict[str, Any] = {}
     differentiated: dict[str, str] = {}
     remarks: list[str] = []
-    by_signal: dict[str, tuple[tuple[str, ...], Real]] = {}
-    for signal, joints, values in parts:
-        if signal in by_signal:
-            before = by_signal[signal]
-            joints, values = before[0] + joints, np.hstack((before[1], values))
-        by_signal[signal] = joints, values
     for suffix, names in (("", "joint_names"), ("_desired", "desired_joint_names")):
         velocity, position = f"velocity{suffix}", f"position{suffix}"
-        known = [by_signal[signal][0] for signal in (velocity, position) if signal in by_signal]
+        known = [parts[signal].joints for signal in (velocity, position) if signal in parts]
         joints = tuple(dict.fromkeys(joint for each in known for joint in each))
         if not joints:
             continue
-        logged = by_signal[velocity][0] if velocity in by_signal else ()
-        missing = tuple(joint for joint in joints if joint not in logged)
-        if missing:
-            slopes = joint_velocity(time, _ordered(by_signal[position], missing), valid)
+        logged = parts[velocity].joints if velocity in parts else ()
+        if missing := tuple(joint for joint in joints if joint not in logged):
+            slopes = joint_velocity(time, parts[position].of(missing), valid)
             if logged:
-                slopes = np.hstack((by_signal[velocity][1], slopes))
-            by_signal[velocity] = logged + missing, slopes
+                slopes = np.hstack((parts[velocity].values, slopes))
+            parts[velocity] = replace(parts[position], joints=logged + missing, values=slopes)
             of_joints = f" of {', '.join(missing)}" if logged else ""
             differentiated[velocity] = METHOD + of_joints
             remarks.append(f"{velocity}{of_joints}: differentiated from positions ({METHOD})")
         signals[names] = joints
         for signal in (velocity, position) if suffix else (velocity, position, "effort"):
-            if signal not in by_signal:
+            if signal not in parts:
                 continue
-            lacking = [joint for joint in joints if joint not in by_signal[signal][0]]
-            if lacking:
+            if lacking := [joint for joint in joints if joint not in parts[signal].joints]:
                 remarks.append(f"{signal}: left out, missing for {', '.join(lacking)}")
             else:
-                signals[signal] = _ordered(by_signal[signal], joints)
+                signals[signal] = parts[signal].of(joints)
     for name in ("base_pose", "base_velocity"):
-        if name in by_signal:
-            signals[name] = by_signal[name][1]
+        if name in parts:
+            signals[name] = parts[name].values
     if "base_pose" in signals and "base_velocity" not in signals:
         signals["base_velocity"] = base_velocity(time, signals["base_pose"], valid)
         differentiated["base_velocity"] = METHOD
         remarks.append(f"base_velocity: differentiated from poses ({METHOD})")
     return signals, differentiated, remarks
-
-
-def _ordered(signal: tuple[tuple[str, ...], Real], joints: Sequence[str]) -> Real:
-    """Columns of some joints; no copy if these are all, in order."""
-    known, values = signal
-    if tuple(joints) == known:
-        return values
-    return values[:, [known.index(joint) for joint in joints]]
