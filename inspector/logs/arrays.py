@@ -464,10 +464,10 @@ HEADER = 128  # bytes before the first variable
 MATRIX, COMPRESSED, FLAGS, DIMENSIONS = 14, 15, 6, 5
 # Numbers by the type of their element, whatever the class of the variable is.
 STORED = ("", "i1", "u1", "i2", "u2", "i4", "u4", "f4", "", "f8", "", "", "i8", "u8")
-STRUCT, TEXT, NESTED = 2, 4, (1, 2)  # classes of variables; cells and structs hold others
+CELL, STRUCT, TEXT = 1, 2, 4  # classes of variables; cells are not read
 NO_NUMBERS = (3, 5, 16, 17, 18)  # classes of objects, sparse matrices and functions
 COMPLEX = 0x800  # the flag of a variable with imaginary parts
-DEPTH = 20  # structs and cells within each other
+DEPTH = 20  # structs within each other
 
 # Fields of a timeseries, or of what Simulink logs as a struct, that hold the signal itself.
 DATA = ("signals/values", "Data", "data", "Values", "values")
@@ -507,7 +507,7 @@ def check_numbers(path: Path, arrays: Arrays, objects: Collection[str]) -> None:
 
 
 def _variables(path: Path) -> dict[str, NDArray[Any]]:
-    """Arrays of numbers in a file; of a struct its fields, of cells each by its number."""
+    """Arrays of numbers in a file, and in the fields of a struct."""
     objects, found = list[str](), dict[str, NDArray[Any]]()
     try:
         for data in _unpacked_variables(path.read_bytes()):
@@ -574,7 +574,6 @@ def _numbers_in(
     """Arrays of numbers in a variable, of the sizes that it states; None for an object."""
     parts = [*_elements(data, place, stop)]
     if not parts:
-        yield name, np.empty((1, 0))  # an empty cell
         return
     flags, dims = NO_NUMBERS[0], tuple[Any, ...]()
     if depth and len(parts) > 2 and (parts[0][0], parts[1][0]) == (FLAGS, DIMENSIONS):
@@ -583,21 +582,15 @@ def _numbers_in(
     kind, count = flags & 0xFF, prod(dims)
     if kind in NO_NUMBERS or min(dims, default=0) < 0:
         yield name, None
-    elif kind in NESTED:
-        fields, inner = [""], parts[3:]
-        if kind == STRUCT and len(parts) > 4:  # the length of the fields' names, and these
-            (length,), inner = unpack_from("<i", data, parts[3][1]), parts[5:]
-            names = data[slice(*parts[4][1:])]
-            each = (names[at : at + length] for at in range(0, len(names), max(1, length)))
-            fields = [f"/{text.partition(bytes(1))[0].decode('latin1')}" for text in each]
-        held = sum(part[0] == MATRIX for part in inner)
-        if held < len(inner) or count > max(1, held) or count * len(fields) > held:
-            raise ArchiveError(f"damaged: a variable states {count} cells and holds {held}")
-        # NumPy counts along the last axis first
-        for number, cell in enumerate(np.arange(count).reshape(dims, order="F").ravel()):
-            numbered = f"{name}/{number}" if count > 1 else name
-            for field, part in zip(fields, inner[cell * len(fields) :], strict=False):
-                yield from _numbers_in(data, *part[1:], f"{numbered}{field}", depth - 1)
+    elif kind == STRUCT and count == 1 and len(parts) > 4:
+        (length,) = unpack_from("<i", data, parts[3][1])
+        names = data[slice(*parts[4][1:])]
+        fields = (names[at : at + length] for at in range(0, len(names), max(1, length)))
+        for field, part in zip(fields, parts[5:], strict=False):
+            text = field.partition(bytes(1))[0].decode("latin1")
+            yield from _numbers_in(data, *part[1:], f"{name}/{text}", depth - 1)
+    elif kind in (CELL, STRUCT):
+        return
     else:
         size = sum(end - start for _, start, end in parts[3:])
         stored, start, end = (*parts, (1, stop, stop))[3]
