@@ -20,7 +20,7 @@ NAMES = st.text(LETTERS, min_size=1)
     offset=st.none() | st.floats(-1e12, 1e12),
     columns=st.lists(st.tuples(NAMES, NAMES), unique_by=(lambda p: p[0], lambda p: p[1])),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_a_saved_mapping_is_loaded_unchanged(tmp_path_factory, columns, **settings):
     entries = tuple(Entry("velocity", joint, column) for joint, column in columns)
     options = ReadOptions(entries=entries, **settings)
@@ -73,7 +73,10 @@ def test_a_part_of_an_array_is_named_as_python_does(source, name, columns):
         ),
         ('format = "noise-mapping/1"\nrate = 2027-01-31', "rate = 2027-01-31 is of another type"),
         ('format = "noise-mapping/1"\njoints = "a"', "joints = 'a' is of another type"),
-        ('format = "noise-mapping/1"\nunits = "miles"', "no units 'miles'; there are radians, deg"),
+        (
+            'format = "noise-mapping/1"\nunits = "miles"',
+            "no units 'miles'; there are radians, degrees",
+        ),
         ('format = "noise-mapping/1"\nmap = 3', "m.toml: "),
         ('format = "noise-mapping/1"\n[map]\nspeed = "x"', "mapping 'speed=x': expected SIGNAL"),
         ('format = "noise-mapping/1"\n[map]\nvelocity = 3', "velocity = 3 is of another"),

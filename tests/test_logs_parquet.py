@@ -110,36 +110,24 @@ def test_unspecified_units_are_not_assumed_to_be_radians(tmp_path):
     names = [f"{joint}.pos" for joint in JOINTS]
     folder = write_lerobot(tmp_path / "set", [STATE * 30], names=names)
     message = (
-        "LeRobot does not log the unit of its '.pos' features: specify --units degrees, normal"
+        "LeRobot does not log the unit of its '.pos' features: specify --units degrees or radian"
     )
     with pytest.raises(LogError, match=message):
         read_log(folder)
     run = read_log(folder, units="degrees").run
     assert np.allclose(run.position, np.deg2rad(STATE * 30), rtol=1e-6)
     assert run.meta["units"] == "degrees"
-    with pytest.raises(LogError, match=r"name the robot \(--robot\)"):
-        read_log(folder, units="normalised")
     older = write_lerobot(tmp_path / "older", [STATE * 30], names=list(JOINTS))
     with pytest.raises(LogError, match="too much for radians; if it is in degrees, say --degrees"):
         read_log(older)
 
 
-def test_normalised_units_are_shares_of_the_robots_ranges(tmp_path):
-    state = np.tile(np.linspace(-100, 100, 90)[:, None], 2)
-    state[:, 1] = np.linspace(0, 100, 90)
-    names = ["panda_joint1.pos", "panda_finger_joint1.pos"]
-    folder = write_lerobot(tmp_path / "set", [state], names=names)
-    position = read_log(folder, robot="panda", units="normalised").run.position
-    assert np.allclose(position[[0, -1], 0], [-2.8973, 2.8973], atol=1e-4)
-    assert np.allclose(position[[0, -1], 1], [0.0, 0.04], atol=1e-6)
-
-
-def test_a_gripper_of_a_data_set_in_degrees_is_normalised(tmp_path):
+def test_a_gripper_of_a_data_set_in_degrees_is_left_out(tmp_path):
     names = ["shoulder.pos", "gripper.pos"]
     folder = write_lerobot(tmp_path / "set", [STATE[:, :2] * 30], names=names)
     imported = read_log(folder, units="degrees")
     assert imported.run.joint_names == ("shoulder",)
-    assert "set: left out, since no robot tells their range: gripper" in imported.remarks
+    assert "set: left out, since grippers have no angles: gripper" in imported.remarks
 
 
 def test_the_pose_of_an_end_effector_is_no_joint(tmp_path):

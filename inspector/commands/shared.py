@@ -151,9 +151,7 @@ def log_options(
     columns: Annotated[
         str | None, _log_option("Names of a CSV's columns, without a header: time,q1,q2.")
     ] = None,
-    units: Annotated[
-        str | None, _log_option("Unit of angles: radians, degrees or normalised.")
-    ] = None,
+    units: Annotated[str | None, _log_option("Unit of angles: radians or degrees.")] = None,
     degrees: Annotated[bool, _log_option("Angles are in degrees.", "--degrees")] = False,
     topic: Annotated[list[str] | None, _log_option("Read this topic of a bag; repeatable.")] = None,
     episode: Annotated[

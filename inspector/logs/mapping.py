@@ -41,8 +41,7 @@ COMMAND = "command"  # the signal of fields that may be desired positions: their
 FOLLOWS, SLOPES = 0.9, (0.5, 2.0)
 # What moves less does not move; largest mean distance of its target, both in [rad] or [m].
 STILL, NEARBY = 1e-3, 0.1
-# Units of angles; normalised is -100 to 100 of each joint's range, 0 to 100 of a gripper's.
-UNITS = ("radians", "degrees", "normalised")
+UNITS = ("radians", "degrees")  # of angles
 RATES = (1e-3, 1e9)  # rates that a log may be said to have, in [Hz]
 
 # Conventions of a base: the order of its quaternion; the axes of its velocity, which for MuJoCo are

@@ -249,7 +249,7 @@ def _repeats(time: Array, same: Mask, tracks: Sequence[Track]) -> Iterator[tuple
 LARGEST = {"position": 4 * np.pi, "velocity": 100.0}
 TURN = 2 * np.pi  # positions beyond, of half of the joints that move, are in degrees, in [rad]
 FARTHEST = 720.0  # largest position of an arm's joint, in [deg]; wheels turn farther
-NORMALISED = 100.0  # largest position that may be normalised as well
+NORMALISED = 100.0  # largest position that may be a share of a joint's range as well
 STRAIGHT = 0.9  # share of its way that a joint is away from its start: wheels go on and on
 # What is in degrees, by the ratio of logged velocities to the slope of positions.
 MATCHES = {1.0: ("position", "velocity"), np.pi / 180: ("position",), 180 / np.pi: ("velocity",)}
@@ -258,8 +258,8 @@ STRETCHES = 50  # of a log, whose ways are compared
 TURNING = ("revolute", "continuous")
 
 HINT = (
-    "if it is in degrees, say --degrees; if in -100 to 100 of each joint's range, --units"
-    " normalised; if the joint is prismatic or continuous, name the robot (--robot)"
+    "if it is in degrees, say --degrees; if the joint is prismatic or continuous, name the robot"
+    " (--robot)"
 )
 
 
@@ -277,28 +277,23 @@ def _in_si(
         )
     found: list[Track] = []
     for track in tracks:
-        shares = _shares(log, track, units)
-        if units == "degrees" or track.quantity in in_degrees:
-            angular = _angular(track, kinds) & ~shares
-            if angular.any():
-                values = np.where(angular, np.deg2rad(track.values), track.values)
-                track = replace(track, values=values)
-        if shares.any() and robot is None:
-            if units == "normalised":
-                problem = "normalised units are shares of the joints' ranges; name the robot"
-                raise LogError(log.path, f"{problem} (--robot)")
-            remark = "left out, since no robot tells their range: "
-            remark += listed(_chosen(track.joints, shares))
+        angles = np.array([not (log.units and _is_gripper(joint)) for joint in track.joints])
+        if units == "degrees" and not angles.all():
+            remark = (
+                f"left out, since grippers have no angles: {listed(_chosen(track.joints, ~angles))}"
+            )
             remarks += [] if remark in remarks else [remark]
-            if shares.all():
+            if not angles.any():
                 continue
-            track = _columns(track, np.flatnonzero(~shares).tolist())
-        elif shares.any() and robot:
-            track = _of_range(log.path, track, shares, robot)
+            track = _columns(track, np.flatnonzero(angles).tolist())
+        angular = _angular(track, kinds)
+        if angular.any() and (units == "degrees" or track.quantity in in_degrees):
+            values = np.where(angular, np.deg2rad(track.values), track.values)
+            track = replace(track, values=values)
         if not units:
             _refuse_degrees(log.path, track, kinds)
-        angles = _angular(track, kinds) & track.signal.startswith("position")
-        found.append(replace(track, angles=angles.tolist()))
+        is_position = track.quantity == "position"
+        found.append(replace(track, angles=(angular & is_position).tolist()))
     return found, in_degrees
 
 
@@ -364,32 +359,8 @@ def _ratio(position: Track, velocity: Track) -> float:
     return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
 
 
-def _shares(log: Log, track: Track, units: str) -> Mask:
-    """Whether each column is a share of its joint's range: grippers are whatever others are."""
-    moves = track.signal.startswith(("position", "velocity"))
-    grippers = units == "degrees" and bool(log.units)
-    every = (units == "normalised" or (grippers and _is_gripper(joint)) for joint in track.joints)
-    return np.array([*every], dtype=bool) & moves
-
-
-def _of_range(path: Path, track: Track, shares: Mask, robot: Robot) -> Track:
-    """Track in SI of one with shares of ranges: -100 to 100, of a gripper 0 to 100."""
-    scales, zeros = np.ones(len(shares)), np.zeros(len(shares))
-    for place in np.flatnonzero(shares).tolist():
-        name = track.joints[place]
-        joint = next(each for each in robot.joints if each.name == name)
-        lower = float(robot.model.lowerPositionLimit[joint.first_q])
-        span = float(robot.model.upperPositionLimit[joint.first_q]) - lower
-        if joint.kind == "continuous" or not 0 < span < 1e3:
-            raise LogError(path, f"normalised units: joint {name!r} of {robot.name!r} has no range")
-        is_gripper = _is_gripper(name)
-        scales[place] = span / 100 if is_gripper else span / 200
-        zeros[place] = lower if is_gripper else lower + span / 2
-    moved = zeros if track.signal.startswith("position") else 0.0
-    return replace(track, values=track.values * scales + moved)
-
-
 def _is_gripper(joint: str) -> bool:
+    """Whether a name is a gripper's, which LeRobot logs as a share of its way."""
     return "gripper" in joint or "finger" in joint
 
 

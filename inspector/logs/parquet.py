@@ -54,8 +54,8 @@ SLOWEST, FASTEST = 1e-3, 1e6  # rates that a data set may have, in [Hz]
 TOLERANCE = 1e-4  # largest difference of a stamp from the rate's, in [s], as in LeRobot
 IMAGES = "observation.images"  # beginning of the names of features that are videos
 UNKNOWN = (
-    "LeRobot does not log the unit of its '.pos' features: specify --units degrees, normalised"
-    " (-100 to 100 of each joint's range, needs --robot) or radians"
+    "LeRobot does not log the unit of its '.pos' features: specify --units degrees or radians;"
+    " numbers of -100 to 100 of each joint's range are no angles"
 )
 
 
