@@ -112,7 +112,7 @@ def log_of(
 
     Args:
         stated: What states the rate, and the rate, in [Hz].
-        joints: Names of the columns of measured signals, by "", and of desired ones, by "_desired".
+        joints: Names of the columns of arrays, by the arrays' names.
     """
     every = arrays
     arrays = {
@@ -120,8 +120,8 @@ def log_of(
         for n, each in arrays.items()
         if each.ndim in (1, 2) and len(each) > 1
     }
-    entries = options.for_columns(path, [*arrays]).entries
-    mapped = {entry.part()[0] for entry in entries if entry.signal != "time"}
+    options = options.for_columns(path, [*arrays])
+    mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
     naming = Naming.of((n for n, e in arrays.items() if e.ndim == 1), options.known_joints)
     columns = {  # that say in their names what they hold
         n
@@ -138,27 +138,20 @@ def log_of(
     stamps = Stamps.counted(samples, stated)
     if time:
         stamps = replace(stamps_of(path, time, arrays[time], options.rate), stated=stated)
-    arms = {match["arm"] for name in roles if (match := ARMS.fullmatch(name))}
-    fields = []
-    for name, what in roles.items():
-        each = arrays[name]
-        if len(each) != samples or name == time:
-            continue
-        desired = what.endswith("_desired")
-        names = (joints or {}).get("_desired" if desired else "", (joints or {}).get("", ()))
-        if len(arms) > 1 and (match := ARMS.fullmatch(name)):
-            names = tuple(f"{match['arm']}_joint_{n}" for n in range(each.size // samples))
-        fields.append(
-            Field(
-                name,
-                floats(each.reshape(samples, -1)),
-                stamps,
-                joints=names,
-                signal=what if what in (*SIGNALS, COMMAND) and name not in columns else "",
-                source=path.name,
-                rank=0 if STATES.fullmatch(name) else 1,
-            )
+    named = {**(joints or {}), **_arms(arrays, roles)}
+    fields = [
+        Field(
+            name,
+            floats(arrays[name].reshape(samples, -1)),
+            stamps,
+            joints=named.get(name, ()),
+            signal=what if what in (*SIGNALS, COMMAND) and name not in columns else "",
+            source=path.name,
+            rank=0 if STATES.fullmatch(name) else 1,
         )
+        for name, what in roles.items()
+        if len(arrays[name]) == samples and name != time
+    ]
     read = {time, *(each.name for each in fields)}
     log = Log(
         path,
@@ -169,6 +162,18 @@ def log_of(
         time=time,
     )
     return gathered(log, options)
+
+
+def _arms(arrays: Arrays, roles: Collection[str]) -> dict[str, tuple[str, ...]]:
+    """Names of the joints of robosuite's arrays, if there are several arms."""
+    arms = {name: match["arm"] for name in roles if (match := ARMS.fullmatch(name))}
+    if len({*arms.values()}) < 2:
+        return {}
+    widths = {name: arrays[name].size // len(arrays[name]) for name in arms}
+    return {
+        name: tuple(f"{arm}_joint_{number}" for number in range(widths[name]))
+        for name, arm in arms.items()
+    }
 
 
 def gathered(log: Log, options: ReadOptions) -> Log:
@@ -442,15 +447,20 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     arrays = _arrays(path)
-    joints = {
-        ending: tuple(map(str, arrays[key].ravel()))
-        for ending, key in (("", "joint_names"), ("_desired", "desired_joint_names"))
+    measured, desired = (
+        tuple(map(str, arrays[key].ravel()))
         if key in arrays and arrays[key].dtype.kind == "U"
-    }
+        else ()
+        for key in ("joint_names", "desired_joint_names")
+    )
     numbers = {
         name: each
         for name, each in part_of(arrays, episode).items()
         if each.ndim and each.dtype.kind in "iufM"
+    }
+    joints = {
+        name: (desired or measured) if meaning(name).endswith("_desired") else measured
+        for name in numbers
     }
     stated = stated_rate(arrays)
     return log_of(path, numbers, options, episode=episode, stated=stated, joints=joints)
