@@ -146,7 +146,8 @@ def endless(data):
 def test_arguments_in_a_damaged_heap_are_given_up(tmp_path, monkeypatch, damage, problem):
     path = environment(tmp_path / "a.h5")
     path.write_bytes(damage(path.read_bytes()))
-    monkeypatch.setattr("inspector.logs.hdf5.TIMEOUT", 1.0)
+    if damage is endless:  # others end by themselves, on a busy machine later than that
+        monkeypatch.setattr("inspector.logs.hdf5.TIMEOUT", 1.0)
     with pytest.raises(LogError, match=f"damaged: {problem}$"):
         read_log(path)
 
