@@ -1,6 +1,7 @@
 """The command that measures a model."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,6 +116,25 @@ def test_findings_are_those_that_classify_reports(folder, tmp_path):
     assert outcome.run.findings == expected.findings
     assert outcome.run.spans == expected.spans
     assert len(expected.findings) == 1
+
+
+def test_the_first_motion_after_standing_is_no_false_alarm_of_a_file(tmp_path):
+    """As for `classify`; the past alone would make it one, since it was silent."""
+    from inspector.library import load_library, signals_of
+    from noisemodel import Block, Run
+
+    time, rng = np.arange(8000) / 1000, np.random.default_rng(0)
+    noise = 0.8 * np.sin(3 * np.pi * time) + 0.05 * rng.standard_normal(8000)
+    moving = np.clip((time - 1.5) / 0.05, 0, 1) * noise
+    velocity = moving[:, None] + 1e-4 * rng.standard_normal((8000, 3))
+    names, blocks = ("a", "b", "c"), (Block(0.0, 8.0, "ok"),)
+    walk = Run(time=time, velocity=velocity, joint_names=names, blocks=blocks)
+    walk.save(tmp_path / "walk.npz")
+    signals = signals_of(walk)
+    model = load_library()["general"].at(1000.0, signals)
+    assert model.classify(signals, 1000.0).events()
+    report = train.evaluate(Path(__file__).parents[1] / "models/general.npz", [tmp_path])
+    assert report.protocol.counts["false_alarms"] == 0
 
 
 def test_runs_below_the_rate_of_the_model_are_listed_as_not_answered(folder, tmp_path):

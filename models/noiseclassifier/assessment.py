@@ -149,9 +149,9 @@ def predict(
     """Predictions of a model on a recording, on its annotated blocks and from end to end."""
     profile, blocks, step = classifier.profile, within(recording), 1.0 / recording.rate
     check(recording, profile)
-    labels = classifier.classify(
-        recording.signal, recording.rate, start=recording.start, valid=recording.valid
-    )
+    # As of a file: what is found has to stand out from the rest of the run, not only from its past.
+    pieces = [(recording.signal, recording.valid)]
+    labels = classifier.classify_pieces(pieces, recording.rate, start=recording.start, whole=True)
     truth = predicted = np.array([], dtype=str)
     if profile.reference:
         # Frames that are cut out of blocks have no reference: those of the whole recording count.
