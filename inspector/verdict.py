@@ -21,7 +21,7 @@ from enum import StrEnum
 from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
-from typing import IO, Any, TypeVar
+from typing import IO, Any
 
 import numpy as np
 
@@ -43,16 +43,13 @@ from noisemodel.parallel import DIED, Jobs, as_done, in_order
 # The errors that are printed in one line; all others are bugs.
 EXPECTED = (InspectorError, nc.ModelsError, nm.NoiseModelError)
 UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
-KIND = "noise-classify-state/"
-FORMAT = f"{KIND}2"
+FORMAT = "noise-classify-state/2"
 # Most bytes of a file that is resumed: enough for some hundred thousand runs.
 MAX_BYTES = 256 * 2**20
 DRAWING = 0.4  # about how long a picture takes, in [s]
 LARGE = 31 * 2**20  # bytes: glibc never keeps pieces of 32 MiB or more
 LONGEST_LINE = 2**16  # characters of a line that are looked at
 
-
-Kept = TypeVar("Kept")
 # Draws a picture of an analysis with its verdict and comparison, which is None without a reference,
 # and gives its path.
 Drawing = Callable[[Analysis, "Verdict", Any], Path]
@@ -70,19 +67,14 @@ class Ruling(StrEnum):
     """What became of a finding."""
 
     FOUND = "found"
-    FORBIDDEN = "forbidden"
     EXPIRED = "waiver-expired"
-    OVER_BUDGET = "over-budget"
-    REQUIRED = "required"
     ALLOWED = "allowed"
     WAIVED = "waived"
-    IN_BUDGET = "in-budget"
     FILTERED = "filtered"
     AS_REFERENCE = "as-reference"
 
 
-# Those that fail a run.
-FAILING = (Ruling.FOUND, Ruling.FORBIDDEN, Ruling.EXPIRED, Ruling.OVER_BUDGET)
+FAILING = (Ruling.FOUND, Ruling.EXPIRED)  # those that fail a run
 LOG, END = "log of ", "end of the run"  # what a scenario without logs, and a run that is cut, lack
 
 
@@ -600,9 +592,8 @@ def kept(
         The verdicts so far, by run and SHA-256 of its content, and a function that adds one.
     """
     header = {"format": FORMAT, **settings}
-
-    def read(first: bytes, rows: list[bytes]) -> dict[tuple[Path, str], Verdict]:
-        _check_header(path, first, header)
+    refused = partial(StateError, path)
+    with resumed(path, header, refused, what="state of classify") as (rows, append):
         verdicts = {}
         for number, row in enumerate(rows, start=2):
             try:
@@ -611,37 +602,34 @@ def kept(
                 " ".join(verdict.lost)  # what is no text fails here
                 verdicts[verdict.path, content["sha256"]] = verdict
             except (ValueError, KeyError, TypeError, AttributeError) as error:
-                raise StateError(path, f"is damaged in line {number}") from error
-        return verdicts
-
-    with resumed(path, header, read, partial(StateError, path)) as (verdicts, append):
+                raise refused(f"is damaged in line {number}") from error
 
         def add(verdict: Verdict, sha256: str) -> None:
             if verdict.status is not Status.INTERNAL_ERROR:
                 append({"sha256": sha256, **verdict.as_dict(), "lost": list(verdict.lost)})
 
-        yield verdicts or {}, add
+        yield verdicts, add
 
 
 @contextmanager
 def resumed(
     path: Path,
     header: Mapping[str, Any],
-    read: Callable[[bytes, list[bytes]], Kept],
     refused: Callable[[str], InspectorError],
     *,
+    what: str,
     afresh: bool = False,
-) -> Iterator[tuple[Kept | None, Callable[[Mapping[str, Any]], None]]]:
+) -> Iterator[tuple[list[bytes], Callable[[Mapping[str, Any]], None]]]:
     """Open a file of JSON lines to resume, or create it.
 
     Args:
-        header: Its first line.
-        read: Reads the first line and the others, or raises.
+        header: Its first line, with its format.
         refused: Makes an error of a problem of the file.
+        what: What it holds, in words.
         afresh: Whether to discard what it holds.
 
     Returns:
-        What was read, None of a new file, and a function that appends a line.
+        The lines after the header, and a function that appends one.
     """
     if path.exists() and not path.is_file():
         raise refused("is no regular file")
@@ -660,18 +648,33 @@ def resumed(
             raise refused(f"is larger than {MAX_BYTES} bytes")
         file.seek(0)
         whole, end, torn = (b"" if afresh else file.read()).rpartition(b"\n")
-        found, append = None, partial(_append, path, file)
+        append = partial(_append, path, file)
         first, *rows = whole.split(b"\n") if end else [torn]
         # A line without its end was being written when the process was killed.
-        if end or not json.dumps(header).encode().startswith(torn):
-            found = read(first, rows)
+        begun = not end and json.dumps(header).encode().startswith(torn)
+        if not begun and (problem := _differs(first, header, what)):
+            raise refused(problem)
         file.truncate(len(whole) + len(end))
         if not end:
             append(header)
-        yield found, append
+        yield rows, append
     finally:
         with suppress(OSError):  # what it could not write has been said by then
             file.close()
+
+
+def _differs(line: bytes, header: Mapping[str, Any], what: str) -> str:
+    """Why a file with this first line cannot be resumed; empty if it can."""
+    try:
+        there = from_json(line)
+    except ValueError:
+        there = None
+    kind = f"{header['format']}".rpartition("/")[0]
+    if not isinstance(there, dict) or not str(there.get("format")).startswith(f"{kind}/"):
+        return f"holds no {what}"
+    expected = from_json(json.dumps(header))
+    other = next((name for name in expected if there.get(name) != expected[name]), "")
+    return f"is of another batch (its {other} differs)" if other else ""
 
 
 def digest(path: Path) -> str:
@@ -694,15 +697,3 @@ def _append(path: Path, file: IO[bytes], content: Mapping[str, Any]) -> None:
         os.fsync(file.fileno())
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
-
-
-def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:
-    try:
-        there = from_json(line)
-    except ValueError:
-        there = None
-    if not isinstance(there, dict) or not str(there.get("format")).startswith(KIND):
-        raise StateError(path, "holds no state of classify")
-    for name, value in header.items():
-        if there.get(name) != value:
-            raise StateError(path, f"is of another batch (its {name} differs)")

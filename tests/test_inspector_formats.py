@@ -143,7 +143,7 @@ def test_findings_of_repetitions_are_apart_by_class_time_and_ruling():
     for event in two:
         pair = [one[0], replace(one[1], events=(event,))]
         assert text(pair).count("1 of 2 runs") == 2
-    ruled = replace(one[1], events=(replace(BLOW, ruling=Ruling.FORBIDDEN, reason="never"),))
+    ruled = replace(one[1], events=(replace(BLOW, ruling=Ruling.EXPIRED, reason="never"),))
     assert text([one[0], ruled]).count("1 of 2 runs") == 2
     twice = replace(one[0], events=(BLOW, replace(BLOW, start=1.1)))
     assert text([twice, one[1]]).count("impact") == 2

@@ -235,7 +235,7 @@ def refused(data, output, *more, grid=GRID, code=3):
 def test_results_of_another_grid_are_refused(data, whole, tmp_path):
     output, more = tmp_path / "tuned.jsonl", ("--grid", "C=1")
     output.write_bytes(whole[0].read_bytes())
-    assert "holds results of another grid;" in refused(data, output, *more)
+    assert "is of another batch (its grid differs);" in refused(data, output, *more)
     assert output.read_bytes() == whole[0].read_bytes()
     assert tune(data, output, *more, "--overwrite")[0] == 0
 
@@ -248,7 +248,7 @@ def test_results_of_other_annotations_are_refused(data, whole, tmp_path):
     arguments = ("--validation", tmp_path, *OPTIONS, *GRID, "-o", whole[0])
     status, _, err = call("tune", data / "training", *arguments)
     assert status == 3
-    assert "holds results of another validation set;" in err
+    assert "is of another batch (its validation_set differs);" in err
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,7 @@ def test_results_of_other_annotations_are_refused(data, whole, tmp_path):
         (lambda text: text.replace('"stride": 50', '"stride": 51', 1), "is damaged in line 8"),
         (lambda text: text.replace('"failure_recall"', '"recall"', 1), "is damaged in line 2"),
         (lambda text: text + text.splitlines()[-1] + "\n", "is damaged: 13 points of 12"),
-        (lambda text: text.replace("noise-tuning/1", "noise-tuning/0"), "of another format"),
+        (lambda text: text.replace("noise-tuning/1", "noise-tuning/0"), "its format differs"),
     ],
 )
 def test_a_damaged_file_is_named_and_left_alone(data, whole, tmp_path, damage, reason):

@@ -7,7 +7,6 @@ a complete one is only read.
 """
 
 import hashlib
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
@@ -270,15 +269,10 @@ def opened(
     Returns:
         The measures of the first points, and a function that appends those of the next ones.
     """
-    header = {"format": FORMAT, **settings}
-
-    def read(first: bytes, rows: list[bytes]) -> list[Measures]:
-        _check_header(path, first, json.loads(json.dumps(header)))
-        return _measures(path, rows, points)
-
-    refused = partial(_refused, path)
-    with resumed(path, header, read, refused, afresh=overwrite) as (there, write):
-        done = there or []
+    refused, header = partial(_refused, path), {"format": FORMAT, **settings}
+    what = "results of tuning"
+    with resumed(path, header, refused, what=what, afresh=overwrite) as (rows, write):
+        done = _measures(path, rows, points)
 
         def append(measures: Sequence[Measures]) -> None:
             for each in measures:
@@ -290,18 +284,6 @@ def opened(
 
 def _refused(path: Path, problem: str) -> InspectorError:
     return InspectorError(f"{path}: {problem}; name another file, or overwrite it (--overwrite)")
-
-
-def _check_header(path: Path, line: bytes, settings: Mapping[str, Any]) -> None:
-    try:
-        there = from_json(line)
-    except ValueError:
-        there = None
-    if not isinstance(there, dict) or not str(there.get("format")).startswith("noise-tuning/"):
-        raise _refused(path, "holds no results of tuning")
-    for topic, mine in settings.items():
-        if there.get(topic) != mine:
-            raise _refused(path, f"holds results of another {topic.replace('_', ' ')}")
 
 
 def _measures(path: Path, rows: Sequence[bytes], points: Sequence[Point]) -> list[Measures]:
