@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from inspector.pytest_plugin import name_of
+from inspector.noisecheck import name_of
 
 ROOT = Path(__file__).parents[1]
 RUNS = """
@@ -216,7 +216,7 @@ def test_one(noise):
     told = f", expected a class, or (class, from, to) in [s]; classes are {known}"
     for wrong in ("'impakt'", "'impakt'", "('impakt', 0.0, 1.0)", "0.0", "('impact', 1.0)", "3"):
         assert f"allow: {wrong}{told}" in lines
-    assert "pytest_plugin.py" not in out
+    assert "noisecheck.py" not in out
 
 
 def test_a_log_or_a_reference_that_cannot_be_read_fails_in_one_line(project, tmp_path):
