@@ -81,9 +81,6 @@ def test_a_run_and_itself_differ_by_nothing(itself):
     assert (link_steps(itself, shared_links(itself))[1] == 0).all()
     every = [*by_link(itself), *(c.level for c in changes(itself)), whole(itself)]
     assert {level.change for level in every} == {0.0}
-
-
-def test_failures_of_a_run_and_itself_are_unchanged(itself):
     found = changes(itself)
     assert len(found) == len(itself.before.findings) > 0
     assert {change.kind for change in found} == {"unchanged"}
@@ -188,30 +185,23 @@ def test_annotated_failures_are_matched_where_no_model_fits(tmp_path):
     )
 
 
-def test_motions_that_have_nothing_in_common_are_laid_start_to_start():
-    found = align(moving(seed=1), moving(seed=2))
-    assert found.refused
-    assert (found.lag, found.how) == (0, Align.START)
+TIME = np.arange(4000) / 1000
+STILL, EVEN = (moving(velocity=np.full((4000, 2), speed)) for speed in (0.0, 0.3))
+WALK = moving(velocity=np.sin(2 * np.pi * 2 * TIME)[:, None] * np.ones(2))
+LATER = dataclasses.replace(part(WALK, 250, 4000), time=TIME[:3750])
+RAMP = moving(velocity=TIME[:, None] * np.ones(2))
+UNLIKE = [moving(seed=1), moving(seed=2)]
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [UNLIKE, (STILL, STILL), (STILL, moving()), (EVEN, EVEN), (EVEN, moving()), (WALK, LATER),
+     (RAMP, RAMP)],
+)  # fmt: skip
+def test_unlike_even_repeated_and_ever_faster_motions_determine_no_lag(before, after):
+    found = align(before, after)
+    assert (found.refused, found.lag, found.how) == (True, 0, Align.START)
     assert str(found).startswith("from the start: the motions do not determine the lag (corr")
-
-
-@pytest.mark.parametrize("velocity", [0.0, 0.3])
-def test_an_even_motion_determines_no_lag(velocity):
-    still = moving(velocity=np.full((4000, 2), velocity))
-    assert align(still, still).refused
-    assert align(still, moving()).refused
-
-
-def test_a_motion_that_repeats_itself_determines_no_lag():
-    time = np.arange(4000) / 1000
-    walk = moving(velocity=np.sin(2 * np.pi * 2 * time)[:, None] * np.ones(2))
-    later = dataclasses.replace(part(walk, 250, 4000), time=time[:3750])
-    assert align(walk, later).refused
-
-
-def test_a_motion_that_only_speeds_up_determines_no_lag():
-    ramp = moving(velocity=np.arange(4000)[:, None] * np.ones(2))
-    assert align(ramp, ramp).refused
 
 
 def test_runs_are_aligned_by_the_desired_motion_where_there_is_one():
@@ -231,15 +221,7 @@ def test_starts_and_clocks_are_taken_on_request():
     assert align(run, later).lag == 0
 
 
-def test_a_gap_does_not_mislead_the_alignment():
-    valid = np.ones(4000, dtype=bool)
-    valid[1000:1600] = False
-    run = moving()
-    torn = moving(velocity=np.where(valid[:, None], run.velocity, 0.0), valid=valid)
-    assert align(run, torn).lag == 0
-
-
-def test_gaps_of_either_count_in_neither(tmp_path):
+def test_a_gap_of_either_misleads_no_alignment_and_counts_in_neither(tmp_path):
     valid = np.ones(10_000, dtype=bool)
     valid[2500:5000] = False  # where it rattles
     torn = panda()
@@ -248,6 +230,9 @@ def test_gaps_of_either_count_in_neither(tmp_path):
     assert whole(pair).change == pytest.approx(0.0, abs=1e-9)
     for each in spectra(pair):
         assert not ((each.time > 0.5) & (each.time < 1.0)).any()
+    run = moving()
+    strokes = moving(velocity=run.velocity * valid[1500:5500, None], valid=valid[1500:5500])
+    assert align(run, strokes).lag == 0
 
 
 def test_runs_that_share_no_time_are_refused(tmp_path):
@@ -279,19 +264,13 @@ def test_a_decimated_run_keeps_the_positions_of_its_links(tmp_path):
     assert compared(tmp_path, fast, slow).links is not None
 
 
-def test_only_the_stretch_that_both_cover_is_compared(tmp_path):
+def test_only_the_stretch_that_both_cover_is_compared_and_blocks_move_with_their_run(tmp_path):
     run = moving(seconds=6.0)
-    short = part(run, 0, 4000)
-    pair = compared(tmp_path, run, short)
+    pair = compared(tmp_path, run, part(run, 0, 4000))
     assert len(pair.time) == len(pair.before.noise) == len(pair.after.noise) == 4000
     assert pair.remarks[0].startswith("The run before has 2.00 s that the other one has not")
-
-
-def test_blocks_move_with_their_run(tmp_path):
-    run = moving(seconds=6.0)
-    late = dataclasses.replace(
-        part(run, 1000, 6000), time=run.time[:5000], blocks=(Block(0.5, 1.0, "impact"),)
-    )
+    blocks = (Block(0.5, 1.0, "impact"),)
+    late = dataclasses.replace(part(run, 1000, 6000), time=run.time[:5000], blocks=blocks)
     (block,) = compared(tmp_path, run, late).after.run.blocks
     assert (block.start, block.stop) == pytest.approx((1.5, 2.0))
 
@@ -313,16 +292,12 @@ def test_links_of_what_is_not_one_robot_are_not_compared(tmp_path, changed, why)
     assert "#### Links" not in report(pair)
 
 
-def test_what_only_one_run_has_is_left_out_of_both(tmp_path):
+def test_what_only_one_run_has_is_left_out_and_silence_in_both_is_no_change(tmp_path):
     wanted = moving(velocity_desired=moving().velocity)
     pair = compared(tmp_path, moving(), wanted)
     assert whole(pair).change == 0.0
     assert pair.remarks[0].startswith("Only the run after has desired velocities: they are left")
-
-
-def test_silence_in_both_is_no_change(tmp_path):
-    still = moving(velocity=np.zeros((4000, 2)))
-    pair = compared(tmp_path, still, still)
+    pair = compared(tmp_path, STILL, STILL)
     assert whole(pair).change == 0.0
     assert "vibration +0.0 dB" in report(pair)
     assert "nothing found in either" in summary(pair)
