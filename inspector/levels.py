@@ -117,7 +117,6 @@ def link_levels(noise: LinkNoise) -> tuple[Array, Array]:
 
 WINDOW = 0.1024  # length of the window in [s]: the paper's 1024 samples at 10 kHz
 COLUMNS = 400  # most windows of a spectrogram
-RANGE_DB = 70.0  # range of its level, in [dB]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,13 +133,6 @@ class Spectrogram:
         """Levels of the amplitudes, shape (bins, columns), in [dB]; -inf where there is none."""
         with np.errstate(divide="ignore"):
             return np.asarray(20 * np.log10(self.amplitude))
-
-    @cached_property
-    def level(self) -> Array:
-        """Shape (bins, columns), in [dB] relative to the largest amplitude, at least -70."""
-        largest = self.amplitude.max(initial=0.0) or 1.0
-        floor = 10 ** (-RANGE_DB / 20)
-        return np.asarray(20 * np.log10(np.maximum(self.amplitude / largest, floor)))
 
 
 def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spectrogram:
