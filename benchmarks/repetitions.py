@@ -249,7 +249,7 @@ def reshuffled(sides: dict[tuple[str, str], list[Levels]], draws: int = 1000) ->
             order = rng.permutation(GOOD)
             before = calibrated(Scenario(good[0].name, tuple(good[n] for n in order[:3])))
             over = [compare(good[n], [before]).worst for n in order[3:]]
-            margin = margin_of(before.scores, 3).db
+            margin = margin_of(before.scores_db, 3).db
             worse += bool(np.median(over) > margin or max(over) > margin + 3.0)
             count += 1
     print(f"same code, 3 + 3 runs drawn anew from six: {worse} of {count} scenarios worse")

@@ -552,7 +552,7 @@ def test_margins_follow_from_scores_and_are_assumed_without():
     quiet, loud = judging.margin_of([0.1, 0.2, 0.3], 3), judging.margin_of([4.0, 5.0, 9.0], 3)
     assert quiet.db < loud.db
     assert "at most once in 4" in quiet.bound
-    assert store.calibrated(store.Scenario("a", ())).scores == ()
+    assert store.calibrated(store.Scenario("a", ())).scores_db == ()
 
 
 # --- diff

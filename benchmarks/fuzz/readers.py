@@ -539,7 +539,7 @@ def _accepted(folder: Path) -> Path:
     run = nm.Run(time=TIME, position=POSITION, velocity=VELOCITY, joint_names=JOINTS)
     waived = Expected(reason="later", until=date(2099, 1, 31))
     (pick,) = of_runs([levels(run, name="pick", file="pick-1.npz")])
-    save(Reference(folder, (replace(pick, waived=(waived,)),)), folder)
+    save(Reference(folder, (replace(pick, waive=(waived,)),)), folder)
     return folder / "reference.toml"
 
 

@@ -118,7 +118,7 @@ def classify(
     verdicts += references.absent(verdicts, [each for each in runs if each.is_dir()])
 
     shared.say_assumed({str(each.path): each.assumed for each in verdicts}, verbose=verbose)
-    for remark in filter(None, [left_out(others), *references.remarks(date.today())]):
+    if remark := left_out(others):
         typer.echo(f"inspector: {remark}", err=True)
     _end(verdicts, shared.written(verdicts, formats[format], outputs))
 

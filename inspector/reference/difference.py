@@ -1,7 +1,7 @@
 """Runs before and after a change of code: each scenario by itself, with the same numbers.
 
-The runs after are classified beside those before, and the other way round. So the verdict on a
-scenario depends neither on the order of scenarios nor on their number.
+The runs of a scenario after are classified beside its runs before, and the other way round. So the
+verdict on it depends neither on the order of scenarios nor on their number.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from inspector.errors import EXIT, InspectorError, Status, Unknown
 from inspector.errors import worst as worst_code
 from inspector.library import Library
 from inspector.logs.read import Source, sources
-from inspector.reference.judging import Comparison, Kind, compare, same_motion
+from inspector.reference.judging import Comparison, Kind, Scenario, compare, same_motion
 from inspector.reference.levels import HOP, SIGNALS, Levels, levels
 from inspector.reference.store import Reference, of_runs, scenario_of
 from inspector.reference.verdicts import beside
@@ -161,24 +161,11 @@ class _Run(NamedTuple):
     levels: Levels
     labels: Labels | None
 
-
-class _Side:
-    """The runs of one side that can be compared, and the verdicts on them beside the other."""
-
-    def __init__(self, path: Path, runs: Sequence[_Run]) -> None:
-        self.runs, self.levels = runs, [each.levels for each in runs]
-        self.reference = Reference(path, of_runs(self.levels))
-        self.names = sorted({each.name for each in self.levels})
-        self.verdicts: dict[Path, Verdict] = {}
-
-    def named(self, name: str) -> list[Levels]:
-        return [each for each in self.levels if each.name == name]
-
-    def compare(self, other: Reference) -> None:
-        """Add the verdicts beside the other side."""
-        for verdict, run, labels in self.runs:
-            found = beside(verdict, compare(run, other.scenarios), other, labels)
-            self.verdicts[verdict.path] = found
+    def compare(self, name: str, scenarios: Sequence[Scenario]) -> tuple[Comparison, Verdict]:
+        """Compare it, as of a scenario, with the other side; and the verdict on it beside that."""
+        found = compare(replace(self.levels, name=name), scenarios)
+        other = Reference(self.verdict.path, tuple(scenarios))
+        return found, beside(self.verdict, found, other, self.labels)
 
 
 def difference(
@@ -201,19 +188,21 @@ def difference(
         root, of = path if path.is_dir() else None, sources([path])[0]
         one = partial(_classified, library=library, root=root, unknown=unknown, name=name)
         end = partial(died, unknown=unknown)
-        found = list(in_order(one, of, jobs=jobs, died=end, work=work_of(of)))
-        failed += [each for each in found if isinstance(each, Verdict)]
-        sides.append(_Side(path, [each for each in found if isinstance(each, _Run)]))
+        side: dict[str, list[_Run]] = {}
+        for run in in_order(one, of, jobs=jobs, died=end, work=work_of(of)):
+            if isinstance(run, Verdict):
+                failed.append(run)
+            else:
+                side.setdefault(run.levels.name, []).append(run)
+        sides.append(dict(sorted(side.items())))
         if not before.is_dir() and not after.is_dir():  # two files that are named are a pair
-            name = "".join(sides[0].names)
+            name = "".join(side)
     first, second = sides
-    first.compare(second.reference)
-    second.compare(first.reference)
     rows = _rows(first, second, margin)
     rows.sort(key=lambda row: (ORDER.index(row.outcome), not row.new, row.name))
     result = Difference(tuple(rows), tuple(failed), margin=margin)
-    if first.levels and second.levels and len(result.alone) == len(rows):
-        here, there = (", ".join(side.names[:3]) for side in sides)
+    if all(sides) and len(result.alone) == len(rows):
+        here, there = (", ".join(list(side)[:3]) for side in sides)
         raise InspectorError(
             f"{before} and {after} have no run in common, neither by name nor by motion"
             f" ({here} and {there})"
@@ -236,56 +225,59 @@ def _classified(
     return _Run(verdict, *known) if known else verdict
 
 
-def _paths(runs: Sequence[Levels]) -> tuple[Path, ...]:
-    return tuple(Path(each.run) for each in runs)
+def _paths(runs: Sequence[_Run]) -> tuple[Path, ...]:
+    return tuple(each.verdict.path for each in runs)
 
 
-def _rows(before: _Side, after: _Side, margin: float) -> list[Row]:
+def _scenarios(runs: Sequence[_Run]) -> tuple[Scenario, ...]:
+    return of_runs([each.levels for each in runs])
+
+
+def _rows(
+    before: Mapping[str, list[_Run]], after: Mapping[str, list[_Run]], margin: float
+) -> list[Row]:
     """A row for each scenario of either side."""
-    rows = []
-    come = [name for name in after.names if name not in before.names]
-    for name in before.names:
-        runs, to, given = before.named(name), name, None
-        if name not in after.names:
-            last = runs[-1]
-            to = next((n for n in come if same_motion(after.named(n)[-1], last)), "")
-            if not to:
-                reason = f"{len(runs)} before, none after"
-                rows.append(Row(name, Outcome.MISSING, reason, _paths(runs)))
-                continue
+    rows, known = [], {name: _scenarios(runs) for name, runs in before.items()}
+    come = [name for name in after if name not in before]
+    for name, runs in before.items():
+        if name in after:
+            rows.append(_row(name, runs, after[name], known[name], margin))
+            continue
+        last = runs[-1].levels
+        to = next((each for each in come if same_motion(after[each][-1].levels, last)), "")
+        if to:
             come.remove(to)
-            given = Outcome.RENAMED, f"is called {to} after"
-        rows.append(_row(name, runs, after.named(to), before, after, margin, given))
+            row = _row(name, runs, after[to], known[name], margin)
+            rows.append(replace(row, outcome=Outcome.RENAMED, reason=f"is called {to} after"))
+        else:
+            reason = f"{len(runs)} before, none after"
+            rows.append(Row(name, Outcome.MISSING, reason, _paths(runs)))
+    every = [scenario for each in known.values() for scenario in each]
     for name in come:
-        runs = after.named(name)
-        findings = tuple(_findings(runs, after.verdicts, (), NEW))
-        rows.append(Row(name, Outcome.ADDED, "only after", (), _paths(runs), findings=findings))
+        verdicts = [each.compare(name, every)[1] for each in after[name]]
+        findings = tuple(_findings(verdicts, (), NEW))
+        paths = _paths(after[name])
+        rows.append(Row(name, Outcome.ADDED, "only after", (), paths, findings=findings))
     return rows
 
 
 def _row(
     name: str,
-    earlier: Sequence[Levels],
-    later: Sequence[Levels],
-    before: _Side,
-    after: _Side,
+    earlier: Sequence[_Run],
+    later: Sequence[_Run],
+    scenarios: Sequence[Scenario],
     least: float,
-    given: tuple[Outcome, str] | None,
 ) -> Row:
-    """Compare a scenario; what became of it may be given."""
-    scenarios, others = before.reference.scenarios, of_runs(later)
-    own = tuple(each for each in scenarios if each.name == name) or scenarios
-    found = [compare(replace(each, name=name), own) for each in later]
-    back = [compare(replace(each, name=name), others).worst for each in earlier]
+    """Compare a scenario."""
+    found, verdicts = zip(*(each.compare(name, scenarios) for each in later), strict=True)
+    others = _scenarios(later)
+    back, were = zip(*(each.compare(name, others) for each in earlier), strict=True)
     margin = max([least, *(each.margins[Kind.REPETITIONS].db for each in found if each.scenarios)])
     scores = [each.worst for each in found if each.scenarios and np.isfinite(each.worst)]
     changes = _changes(found)
-    events = [event for each in earlier for event in before.verdicts[Path(each.run)].events]
-    outcome, reason = given or _outcome(found, back, scores, margin, changes, after.verdicts)
-    findings = [
-        *_findings(later, after.verdicts, events, NEW),
-        *_findings(earlier, before.verdicts, (), RESOLVED),
-    ]
+    outcome, reason = _outcome(verdicts, back, scores, margin, changes)
+    events = [event for each in were for event in each.events]
+    findings = [*_findings(verdicts, events, NEW), *_findings(were, (), RESOLVED)]
     return Row(
         name,
         outcome,
@@ -297,25 +289,23 @@ def _row(
         changes,
         tuple(findings),
         tuple(dict.fromkeys(remark for each in found for remark in each.remarks)),
-        max(found, key=lambda each: np.nan_to_num(each.worst, nan=-np.inf), default=None),
+        max(found, key=lambda each: np.nan_to_num(each.worst, nan=-np.inf)),
     )
 
 
 def _outcome(
-    found: Sequence[Comparison],
-    back: Sequence[float],
+    verdicts: Sequence[Verdict],
+    back: Sequence[Comparison],
     scores: Sequence[float],
     margin: float,
     changes: Sequence[Change],
-    verdicts: Mapping[Path, Verdict],
 ) -> tuple[Outcome, str]:
     """What became of a scenario, and why."""
-    for each in found:
-        known = verdicts[Path(each.run.run)].beside
-        for what, why in known.failures if known else ():
+    for verdict in verdicts:
+        for what, why in verdict.beside.failures if verdict.beside else ():
             if what == END or what.startswith("motion from"):
                 kind = Outcome.CUT if what == END else Outcome.FROZEN
-                return kind, f"{Path(each.run.run).name} lacks the {what}: {why}"
+                return kind, f"{verdict.path.name} lacks the {what}: {why}"
     if not scores:
         return Outcome.INCONCLUSIVE, "the runs after make another motion"
     told = f"{median(scores):+.1f} dB over the runs before, margin {margin:.1f} dB"
@@ -323,49 +313,40 @@ def _outcome(
         return Outcome.WORSE, told
     if max(scores) > margin + RARE:
         return Outcome.WORSE, f"{max(scores):+.1f} dB in one of {len(scores)} runs, {told}"
-    returned = [score for score in back if np.isfinite(score)]
+    returned = [each.worst for each in back if np.isfinite(each.worst)]
     if returned and median(returned) > margin:
         return Outcome.BETTER, f"{-median(returned):+.1f} dB, the runs before were louder"
     return Outcome.SAME, told
 
 
 def _changes(found: Sequence[Comparison]) -> tuple[Change, ...]:
-    """Loudest exceedance of each cell over the runs after."""
+    """Loudest exceedance of each cell that all runs after of the motion have."""
     known = [each for each in found if each.scenarios]
-    if not known:
-        return ()
-    octaves = [o for o in known[0].octaves if all(o in each.octaves for each in known)]
-    tops = []
+    tops: dict[tuple[str, str, tuple[float, float]], list[float]] = {}
     for each in known:
         over = np.nan_to_num(each.over, nan=-np.inf)
         # One frame alone is no evidence.
         top = np.minimum(over[:-1], over[1:]).max(axis=0, initial=-np.inf)
-        tops.append(top[:, :, [each.octaves.index(o) for o in octaves]])
-    changes = []
-    for joint in [j for j in known[0].joints if all(j in each.joints for each in known)]:
-        rows = [top[each.joints.index(joint)] for each, top in zip(known, tops, strict=True)]
-        for place, cells in enumerate(np.stack(rows, axis=-1).reshape(-1, len(rows)).tolist()):
-            if np.isfinite(cells).all():
-                signal, octave = divmod(place, len(octaves))
-                of = (joint, SIGNALS[signal], octaves[octave])
-                changes.append(Change(*of, median(cells), min(cells), max(cells)))
+        for joint, signal, octave in np.ndindex(top.shape):
+            cell = each.joints[joint], SIGNALS[signal], each.octaves[octave]
+            tops.setdefault(cell, []).append(float(top[joint, signal, octave]))
+    changes = [
+        Change(*cell, median(values), min(values), max(values))
+        for cell, values in tops.items()
+        if len(values) == len(known) and np.isfinite(values).all()
+    ]
     return tuple(sorted(changes, key=lambda each: -each.change))
 
 
 def _findings(
-    runs: Sequence[Levels],
-    verdicts: Mapping[Path, Verdict],
-    earlier: Sequence[Event],
-    kind: str,
+    verdicts: Sequence[Verdict], earlier: Sequence[Event], kind: str
 ) -> list[ChangedFinding]:
     """Findings of runs that the other side does not have as loud."""
     found = []
-    for path in _paths(runs):
-        verdict = verdicts[path]
-        for event in verdict.events if verdict.beside else ():
-            if event.evidence.excused:
-                continue
-            alike = [other for other in earlier if other.label == event.label]
-            there = bool(match([event], alike, collar=4 * HOP))
-            found.append(ChangedFinding(LOUDER if there else kind, path, event))
+    for verdict in verdicts:
+        for event in verdict.events:
+            if not event.evidence.excused:
+                alike = [other for other in earlier if other.label == event.label]
+                there = bool(match([event], alike, collar=4 * HOP))
+                found.append(ChangedFinding(LOUDER if there else kind, verdict.path, event))
     return found

@@ -17,12 +17,11 @@ end, where a longer run may stay. So each row of costs follows from the row befo
 repetitions at once.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
-from math import prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +92,7 @@ class Expected:
     start: float = float("-inf")  # earliest onset, in [s]
     stop: float = float("inf")  # latest end, in [s]
     joints: tuple[str, ...] = ()  # one of which is the loudest
-    loudest: float | None = None  # highest level of a cell, in [dB re 1 rad/s]
+    loudest_db: float | None = None  # highest level of a cell, in [dB re 1 rad/s]
     required: bool = False
     reason: str = ""
     until: date | None = None  # last day of a waiver
@@ -109,21 +108,15 @@ class Scenario:
 
     name: str
     repetitions: tuple[Levels, ...]
-    scores: tuple[float, ...] = ()  # leave-one-out, in [dB]
-    elsewhere: tuple[float, ...] = ()  # by other moments, in [dB]: how well other motions predict
+    scores_db: tuple[float, ...] = ()  # leave-one-out
+    elsewhere_db: tuple[float, ...] = ()  # by other moments: how well other motions predict
     required: bool = True
     at_least: int = 1  # logs that must exist if it is required
-    renamed_from: tuple[str, ...] = ()
     wanted: tuple[Expected, ...] = ()
-    waived: tuple[Expected, ...] = ()
+    waive: tuple[Expected, ...] = ()
     accepted: date | None = None
     by: str = ""
     reason: str = ""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Its name, and those that it had."""
-        return (self.name, *self.renamed_from)
 
     @property
     def duration(self) -> tuple[float, float]:
@@ -202,23 +195,22 @@ class Cells:
         shape = (frames, len(self.joints), len(SIGNALS), len(self.octaves))
         return np.full(shape, np.nan, dtype=np.float32)
 
-    def of(self, run: Levels, joint: int) -> Real32:
-        """Levels of a joint, shape (frames, 2, octaves); NaN of those that the run lacks."""
-        found = np.full((len(run.level), len(SIGNALS), len(self.octaves)), np.nan, np.float32)
-        name = self.joints[joint]
-        if name in run.joints:
-            own = run.level[:, run.joints.index(name)]
-            for place, octave in enumerate(self.octaves):
-                if octave in run.octaves:
-                    found[..., place] = own[..., run.octaves.index(octave)]
+    def of(self, run: Levels) -> Real32:
+        """Levels of a run, shape (frames, joints, 2, octaves); NaN of those that it lacks."""
+        found = self.unknown(len(run.level))
+        joints = [each for each in self.joints if each in run.joints]
+        octaves = [each for each in self.octaves if each in run.octaves]
+
+        def places(of: Cells | Levels) -> tuple[NDArray[Any], ...]:
+            at = [of.joints.index(each) for each in joints]
+            return np.ix_(range(len(found)), at, (0, 1), [of.octaves.index(o) for o in octaves])
+
+        found[places(self)] = run.level[places(run)]
         return found
 
     def noise(self, run: Levels) -> Array:
         """Level of a run's velocities, all joints and octaves, shape (frames,); NaN without any."""
-        power = np.zeros(len(run.guide))
-        for joint in range(len(self.joints)):
-            level = self.of(run, joint)[:, 0]
-            power += np.nansum(10.0 ** (level / 10), axis=1, dtype=np.float64)
+        power = np.nansum(10.0 ** (self.of(run)[:, :, 0] / 10), axis=(1, 2), dtype=np.float64)
         return np.asarray(10 * np.log10(np.where(power > 0.0, power, np.nan)))
 
 
@@ -237,12 +229,12 @@ class Comparison:
     score: Array  # of each frame, in [dB]; NaN without reference
     margins: Mapping[Kind, Margin]
     exceedances: tuple[Exceedance, ...]  # in order of time
-    quieter: float = 0.0  # than each repetition, in [dB]; 0 if it is not
-    slope: float = float("nan")  # speed divided by the repetitions'; NaN without
+    quieter: float  # than each repetition, in [dB]; 0 if it is not
+    slope: float  # speed divided by the repetitions'; NaN without
     # Level of the noise of the quietest and of the loudest repetition at each frame, shape
     # (frames, 2), in [dB re 1 rad/s]; NaN without.
-    band: Array = field(default_factory=lambda: np.empty((0, 2)))
-    remarks: tuple[str, ...] = ()  # what is not compared, and why, a sentence each
+    band: Array
+    remarks: tuple[str, ...]  # what is not compared, and why, a sentence each
 
     @property
     def empty(self) -> bool:
@@ -262,7 +254,7 @@ class Comparison:
     @property
     def by_joint(self) -> Real32:
         """Loudest exceedance of each joint, shape (frames, joints), in [dB]; NaN without any."""
-        return _largest(self.over.reshape(*self.over.shape[:2], prod(self.over.shape[2:])))
+        return np.asarray(np.fmax.reduce(self.over, axis=(2, 3), initial=np.nan))
 
     @property
     def peaks(self) -> Array:
@@ -310,37 +302,34 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     frames = len(run.guide)
     over, kind = cells.unknown(frames), np.full(frames, KINDS.index(Kind.GENERAL), dtype=np.int8)
     margins: dict[Kind, Margin] = {}
-    matched: list[Scenario] = []
-    references: list[Levels] = []
+    matched, aligned, told = _matching(run, known, cells.joints) if over.size else ([], [], [])
+    remarks += told
+    references = _repetitions(matched)
     quieter, slope, band = 0.0, float("nan"), np.full((frames, 2), np.nan)
-    if frames and cells.joints and cells.octaves:
-        matched, aligned, told = _matching(run, known, cells.joints)
-        remarks += told
-        references = _repetitions(matched)
-        if references:
-            quieter = _quieter(run, references, aligned, cells)
-            band = _band(references, aligned, cells)
-            over, covered = _over_repetitions(run, references, aligned, cells)
-            kind[covered] = KINDS.index(Kind.REPETITIONS)
-            scores = [score for scenario in known for score in scenario.scores]
-            margins[Kind.REPETITIONS] = margin_of(scores, len(references))
-            slopes = [each.slope for each in aligned if np.isfinite(each.slope)]
-            slope = float(np.median(slopes)) if slopes else slope
-            longest = max(each.duration for each in references)
-            if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
-                remarks.append(
-                    f"longer than its scenario, {run.duration:.1f} of {longest:.1f} s: the rest is"
-                    " compared with other motions"
-                )
-        left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
-        others = _repetitions([each for each in known if each not in matched]) or references
-        if len(left) and others:
-            found = _over_others(run, left, others, cells)
-            covered = np.isfinite(_largest(found.reshape(len(left), -1)))
-            over[left[covered]] = found[covered]
-            kind[left[covered]] = KINDS.index(Kind.OTHER_MOTIONS)
-            scores = [score for scenario in known for score in scenario.elsewhere]
-            margins[Kind.OTHER_MOTIONS] = margin_of(scores, 0)
+    if references:
+        quieter = _quieter(run, references, aligned, cells)
+        band = _band(references, aligned, cells)
+        over, covered = _over_repetitions(run, references, aligned, cells)
+        kind[covered] = KINDS.index(Kind.REPETITIONS)
+        scores = [score for scenario in known for score in scenario.scores_db]
+        margins[Kind.REPETITIONS] = margin_of(scores, len(references))
+        slopes = [each.slope for each in aligned if np.isfinite(each.slope)]
+        slope = float(np.median(slopes)) if slopes else slope
+        longest = max(each.duration for each in references)
+        if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
+            remarks.append(
+                f"longer than its scenario, {run.duration:.1f} of {longest:.1f} s: the rest is"
+                " compared with other motions"
+            )
+    left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
+    others = _repetitions([each for each in known if each not in matched]) or references
+    if over.size and len(left) and others:
+        found = _over_others(run, left, others, cells)
+        covered = np.asarray(np.isfinite(found).any(axis=(1, 2, 3)))
+        over[left[covered]] = found[covered]
+        kind[left[covered]] = KINDS.index(Kind.OTHER_MOTIONS)
+        scores = [score for scenario in known for score in scenario.elsewhere_db]
+        margins[Kind.OTHER_MOTIONS] = margin_of(scores, 0)
     score = scores_of(over)
     return Comparison(
         run,
@@ -428,24 +417,22 @@ def _matching(
 ) -> tuple[list[Scenario], "list[Aligned]", list[str]]:
     """Scenarios of the run's motion, of several the one with its name; all their repetitions."""
     usable = [each for each in known if len(each.repetitions[-1].guide)]
-    named = [each for each in usable if run.name in each.names]
+    named = [each for each in usable if each.name == run.name]
     aligned = _aligned(run, _repetitions(named), joints)
     # A run that lies on the motion of its name needs no other scenario.
-    newest = np.cumsum([len(each.repetitions) for each in named], dtype=int) - 1
-    if named and aligned and all(aligned[place].share >= SAME_NAME for place in newest):
+    if aligned and aligned[-1].share >= SAME_NAME:
         return named, aligned, []
     aligned = _aligned(run, [each.repetitions[-1] for each in usable], joints)
+    least = max(SAME_MOTION, ALIKE * max((each.share for each in aligned), default=0.0))
     # Nothing is aligned where no joint is shared.
-    pairs = [(each, own.share) for each, own in zip(usable, aligned, strict=False)]
-    best = max((share for _, share in pairs), default=0.0)
-    found = [each for each, share in pairs if share >= max(SAME_MOTION, ALIKE * best)]
-    named = [each for each, share in pairs if run.name in each.names and share >= SAME_NAME]
+    pairs = zip(usable, aligned, strict=False)
+    found = [each for each, own in pairs if own.share >= least]
     told = []
-    if len(found) > 1 and not named:
+    if len(found) > 1:
         names = ", ".join(each.name for each in found)
         told.append(f"its motion is that of {names}, and its name is of none: all count")
-    aligned = _aligned(run, _repetitions(named or found), joints)
-    return (named or found) if aligned else [], aligned, told
+    aligned = _aligned(run, _repetitions(found), joints)
+    return found if aligned else [], aligned, told
 
 
 def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
@@ -484,25 +471,14 @@ def scores_of(over: Real32) -> Array:
 
 
 def _top(score: Array) -> float:
-    known = score[np.isfinite(score)]
-    return float(known.max()) if len(known) else float("nan")
+    return float(np.fmax.reduce(score, initial=np.nan))
 
 
-def _largest(values: Real32) -> Real32:
-    """Largest along the last axis; NaN where all are."""
-    lowered = np.where(np.isnan(values), -np.inf, values).max(axis=-1, initial=-np.inf)
-    return np.where(np.isfinite(lowered), lowered, np.nan).astype(np.float32)
-
-
-def _floor(references: Sequence[Real32], share: float = FLOOR_SHARE) -> Real32:
-    """Power below which nothing is compared, shape (2, octaves), in [rad²/s²]."""
-    loudest = np.full(references[0].shape[1:], -np.inf)
-    for level in references:
-        loudest = np.fmax(
-            loudest, np.nanmax(level, axis=0, initial=-np.inf, where=~np.isnan(level))
-        )
-    power = np.where(np.isfinite(loudest), 10 ** (loudest / 10), 0.0)
-    return np.maximum(FLOOR**2, share**2 * power).astype(np.float32)
+def _floor(references: Sequence[Levels], cells: Cells, share: float = FLOOR_SHARE) -> Real32:
+    """Power below which nothing is compared, shape (joints, 2, octaves), in [rad²/s²]."""
+    tops = [np.fmax.reduce(cells.of(each), axis=0, initial=np.nan) for each in references]
+    power = 10 ** (np.fmax.reduce(tops, axis=0).astype(np.float64) / 10)
+    return np.asarray(np.fmax(FLOOR**2, share**2 * power), dtype=np.float32)
 
 
 def _raised(level: Real32, floor: Real32) -> Real32:
@@ -523,19 +499,14 @@ def _over_repetitions(
     run: Levels, references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells
 ) -> tuple[Real32, NDArray[np.bool_]]:
     """Exceedance over the loudest repetition, NaN without one, and frames that one covers."""
-    over = cells.unknown(len(run.guide))
-    covered = np.any([path.same for path in aligned], axis=0)
-    for joint in range(len(cells.joints)):
-        views = [cells.of(each, joint) for each in references]
-        loudest = np.full_like(over[:, joint], np.nan)
-        for view, path in zip(views, aligned, strict=True):
-            loud = _spread(view)[path.frame]
-            loud[~path.same] = np.nan
-            loudest = np.fmax(loudest, loud)
-        floor = _floor(views)
-        own = _raised(cells.of(run, joint), floor) - _raised(loudest, floor)
-        over[covered, joint] = own[covered]
-    return over, covered
+    loudest = cells.unknown(len(run.guide))
+    for each, path in zip(references, aligned, strict=True):
+        loud = _spread(cells.of(each))[path.frame]
+        loud[~path.same] = np.nan
+        loudest = np.fmax(loudest, loud)
+    floor = _floor(references, cells)
+    over = _raised(cells.of(run), floor) - _raised(loudest, floor)
+    return over, np.any([path.same for path in aligned], axis=0)
 
 
 def _over_others(
@@ -555,20 +526,26 @@ def _over_others(
     if not shared:
         return found
     near, close, thin = _nearest(run, rows, references, shared, apart)
-    for joint in range(len(cells.joints)):
-        views = [cells.of(each, joint) for each in references]
-        floor, mine = _floor(views, OTHERS_FLOOR), cells.of(run, joint)
-        level = np.concatenate([_spread(view) for view in views])[::thin]
-        level[np.isnan(level)] = -np.inf
-        for first in range(0, len(rows), ROWS):
-            own = slice(first, first + ROWS)
-            known = close[own, :, None, None]
-            loudest = np.where(known, level[near[own]], np.float32(-np.inf)).max(axis=1)
-            loudest[~np.isfinite(loudest)] = np.nan
-            found[own, joint] = _raised(mine[rows[own]], floor) - _raised(loudest, floor)
+    level = np.concatenate(list(_thinned((_spread(cells.of(each)) for each in references), thin)))
+    level[np.isnan(level)] = -np.inf
+    floor, mine = _floor(references, cells, OTHERS_FLOOR), cells.of(run)[rows]
+    for first in range(0, len(rows), ROWS):
+        own = slice(first, first + ROWS)
+        known = close[own, :, None, None, None]
+        loudest = np.where(known, level[near[own]], np.float32(-np.inf)).max(axis=1)
+        loudest[~np.isfinite(loudest)] = np.nan
+        found[own] = _raised(mine[own], floor) - _raised(loudest, floor)
     tracked = np.isfinite(found[:, :, 1]).any(axis=(0, 2))
     found[:, tracked, 0] = np.nan
     return found
+
+
+def _thinned(parts: Iterable[Real32], every: int) -> Iterator[Real32]:
+    """Every so many-th frame of all, by part."""
+    frames = 0
+    for each in parts:
+        yield each[-frames % every :: every]
+        frames += len(each)
 
 
 def _nearest(
@@ -606,16 +583,11 @@ def _quieter(
     run: Levels, references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells
 ) -> float:
     """By how much the run is quieter than each repetition in its loudest joint, in [dB]."""
-    joints, own = range(len(cells.joints)), cells.unknown(len(run.guide))
-    floors = [_floor([cells.of(each, joint) for each in references]) for joint in joints]
-    for joint in joints:
-        own[:, joint] = _raised(_spread(cells.of(run, joint)), floors[joint])
-    margins = []
+    floor, margins = _floor(references, cells), []
+    own = _raised(_spread(cells.of(run)), floor)
     for repetition, path in zip(references, aligned, strict=True):
-        over = cells.unknown(len(run.guide))
-        for joint in joints:
-            level = _raised(cells.of(repetition, joint)[path.frame], floors[joint])
-            over[path.same, joint] = (level - own[:, joint])[path.same]
+        over = _raised(cells.of(repetition)[path.frame], floor) - own
+        over[~path.same] = np.nan
         margins.append(_top(scores_of(over)))
     return max(0.0, min((each for each in margins if np.isfinite(each)), default=0.0))
 
@@ -641,13 +613,12 @@ def _exceedances(
     loud = np.flatnonzero(np.nan_to_num(score, nan=-np.inf) > limit)
     if not len(loud):
         return ()
-    time, found = run.time, []
+    time, level, found = run.time, cells.of(run), list[Exceedance]()
     for group in np.split(loud, np.flatnonzero(np.diff(loud) * HOP > GAP) + 1):
         exceeded = np.nan_to_num(over[group], nan=-np.inf)
         place = np.unravel_index(exceeded.argmax(), exceeded.shape)
         frame, joint, signal, octave = map(int, place)
         row = group[frame]
-        level = cells.of(run, joint)[row, signal, octave]
         evidence = Evidence(
             KINDS[kind[row]].value,
             round(float(exceeded.max()), 2),
@@ -655,7 +626,7 @@ def _exceedances(
             cells.joints[joint],
             SIGNALS[signal],
             cells.octaves[octave],
-            round(float(level), 2),
+            round(float(level[row, joint, signal, octave]), 2),
         )
         # A frame reaches 0.1 s to each side; what is loud in it begins about its middle.
         start = max(run.start, time[group[0]] - HOP)

@@ -24,7 +24,7 @@ import numpy as np
 
 from inspector.audit.signals import without_placeholder
 from inspector.errors import FileError, InspectorError
-from inspector.logs.read import Reading, Source, open_source, sources
+from inspector.logs.read import Reading, open_source, sources
 from inspector.reference.judging import (
     Comparison,
     Expected,
@@ -40,6 +40,7 @@ from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encod
 from inspector.text import counted, natural, toml_shown
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_toml, text_of
+from noiseclassifier.matching import union
 from noisemodel import NoiseModelError, OutputError, Run, runfile
 from noisemodel.files import replacing
 
@@ -56,7 +57,7 @@ Keys = Mapping[str, type | tuple[type]]
 TEXTS, NUMBERS, TABLES = (str,), (float,), (dict,)
 SCENARIO: Keys = {
     **dict.fromkeys(("name", "robot", "by", "reason", "levels", "sha256"), str),
-    **dict.fromkeys(("renamed_from", "joints"), TEXTS),
+    "joints": TEXTS,
     **dict.fromkeys(("duration_s", "scores_db", "elsewhere_db", "loudest_db"), NUMBERS),
     **dict.fromkeys(("repetition", "wanted", "waive"), TABLES),
     "required": bool,
@@ -64,6 +65,7 @@ SCENARIO: Keys = {
     "accepted": date,
     "margin_db": float,
 }
+FACTS = ("required", "at_least", "accepted", "by", "reason")  # that are kept as they are
 REPETITION_KEYS: Keys = {
     **dict.fromkeys(("run", "sha256", "guided_by"), str),
     **dict.fromkeys(("rate_hz", "start_s", "duration_s"), float),
@@ -129,10 +131,8 @@ class Reference:
         return compare(run, self.scenarios)
 
     def named(self, name: str) -> Scenario | None:
-        """The scenario of a name, or that had it; None without."""
-        own = (each for each in self.scenarios if each.name == name)
-        former = (each for each in self.scenarios if name in each.names)
-        return next(own, None) or next(former, None)
+        """The scenario of a name; None without."""
+        return next((each for each in self.scenarios if each.name == name), None)
 
 
 # --- runs by scenario
@@ -178,21 +178,18 @@ def scenario_of(run: Run, path: Path, root: Path | None = None) -> str:
 
 def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Levels]:
     """Measure the levels of runs."""
+    found = []
     try:
-        return [
-            levels_of(source, path if path.is_dir() else None, reading)
-            for path in paths
-            for source in sources([path], reading)[0]
-        ]
+        for path in paths:
+            root = path if path.is_dir() else None
+            for source in sources([path], reading)[0]:
+                opened = open_source(source, reading)
+                name = scenario_of(opened.run, source.shown, root)
+                run, file = without_placeholder(opened.run)[0], str(source.shown)
+                found.append(levels(run, name=name, file=file, sha256=opened.sha256))
     except NoiseModelError as error:
         raise InspectorError(str(error)) from error
-
-
-def levels_of(source: Source, root: Path | None, reading: Reading | None = None) -> Levels:
-    """Measure the levels of a run that was found in a folder."""
-    opened = open_source(source, reading)
-    name, (run, _) = scenario_of(opened.run, source.shown, root), without_placeholder(opened.run)
-    return levels(run, name=name, file=str(source.shown), sha256=opened.sha256)
+    return found
 
 
 def of_runs(runs: Sequence[Levels]) -> tuple[Scenario, ...]:
@@ -217,11 +214,8 @@ def calibrated(scenario: Scenario) -> Scenario:
     """Add the scores from which margins follow."""
     scores = leave_one_out(scenario.repetitions)
     elsewhere = leave_one_moment_out(scenario.repetitions[-CALIBRATED:])
-    return replace(
-        scenario,
-        scores=tuple(round(score, 2) for score in scores),
-        elsewhere=tuple(round(score, 2) for score in elsewhere),
-    )
+    scores_db, elsewhere_db = (tuple(round(db, 2) for db in each) for each in (scores, elsewhere))
+    return replace(scenario, scores_db=scores_db, elsewhere_db=elsewhere_db)
 
 
 # --- accepting
@@ -260,7 +254,6 @@ def accept_into(
                 old = next((each for each in others if _renamed(each, new, home)), None)
                 if old is not None:
                     del kept[old.name]
-                    facts["renamed_from"] = (*old.renamed_from, old.name)
                     changes.append((new.name, f"renamed from {old.name}"))
             if old is None:
                 words = f"new, {counted(len(new.repetitions), 'repetition')}"
@@ -306,9 +299,7 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
     known = {each.sha256 for each in old.repetitions if each.sha256}
     fresh = [each for each in new.repetitions if each.sha256 not in known]
     if not fresh:
-        former = facts.get("renamed_from", old.renamed_from)
-        words = "unchanged, these runs are accepted already"
-        return replace(old, name=new.name, renamed_from=former), words
+        return replace(old, name=new.name), "unchanged, these runs are accepted already"
     over = [compare(replace(each, name=old.name), (old,)) for each in fresh]
     same = all(
         not each.exceedances and each.scenarios and each.quieter <= _margin(old) for each in over
@@ -325,34 +316,29 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
 
 
 def _margin(scenario: Scenario) -> float:
-    return margin_of(scenario.scores, len(scenario.repetitions)).db
+    return margin_of(scenario.scores_db, len(scenario.repetitions)).db
 
 
 def wanted_in(
     runs: Sequence[Levels], events: Mapping[str, Sequence[Event]]
 ) -> dict[str, list[Expected]]:
     """Findings in runs that are accepted, as wanted from then on, by scenario."""
-    spans: dict[tuple[str, str], list[list[Any]]] = defaultdict(list)
+    heard: dict[tuple[str, str], list[tuple[float, float, str, float]]] = defaultdict(list)
     for run in runs:
         for event in events.get(run.run, ()):
             inside = (run.time >= event.start - TOLERANCE) & (run.time <= event.stop + TOLERANCE)
             level = np.nan_to_num(run.level[inside], nan=LEAST_DB)
-            loud = [run.joints[int(level.max(axis=(0, 2, 3)).argmax())]] if level.size else []
+            joint = run.joints[int(level.max(axis=(0, 2, 3)).argmax())] if level.size else ""
             top = float(level.max(initial=LEAST_DB))
             start, stop = event.start - run.start - TOLERANCE, event.stop - run.start + TOLERANCE
-            known = spans[run.name, event.label]
-            same = next((each for each in known if start < each[1] and stop > each[0]), None)
-            if same is None:
-                known.append([start, stop, {*loud}, top])
-            else:
-                same[:2] = min(start, same[0]), max(stop, same[1])
-                same[2] |= {*loud}
-                same[3] = max(top, same[3])
+            heard[run.name, event.label].append((start, stop, joint, top))
     found: dict[str, list[Expected]] = defaultdict(list)
-    for (name, label), known in spans.items():
-        for start, stop, joints, top in known:
-            span = round(start, 2), round(stop, 2)
-            found[name].append(Expected(label, *span, tuple(sorted(joints)), round(top, 1)))
+    for (name, label), every in heard.items():
+        for start, stop in union(np.array([each[:2] for each in every])).tolist():
+            own = [each for each in every if each[0] >= start and each[1] <= stop]
+            joints = tuple(sorted({joint for _, _, joint, _ in own if joint}))
+            loudest = round(max(top for *_, top in own), 1)
+            found[name].append(Expected(label, round(start, 2), round(stop, 2), joints, loudest))
     return found
 
 
@@ -434,14 +420,13 @@ def _lines(scenario: Scenario, file: str, sha256: str) -> list[str]:
         "robot": newest.robot,
         "required": scenario.required,
         "at_least": scenario.at_least,
-        "renamed_from": list(scenario.renamed_from),
         "accepted": scenario.accepted or date.today(),
         "by": scenario.by,
         "reason": scenario.reason,
         "duration_s": [round(each, 3) for each in scenario.duration],
         "margin_db": round(_margin(scenario), 1),
-        "scores_db": list(scenario.scores),
-        "elsewhere_db": list(scenario.elsewhere),
+        "scores_db": list(scenario.scores_db),
+        "elsewhere_db": list(scenario.elsewhere_db),
         "joints": list(newest.joints),
         "loudest_db": [round(each, 1) for each in top.tolist()],
         "levels": file,
@@ -459,14 +444,14 @@ def _lines(scenario: Scenario, file: str, sha256: str) -> list[str]:
             "joints": list(each.joints) if each.joints != newest.joints else None,
         }
         lines += _table("scenario.repetition", facts)
-    for name, entries in (("wanted", scenario.wanted), ("waive", scenario.waived)):
+    for name, entries in (("wanted", scenario.wanted), ("waive", scenario.waive)):
         for entry in entries:
             bounded = isfinite(entry.start) or isfinite(entry.stop)
             facts = {
                 "class": entry.label or None,
                 "time_s": [entry.start, entry.stop] if bounded else None,
                 "joints": list(entry.joints) or None,
-                "loudest_db": entry.loudest,
+                "loudest_db": entry.loudest_db,
                 "required": entry.required or None,
                 "until": entry.until,
                 "reason": entry.reason or None,
@@ -544,42 +529,23 @@ def _checked(path: Path, where: str, row: Any, keys: Keys, needed: Sequence[str]
 
 def _scenario(path: Path, where: str, given: Any) -> Scenario:
     row = _checked(path, where, given, SCENARIO, ("name", "levels", "sha256", "joints"))
-    rows: dict[str, list[Any]] = {key: row.get(key, []) for key in ("wanted", "waive")}
-    return Scenario(
-        row["name"],
-        _levels(path, where, row),
-        tuple(map(float, row.get("scores_db", ()))),
-        tuple(map(float, row.get("elsewhere_db", ()))),
-        row.get("required", True),
-        row.get("at_least", 1),
-        tuple(row.get("renamed_from", ())),
-        tuple(_expected(path, f"{where}, [[scenario.wanted]]", each) for each in rows["wanted"]),
-        tuple(
-            _expected(path, f"{where}, [[scenario.waive]]", each, ("until", "reason"))
-            for each in rows["waive"]
-        ),
-        row.get("accepted"),
-        row.get("by", ""),
-        row.get("reason", ""),
-    )
+    known = {key: row[key] for key in FACTS if key in row}
+    for key in ("scores_db", "elsewhere_db"):
+        known[key] = tuple(map(float, row.get(key, ())))
+    for key, needed in (("wanted", ()), ("waive", ("until", "reason"))):
+        entry = f"{where}, [[scenario.{key}]]"
+        known[key] = tuple(_expected(path, entry, each, needed) for each in row.get(key, ()))
+    return Scenario(row["name"], _levels(path, where, row), **known)
 
 
-def _expected(path: Path, where: str, given: Any, needed: Sequence[str] = ()) -> Expected:
-    row = _checked(path, where, given, EXPECTED, needed)
-    span = row.get("time_s", [float("-inf"), float("inf")])
+def _expected(path: Path, where: str, given: Any, needed: Sequence[str]) -> Expected:
+    anything = {"class": "", "time_s": [float("-inf"), float("inf")], "joints": []}
+    row = anything | _checked(path, where, given, EXPECTED, needed)
+    label, span, joints = (row.pop(key) for key in anything)
     if len(span) != 2 or not span[0] < span[1]:
         shown = toml_shown(span)
         raise StoreError(path, f"{where}: time_s = {shown}, expected [from, to] in seconds")
-    return Expected(
-        row.get("class", ""),
-        float(span[0]),
-        float(span[1]),
-        tuple(row.get("joints", ())),
-        row.get("loudest_db"),
-        row.get("required", False),
-        row.get("reason", ""),
-        row.get("until"),
-    )
+    return Expected(label, float(span[0]), float(span[1]), tuple(joints), **row)
 
 
 def _levels(path: Path, where: str, row: Mapping[str, Any]) -> tuple[Levels, ...]:

@@ -85,17 +85,6 @@ class References:
         )
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def remarks(self, today: date) -> list[str]:
-        """List waivers that have expired, a sentence each."""
-        return [
-            f"{path / NAME}: a waiver of {scenario.name} expired on {each.until} ({each.reason});"
-            " its findings count again"
-            for path, reference in self.loaded.items()
-            for scenario in reference.scenarios
-            for each in scenario.waived
-            if each.until is not None and today > each.until
-        ]
-
     def judge(self, verdict: Verdict, gate: "Gate | None", today: date) -> Verdict:
         """Decide what becomes of the findings of a run; see `judge`."""
         path = self.of.get(verdict.path)
@@ -105,26 +94,22 @@ class References:
         """Verdicts on stores whose required scenarios have too few logs."""
         found, given = [], [folder.resolve() for folder in folders]
         for path, reference in self.loaded.items():
-            top = path.resolve().parent
-            own = [each for each in verdicts if self.of.get(each.path) == path]
-            names = Counter(
-                name
-                for each in own
-                for name in (each.beside.scenarios if each.beside else (each.scenario,))
-            )
+            top, store = path.resolve().parent, path / NAME
+            known: Counter[str] = Counter()
+            for each in verdicts:
+                if self.of.get(each.path) == path:
+                    known.update(each.beside.scenarios if each.beside else (each.scenario,))
             missing = []
-            for each in reference.scenarios if reference.stored else ():
-                number = names[each.name]
-                lacks = each.required and number < each.at_least
-                if lacks and any(_asked(each, folder, top) for folder in given):
-                    reason = f"no log; it had {len(each.repetitions)}"
-                    reason = f"{number} of {each.at_least} logs" if number else reason
-                    missing.append(Missing(f"{LOG}{each.name}", reason=reason))
+            for one in reference.scenarios if reference.stored else ():
+                number = known[one.name]
+                lacks = one.required and number < one.at_least
+                if lacks and any(_asked(one, folder, top) for folder in given):
+                    reason = f"no log; it had {len(one.repetitions)}"
+                    reason = f"{number} of {one.at_least} logs" if number else reason
+                    missing.append(Missing(f"{LOG}{one.name}", reason=reason))
             if missing:
-                store, status = path / NAME, Status.FINDINGS
-                found.append(
-                    Verdict(store, status, missing=tuple(missing), expectations=str(store))
-                )
+                status, lost = Status.FINDINGS, tuple(missing)
+                found.append(Verdict(store, status, missing=lost, expectations=str(store)))
         return found
 
 
@@ -380,14 +365,15 @@ def _ruled(
     joint, level = event.evidence.joint, event.evidence.level
     for scenario in scenarios:
         span = _span(event, begin, scenario)
-        for each in reversed(scenario.waived):
+        for each in reversed(scenario.waive):
             if each.covers(*span) and each.until is not None:
                 if today <= each.until:
                     return Ruling.WAIVED, each.reason
                 return Ruling.EXPIRED, f"{each.until}, {each.reason}"
         for each in reversed(scenario.wanted):
             if each.covers(*span) and (not each.joints or joint in each.joints):
-                if each.loudest is None or level is None or level <= each.loudest:
+                most = each.loudest_db
+                if most is None or level is None or level <= most:
                     return Ruling.ALLOWED, each.reason or "it is wanted"
-                return Ruling.FOUND, f"wanted, up to {each.loudest:.1f} dB, and has {level:.1f} dB"
+                return Ruling.FOUND, f"wanted, up to {most:.1f} dB, and has {level:.1f} dB"
     return Ruling.FOUND, ""
