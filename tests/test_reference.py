@@ -519,6 +519,12 @@ def test_repetitions_of_which_no_joint_is_in_all_are_no_reference_for_each_other
     assert compared.share(judging.Kind.GENERAL) == 1.0
 
 
+def test_a_reference_shorter_than_a_frame_covers_nothing(simulate):
+    run = simulate.run("pick", 1)
+    reference = Reference(Path("good"), store.of_runs([levels(run.cut(0.0, 0.15), name="wave")]))
+    assert reference.compare(run).share(judging.Kind.GENERAL) == 1.0
+
+
 def test_a_desired_velocity_that_is_a_placeholder_tells_no_error(tmp_path, simulate):
     run = simulate.run("pick", 1)
     zeros = replace(run, velocity_desired=np.zeros_like(run.velocity))
@@ -624,8 +630,10 @@ def test_a_chatter_in_all_scenarios_is_worse_in_all_in_any_order(project, tmp_pa
     assert {row["verdict"] for row in rows.values()} == {"worse"}
     pair = (some(tmp_path / f"{side.name} alone", side, "a-*") for side in (before, after))
     _, _, only = compared(*pair)
-    for name in ("verdict", "over_db", "margin_db"):
+    for name in ("verdict", "over_db", "margin_db", "changes"):
         assert only["a"][name] == rows["a"][name]
+    found, alone = ([each | {"run": ""} for each in side["a"]["findings"]] for side in (rows, only))
+    assert found == alone != []
 
 
 def test_missing_renamed_cut_and_frozen_scenarios_fail_by_name_and_new_ones_pass(

@@ -17,7 +17,7 @@ end, where a longer run may stay. So each row of costs follows from the row befo
 repetitions at once.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
@@ -523,10 +523,12 @@ def _over_others(
     """
     found = cells.unknown(len(rows))
     shared = [j for j in cells.joints if all(j in each.joints for each in references)]
-    if not shared:
+    frames = sum(len(each.guide) for each in references)
+    if not shared or not frames:
         return found
-    near, close, thin = _nearest(run, rows, references, shared, apart)
-    level = np.concatenate(list(_thinned((_spread(cells.of(each)) for each in references), thin)))
+    every = -(-frames // POOL)
+    near, close = _nearest(run, rows, references, shared, apart, every)
+    level = np.concatenate([_spread(cells.of(each))[::every] for each in references])
     level[np.isnan(level)] = -np.inf
     floor, mine = _floor(references, cells, OTHERS_FLOOR), cells.of(run)[rows]
     for first in range(0, len(rows), ROWS):
@@ -540,28 +542,19 @@ def _over_others(
     return found
 
 
-def _thinned(parts: Iterable[Real32], every: int) -> Iterator[Real32]:
-    """Every so many-th frame of all, by part."""
-    frames = 0
-    for each in parts:
-        yield each[-frames % every :: every]
-        frames += len(each)
-
-
 def _nearest(
     run: Levels,
     rows: NDArray[np.int64],
     references: Sequence[Levels],
     joints: Sequence[str],
     apart: float,
-) -> tuple[NDArray[np.int32], NDArray[np.bool_], int]:
-    """Moments of references with the nearest speeds, whether they are near, and every how many."""
+    every: int,
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Of every so many-th moment of references, those of the nearest speeds, and which are near."""
     speed = np.concatenate(
-        [each.speed[:, [each.joints.index(j) for j in joints]] for each in references]
+        [each.speed[::every, [each.joints.index(j) for j in joints]] for each in references]
     )
-    time = np.concatenate([each.time - each.start for each in references])
-    thin = -(-len(speed) // POOL)
-    speed, time = speed[::thin], time[::thin]
+    time = np.concatenate([(each.time - each.start)[::every] for each in references])
     scale = speed.std(axis=0) + 0.05
     wanted = run.speed[rows][:, [run.joints.index(j) for j in joints]] / scale
     speed = speed / scale
@@ -576,7 +569,7 @@ def _nearest(
             square[np.abs(when[:, None] - time) < apart] = np.inf
         near[own] = np.argpartition(square, near.shape[1] - 1, axis=1)[:, :NEAREST]
         close[own] = np.take_along_axis(square, near[own], axis=1) <= NEAR**2
-    return near, close, thin
+    return near, close
 
 
 def _quieter(
