@@ -92,14 +92,6 @@ def test_a_run_whose_picture_is_gone_is_done_again(tmp_path):
     assert len(pictures) == 2
 
 
-def test_a_state_that_another_process_keeps_is_not_opened(tmp_path):
-    with (tmp_path / "state.jsonl").open("ab") as holder:
-        fcntl.flock(holder, fcntl.LOCK_EX)
-        refused = pytest.raises(InspectorError, match="is being written by another process; wait")
-        with refused, kept(tmp_path / "state.jsonl", {}):
-            pass
-
-
 @pytest.mark.slow
 def test_only_what_changed_is_done_again(runs, tmp_path):
     state = tmp_path / "state.jsonl"
@@ -249,30 +241,26 @@ def test_a_header_that_was_being_written_is_written_again(tmp_path):
         pass
 
 
-def test_a_state_that_cannot_be_a_file_is_refused(tmp_path, monkeypatch):
-    with pytest.raises(StateError, match="is no regular file"), kept(tmp_path, {}):
-        pass
+def test_a_state_that_cannot_be_written_or_is_no_file_is_refused(tmp_path, monkeypatch):
+    def refused(path, error, problem):
+        with pytest.raises(error, match=problem), kept(tmp_path / path, {}):
+            pass
+
+    refused(".", StateError, "is no regular file")
     (tmp_path / "file").touch()
-    refused = pytest.raises(
-        OutputError, match=r"file/state: cannot be written \(Not a directory\)$"
-    )
-    with refused, kept(tmp_path / "file" / "state", {}):
-        pass
+    refused("file/state", OutputError, r"file/state: cannot be written \(Not a directory\)$")
+    with (tmp_path / "held").open("ab") as holder:
+        fcntl.flock(holder, fcntl.LOCK_EX)
+        refused("held", InspectorError, "is being written by another process; wait")
     with (tmp_path / "large").open("wb") as file:
         file.truncate(2**28 + 1)
-    refused = pytest.raises(StateError, match="large: is larger than 268435456 bytes;")
-    with refused, kept(tmp_path / "large", {}):
-        pass
+    refused("large", StateError, "large: is larger than 268435456 bytes;")
 
     def full(_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    refused = pytest.raises(
-        OutputError, match=r"new: cannot be written \(No space left on device\)$"
-    )
-    with refused, kept(tmp_path / "new", {}):
-        pass
+    refused("new", OutputError, r"new: cannot be written \(No space left on device\)$")
 
 
 @pytest.mark.parametrize("beside", ["robot", "desired"])
