@@ -484,5 +484,5 @@ ANY = LogBands(
     speed=True,
     rounds=300,
     leaves=16,
-    alarm=0.64,
+    alarm=0.83,
 )
