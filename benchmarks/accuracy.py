@@ -19,8 +19,8 @@ model was trained on none of this. All motion is simulated unless it says "real"
 motion of a real robot was available.
 """
 OTHERS = """
-Robots and controllers of PyBullet, Drake and dm_control (`python -m benchmarks.elsewhere`), never
-used in training. Legged robots have most of the false alarms."""
+Robots and controllers of PyBullet and Drake (`python -m benchmarks.elsewhere`), never used in
+training. Legged robots have all of the false alarms."""
 LASTING = """
 Other seeds of robots in wide domains: good runs, faults, tones over whole runs, and faults that are
 cut out of their runs. Then real logs of good motion, with tones of half a second added."""
