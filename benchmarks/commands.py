@@ -25,13 +25,14 @@ RECORDINGS = {"view of 10 s, 10 kHz, 32 joints": 20.0}  # most that a recording 
 
 def cases(folder: Path) -> dict[str, tuple[list[str], float, float | None]]:
     """Arguments of each command, the motion that it takes and the most CPU time, in [s]."""
-    save = ["--overwrite", "--save", str(folder / "out.rrd")]
-    page = ["--overwrite", "--output", str(folder / "out.html")]
-    short, long = str(folder / "short.npz"), str(folder / "long.npz")
+    save = ["--overwrite", "-o", str(folder / "out.rrd")]
+    page = ["--overwrite", "-o", str(folder / "out.html")]
+    short, long, batch = (str(folder / name) for name in ("short.npz", "long.npz", "batch"))
     return {
         "`inspector --help`": (["--help"], 0.0, 0.5),
         "classify 10 s, 10 kHz, 32 joints": (["classify", short], 10.0, None),
         "classify 150 s, 1 kHz, 60 joints": (["classify", long], 150.0, None),
+        "classify 28 runs of 7 s, 1 kHz, 18 joints": (["classify", batch], BATCH * 7.0, None),
         "classify 10 s of noise, 10 kHz": (["classify", str(folder / "noise.log")], 10.0, 1.5),
         "view of 10 s, 10 kHz, 32 joints": (["view", short, *save], 10.0, 3.0),
         "view of 150 s, 1 kHz, 60 joints": (["view", long, *save], 150.0, 5.0),
@@ -49,7 +50,9 @@ def rows(before: Path | None) -> Iterator[Row]:
         if before:
             sides["before"] = Checkout.of(before, None, folder / "before")
         for title, (arguments, seconds, most) in cases(folder).items():
-            work = {side: partial(measure, each, arguments) for side, each in sides.items()}
+            # An older `view` writes to other options.
+            which = {"ours": ours} if arguments[0] == "view" else sides
+            work = {side: partial(measure, each, arguments) for side, each in which.items()}
             if title == "`inspector --help`" and not before:
                 work["empty Python"] = partial(of_process, [sys.executable, "-c", "pass"])
             times = in_turns(work, REPEATS, warm=1)
