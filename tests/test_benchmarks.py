@@ -5,10 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
-
-import noisemodel as nm
 
 ROOT = Path(__file__).parents[1]
 
@@ -58,13 +55,6 @@ def test_an_unknown_benchmark_is_refused():
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "no benchmark nothing; there are extended, stream" in done.stderr
-
-
-def test_our_twists_are_those_of_the_loop_that_they_are_timed_with(bench):
-    twists, robot = bench("twists"), nm.Robot.load("talos")
-    motion = twists.states(robot, 3)
-    ours = nm.link_twists(robot, *motion)
-    np.testing.assert_allclose(twists.loop_by_sample(robot, *motion), ours, atol=1e-12)
 
 
 def test_mutants_are_of_what_fast_tests_measure(bench):

@@ -60,7 +60,7 @@ HEAD = "time,a.velocity,b.velocity\n"
         ("time,a.velocity,a.velocity\n0,1,2\n", "row 1: two columns are named 'a.velocity'"),
         (
             "time,a.velocity,/js/a/velocity\n0,1,2\n0.1,1,2\n",
-            "row 1: 'a.velocity' and '/js/a/velocity' both hold velocity of joint 'a'",
+            "'a.velocity' and '/js/a/velocity' both hold velocity of joint 'a'",
         ),
         (
             'time,"a.velocity\n0,1\n',

@@ -34,6 +34,8 @@ def run(*arguments, limit=None, **settings):
     return subprocess.run(
         command(*arguments),
         cwd=ROOT,
+        # Bytecode would be cut off, too.
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         check=False,
         text=True,
         stderr=subprocess.PIPE,

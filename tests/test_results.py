@@ -20,13 +20,14 @@ from inspector.verdict import Beside, Finding, Verdict
 @pytest.fixture
 def project(tmp_path, monkeypatch):
     """A repository; the working folder is one below its top."""
-    (tmp_path / ".git").mkdir()
-    (tmp_path / "sub").mkdir()
-    monkeypatch.chdir(tmp_path / "sub")
+    top = tmp_path / "project"
+    for folder in (top / ".git", top / "sub"):
+        folder.mkdir(parents=True)
+    monkeypatch.chdir(top / "sub")
     time = np.arange(400) / 100
     rows = "".join(f"{each:g},{np.sin(each):g}\n" for each in time)
-    (tmp_path / "log.csv").write_text(f"time,elbow\n{rows}")
-    return tmp_path
+    (top / "log.csv").write_text(f"time,elbow\n{rows}")
+    return top
 
 
 def test_settings_hold_for_commands_and_the_command_line_wins(project):
