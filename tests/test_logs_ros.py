@@ -179,29 +179,6 @@ def test_joint_states_take_precedence_over_a_controllers_feedback(tmp_path):
     assert any("not read: /arm/state/actual/positions" in each for each in imported.remarks)
 
 
-def test_trajectories_are_desired_motion_and_apply_between_their_points(tmp_path):
-    def trajectory(at, start, stop):
-        points = [
-            TALK.point([start + (stop - start) * n / 10] * 3, [stop - start] * 3, after=n / 10)
-            for n in range(11)
-        ]
-        header = TALK.header(int(at))
-        return at, TALK.make(
-            "trajectory_msgs/JointTrajectory",
-            header=header,
-            joint_names=list(JOINTS),
-            points=points,
-        )
-
-    plans = [trajectory(EPOCH, 0.0, 1.0), trajectory(EPOCH + 2_000_000_000, 1.0, 0.0)]
-    run = read_log(bag(tmp_path, {"/joint_states": states(), "/arm/joint_trajectory": plans})).run
-    assert run.mask.all()
-    held = (run.time > 1) & (run.time < 2)
-    assert np.allclose(run.position_desired[held], 1.0)
-    moving = (run.time > 0.2) & (run.time < 0.9)
-    assert np.allclose(run.position_desired[moving, 0], run.time[moving], atol=1e-9)
-
-
 def test_odometry_is_the_base_in_body_axes(tmp_path):
     robot = Talk()
     messages = []

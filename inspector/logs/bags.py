@@ -296,45 +296,6 @@ class MotionReader:
                 )
 
 
-class Trajectories:
-    """``trajectory_msgs/JointTrajectory``: planned desired motion."""
-
-    def __init__(self, path: Path, topic: Topic) -> None:
-        self._decode = decoder(path, topic)
-        self._topic = topic.name
-        self._plans: dict[frozenset[str], list[tuple[int, tuple[str, ...], Any]]] = {}
-
-    def add(self, received: int, data: bytes) -> None:
-        """Add a trajectory."""
-        message = self._decode(data)
-        joints = tuple(message.joint_names)
-        if joints and message.points:
-            start = _nanoseconds(message.header.stamp) or received
-            self._plans.setdefault(frozenset(joints), []).append((start, joints, message.points))
-
-    def fields(self) -> Iterator[Field]:
-        """Fields of the points; a new trajectory replaces the rest of the previous one."""
-        for plans in self._plans.values():
-            joints, rows = plans[0][1], []
-            stops = [*(start for start, _, _ in plans[1:]), 2**63]
-            for (start, names, points), stop in zip(plans, stops, strict=True):
-                order = [names.index(joint) for joint in joints]
-                times = [start + _nanoseconds(point.time_from_start) for point in points]
-                rows += [(t, order, p) for t, p in zip(times, points, strict=True) if t < stop]
-            stamps = Stamps.of_nanoseconds(np.array([at for at, _, _ in rows]), held=True)
-            for name, signal in (("positions", "position"), ("velocities", "velocity")):
-                if all(len(getattr(point, name)) == len(joints) for _, _, point in rows):
-                    yield Field(
-                        f"{self._topic}/{name}",
-                        np.array([getattr(point, name)[order] for _, order, point in rows]),
-                        stamps,
-                        joints=joints,
-                        signal=f"{signal}_desired",
-                        source=self._topic,
-                        rank=2,
-                    )
-
-
 class Descriptions:
     """``std_msgs/String``: the robot's URDF, the last that holds one."""
 
@@ -353,17 +314,14 @@ class Descriptions:
         return ()
 
 
-TopicReader: TypeAlias = MotionReader | Trajectories | Descriptions
-TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-TYPES = (*MOTION, TRAJECTORY)  # types of messages with motion
+TopicReader: TypeAlias = MotionReader | Descriptions
+TYPES = tuple(MOTION)  # types of messages with motion
 
 
 def topic_reader(path: Path, topic: Topic) -> TopicReader | None:
     """Reader of a topic; None if its type is not read."""
     if topic.type == "std_msgs/msg/String" and topic.name.endswith(DESCRIPTION):
         return Descriptions(path, topic)
-    if topic.type == TRAJECTORY:
-        return Trajectories(path, topic)
     return MotionReader(path, topic) if topic.type in MOTION else None
 
 

@@ -51,20 +51,15 @@ class Stamps:
     rows: Sequence[int] | None = None  # line number of each sample, if the file has lines
     unit: str = "seconds"  # of the stamps in the log; `SAMPLES` until the rate is known
     remark: str = ""  # on their source, if it is not the expected one
-    held: bool = False  # values apply between stamps however far apart, as in a planned trajectory
     rate: float | None = None  # that the log is said to have, in [Hz]
     name: str = ""  # of their column
     stated: tuple[str, float | None] = ("", None)  # what else tells the rate, and that, in [Hz]
 
     @classmethod
-    def of_nanoseconds(
-        cls, stamps: NDArray[np.int64], *, remark: str = "", held: bool = False
-    ) -> "Stamps":
+    def of_nanoseconds(cls, stamps: NDArray[np.int64], *, remark: str = "") -> "Stamps":
         """Stamps from whole nanoseconds, shape (samples,)."""
         first = int(stamps[0])
-        return cls(
-            Decimal(first).scaleb(-9), np.multiply(stamps - first, 1e-9), remark=remark, held=held
-        )
+        return cls(Decimal(first).scaleb(-9), np.multiply(stamps - first, 1e-9), remark=remark)
 
     @classmethod
     def counted(cls, samples: int, stated: tuple[str, float | None] = ("", None)) -> "Stamps":
@@ -88,7 +83,7 @@ class Stamps:
             near = float(power * min(ROUND, key=lambda digit: abs(digit * power / nominal - 1)))
             rate = near if abs(near / nominal - 1) <= NEAR else nominal
         uniform = uniform and abs(rate * step - 1) <= UNIFORM
-        wide = np.empty(0, dtype=np.int64) if self.held else np.flatnonzero(steps > GAP / rate)
+        wide = np.flatnonzero(steps > GAP / rate)
         deviations = np.delete(steps, wide) - 1 / rate
         edges = [0, *(wide + 1), len(self.time)]
         return Clock(
