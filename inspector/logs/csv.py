@@ -18,7 +18,7 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, gathered
-from inspector.logs.clocks import counting, is_counter, slope, stamps_since
+from inspector.logs.clocks import counting, stamps_since
 from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions, no_motion
 from inspector.logs.names import (
@@ -41,8 +41,7 @@ COMMENTS = ("#", "%", "//")
 # Cells without a number, in any case.
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
 HEAD = 200  # lines among which the first row of numbers is looked for
-EXAMINED = 20_000  # lines of a log without a header from which its columns are recognised
-CLEAR = 0.8  # least correlation of columns with the slopes of others that they are named after
+COLUMNS = "such as --columns time,q1,q2,dq1,dq2 (without stamps: no time, but --rate HZ)"
 SPARSE = 0.5  # share of rows without a number from which a column has another clock
 LONGEST_LINE = 4 * 2**20  # characters of a line: far more than all columns that are read can have
 DIGITS = 30  # stamps have at most so many digits before or after the point
@@ -192,7 +191,11 @@ def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
     known = [n for n, row in names.items() if time_column(row) or any(map(column_signal, row))]
     candidates = plain or fitting or known
     if not candidates:
-        raise _no_header(path, delimiter, first, max(before, default=0) + 1)
+        count = width - lines[first].rstrip().endswith(delimiter)
+        problem = (
+            f"there is no header; the first row has {count} numbers. Name the columns in order"
+        )
+        raise LogError(path, f"{problem}, {COLUMNS}", max(before, default=0) + 1)
     row = candidates[-1]
     # with an open quotation mark, the header takes more lines
     rows = csv.reader(lines[row - 1 :], delimiter=delimiter, skipinitialspace=True)
@@ -233,51 +236,6 @@ def _clean(cells: Sequence[str]) -> tuple[str, ...]:
     first = cells[0].strip().lstrip("#% ")
     marked_alone = cells[0].strip() and not first  # as in "# time q"
     return (*(() if marked_alone else (first,)), *(name.strip() for name in cells[1:]))
-
-
-def _no_header(path: Path, delimiter: str, skip: int, row: int) -> LogError:
-    """Error of a log without a header, with names for its columns by what they hold."""
-    rows: list[list[float]] = []
-    with path.open(newline="", encoding="utf-8-sig") as stream, suppress(ValueError, csv.Error):
-        for line in islice(stream, skip, skip + EXAMINED):
-            cells = _split(line, delimiter)
-            cells = cells[:-1] if cells[-1:] == [""] else cells
-            rows.append([float(cell.replace(",", ".")) for cell in cells])
-    width = len(rows[0]) if rows else 0
-    if not width:
-        return LogError(path, "there is no row of numbers", row)
-    names, how = _suggested(np.array([each for each in rows if len(each) == width]))
-    problem = f"there is no header; the first row has {width} numbers. Name the columns in order"
-    return LogError(path, f"{problem}, such as --columns {','.join(names)}{how}", row)
-
-
-def _suggested(table: Array) -> tuple[list[str], str]:
-    """Names of the columns of a table, by what they hold, and what else has to be typed.
-
-    The first is time if it rises evenly. Columns are velocities if they are the slopes of as many
-    columns before them; without such, all are positions.
-    """
-    steps = np.diff(table[:, 0])
-    even = len(steps) > 0 and (steps > 0).all() and np.ptp(steps) <= 2 * float(np.mean(steps))
-    columns = table[:, int(even) :]
-    left = columns.shape[1]
-    best, names = CLEAR, [f"q{number}" for number in range(1, left + 1)]
-    for count in range(1, left // 2 + 1):
-        kinds = ("q", "dq", "tau")[: 2 if left == 2 * count else 3]
-        pairs = [(kind, number) for kind in kinds for number in range(1, count + 1)]
-        for order in (pairs, sorted(pairs, key=lambda pair: pair[1])):  # by quantity, by joint
-            named = [*(f"{kind}{number}" for kind, number in order), *[""] * left][:left]
-            position, velocity = (
-                columns[:, [name.startswith(kind) for name in named]] for kind in ("q", "dq")
-            )
-            if position.shape == velocity.shape:
-                fit, _ = slope((position[2:] - position[:-2]) / 2, velocity[1:-1])
-                if fit > best + 0.01:
-                    best, names = fit, named
-    names = ["time", *names] if even else names
-    if even and not is_counter(steps, float(table[0, 0])):
-        return names, " (without stamps: no time, but --rate HZ)"
-    return names, "" if best > CLEAR else " --rate HZ (the log's samples per second)"
 
 
 def _times(header: Sequence[str], options: ReadOptions) -> tuple[int | None, int | None]:
