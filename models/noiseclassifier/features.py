@@ -142,11 +142,9 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
     if profile.bands == "log":
         squares = np.square(spectrum.real)
         squares += np.square(spectrum.imag)
-        # A product for each window: the rounding of one for all depends on how many they are.
-        last = squares.ndim - 1
-        by_window = squares.transpose(*range(1, last), 0, last)
-        power = by_window @ _power_shares(profile.rate, resolution)
-        amplitude = np.sqrt(power, out=power)
+        # A product for each row: the rounding of one for all depends on how many they are.
+        rows = np.moveaxis(squares, 0, -2)[..., None, :]
+        amplitude = np.sqrt((rows @ _power_shares(profile.rate, resolution))[..., 0, :])
     else:
         amplitude = np.moveaxis(compress(np.abs(spectrum), comb=profile.bands == "comb"), 0, -2)
     amplitude += profile.floor
