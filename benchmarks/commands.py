@@ -1,9 +1,8 @@
 """Commands, each as a process of its own, beside real time, or beside an older checkout.
 
-The runs: 10 s at 10 kHz of TALOS, 32 joints; 150 s at 1 kHz of 60 joints without a robot; both
-float32, with positions, velocities measured and desired. The log: 10 s of a noise in NoisyTest's
-two columns. The batch: 28 runs of 7 s at 1 kHz of 18 joints. With an older checkout (`--before`),
-both have the same input, caches and bytecode of their own, and take turns after a warm-up.
+The runs: 10 s at 10 kHz of TALOS, 32 joints; 150 s at 1 kHz of 60 joints; both float32, with
+positions, velocities measured and desired. The log: 10 s of noise in two columns. The batch: 28
+runs of 7 s. With an older checkout, each has its own caches, and they take turns after a warm-up.
 """
 
 import sys

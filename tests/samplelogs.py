@@ -69,14 +69,14 @@ class Talk:
             **{name: np.asarray(each, dtype=np.float64) for name, each in arrays.items()},
         )
 
-    def point(self, positions=(), velocities=(), effort=(), after=0.0):
+    def point(self, positions=(), velocities=(), effort=()):
         return self.make(
             "trajectory_msgs/JointTrajectoryPoint",
             positions=np.asarray(positions, dtype=np.float64),
             velocities=np.asarray(velocities, dtype=np.float64),
             accelerations=np.zeros(0),
             effort=np.asarray(effort, dtype=np.float64),
-            time_from_start=self.duration(after),
+            time_from_start=self.duration(0.0),
         )
 
     def raw(self, message):

@@ -161,7 +161,7 @@ def _store(kind: str, definition: str, ros1: bool) -> Any:
 
 
 def _nanoseconds(time: Any) -> int:
-    """Time or duration of ROS, in [ns]."""
+    """Time of ROS, in [ns]."""
     return int(time.sec) * 10**9 + int(time.nanosec)
 
 
