@@ -23,8 +23,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import IO, Any
 
-import numpy as np
-
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import Analysis, analyse, analyse_noise
@@ -47,7 +45,6 @@ FORMAT = "noise-classify-state/2"
 # Most bytes of a file that is resumed: enough for some hundred thousand runs.
 MAX_BYTES = 256 * 2**20
 DRAWING = 0.4  # about how long a picture takes, in [s]
-LARGE = 31 * 2**20  # bytes: glibc never keeps pieces of 32 MiB or more
 LONGEST_LINE = 2**16  # characters of a line that are looked at
 
 # Draws a picture of an analysis with its verdict and comparison, which is None without a reference,
@@ -408,9 +405,6 @@ def classify_file(
     """
     source = path if isinstance(path, Source) else Source(path)
     begun = perf_counter()
-    # Allocators such as glibc's keep freed memory only after a large piece was freed. Else a tenth
-    # of the time goes into getting the same memory again for each array.
-    np.empty(LARGE, dtype=np.uint8)
     try:
         if source.path.suffix == ".log" and not _has_header(source.path):
             analysis = analyse_noise(*nc.read_log(source.path), library, unknown=unknown)

@@ -503,7 +503,8 @@ def _over_repetitions(
     for each, path in zip(references, aligned, strict=True):
         loud = _spread(cells.of(each))[path.frame]
         loud[~path.same] = np.nan
-        loudest = np.fmax(loudest, loud)
+        np.fmax(loudest, loud, out=loudest)
+        del loud  # as large as a run
     floor = _floor(references, cells)
     over = _raised(cells.of(run), floor) - _raised(loudest, floor)
     return over, np.any([path.same for path in aligned], axis=0)
@@ -531,8 +532,9 @@ def _over_others(
     level = np.concatenate([_spread(cells.of(each))[::every] for each in references])
     level[np.isnan(level)] = -np.inf
     floor, mine = _floor(references, cells, OTHERS_FLOOR), cells.of(run)[rows]
-    for first in range(0, len(rows), ROWS):
-        own = slice(first, first + ROWS)
+    at_once = max(1, ROWS // len(cells.joints))
+    for first in range(0, len(rows), at_once):
+        own = slice(first, first + at_once)
         known = close[own, :, None, None, None]
         loudest = np.where(known, level[near[own]], np.float32(-np.inf)).max(axis=1)
         loudest[~np.isfinite(loudest)] = np.nan
