@@ -1,7 +1,7 @@
 """Commands that check runs: `classify`, `diff`, `accept`, `audit`, `smoothness` and more."""
 
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from fnmatch import fnmatchcase
@@ -34,6 +34,14 @@ Format = Annotated[
 
 # --- classify
 
+Verbose = Annotated[
+    bool, option("All that was assumed, and the runs of scenarios.", "--verbose", "-v")
+]
+ReportFolder = Annotated[
+    Path | None, option("Write index.html with a picture of each run to this folder.")
+]
+Resume = Annotated[Path | None, option("Keep verdicts in this file; continue if it exists.")]
+
 _gate = partial(option, rich_help_panel="What fails a run")
 
 Accepted = Annotated[
@@ -55,21 +63,15 @@ def classify(
     ctx: typer.Context,
     runs: shared.Runs,
     format: Format = "text",  # noqa: A002
-    verbose: Annotated[
-        bool, option("All that was assumed, and the runs of scenarios.", "--verbose", "-v")
-    ] = False,
+    verbose: Verbose = False,
     jobs: shared.NumberOfJobs = 1,
     dask: shared.Dask = "",
     model: shared.ModelFiles = None,
     write: shared.Write = None,
-    report: Annotated[
-        Path | None, option("Write index.html with a picture of each run to this folder.")
-    ] = None,
+    report: ReportFolder = None,
     report_url: shared.ReportUrl = "",
     overwrite: shared.Overwrite = False,
-    resume: Annotated[
-        Path | None, option("Keep verdicts in this file; continue if it exists.")
-    ] = None,
+    resume: Resume = None,
     unknown: shared.UnknownFrames = Unknown.FINDING,
     reference: Accepted = None,
     no_reference: Annotated[bool, _gate("Use the general model alone.", "--no-reference")] = False,
@@ -89,12 +91,7 @@ def classify(
     references = References() if no_reference else References.found(shown, reference, ctx.obj)
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
     formats = FORMATS | {"text": partial(text, verbose=verbose)}
-    outputs = shared.outputs_of(write, formats, overwrite=overwrite)
-    if report:
-        require("a report")
-        shared.prepare(report, html.PAGE, overwrite=overwrite)
-        outputs[report] = partial(html.write_index, folder=report)
-
+    outputs = _outputs(write, formats, report, overwrite=overwrite)
     classified = classify_files(
         found,
         library,
@@ -121,6 +118,18 @@ def classify(
     if remark := left_out(others):
         typer.echo(f"inspector: {remark}", err=True)
     _end(verdicts, shared.written(verdicts, formats[format], outputs))
+
+
+def _outputs(
+    write: Sequence[str] | None, formats: Mapping[str, Any], report: Path | None, *, overwrite: bool
+) -> dict[Path, Any]:
+    """What writes each file that was asked for, and the report."""
+    outputs = shared.outputs_of(write, formats, overwrite=overwrite)
+    if report:
+        require("a report")
+        shared.prepare(report, html.PAGE, overwrite=overwrite)
+        outputs[report] = partial(html.write_index, folder=report)
+    return outputs
 
 
 def _classes(given: Sequence[str], library: Library) -> tuple[str, ...]:

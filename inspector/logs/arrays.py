@@ -114,12 +114,7 @@ def log_of(
         stated: What states the rate, and the rate, in [Hz].
         joints: Names of the columns of arrays, by the arrays' names.
     """
-    every = arrays
-    arrays = {
-        n: each[:, 0] if each.shape[1:] == (1,) and n.rpartition("/")[2].lower() in TIMES else each
-        for n, each in arrays.items()
-        if each.ndim in (1, 2) and len(each) > 1
-    }
+    every, arrays = arrays, _tables(arrays)
     options = options.for_columns(path, [*arrays])
     mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
     naming = Naming.of((n for n, e in arrays.items() if e.ndim == 1), options.known_joints)
@@ -162,6 +157,15 @@ def log_of(
         time=time,
     )
     return gathered(log, options)
+
+
+def _tables(arrays: Arrays) -> Arrays:
+    """Arrays that may be of samples; times as columns of one dimension."""
+    return {
+        n: each[:, 0] if each.shape[1:] == (1,) and n.rpartition("/")[2].lower() in TIMES else each
+        for n, each in arrays.items()
+        if each.ndim in (1, 2) and len(each) > 1
+    }
 
 
 def _arms(arrays: Arrays, roles: Collection[str]) -> dict[str, tuple[str, ...]]:
