@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.signal import butter, savgol_filter, sosfilt
@@ -50,6 +52,15 @@ def test_the_power_of_white_noise_is_spread_evenly_and_adds_up(rate):
     assert found.total.sum() * width == pytest.approx(3 * 0.1**2, rel=0.05)
     low, high = np.array_split(found.total, 2)
     assert low.mean() == pytest.approx(high.mean(), rel=0.1)
+
+
+def test_the_spectrum_of_a_minute_of_many_joints_takes_less_than_the_minute_itself():
+    velocity = noise((60_000, 20))
+    tracemalloc.start()
+    spectrum(velocity, 1000.0, np.ones(60_000, dtype=bool))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2 * velocity.nbytes
 
 
 def test_a_sine_has_its_power_at_its_frequency():

@@ -31,7 +31,7 @@ def reach(signal: Real) -> Real:
 SEGMENT = 0.4
 FEWEST_SAMPLES = 128  # fewest samples of a segment, so that slow logs have a spectrum too
 MOST = 256  # most segments that are averaged, evenly spread, which limits the cost of long logs
-AT_ONCE = 16  # segments that are transformed at once, which bounds the memory that they take
+BATCH = 16  # segments that are transformed at once, which bounds the memory that they take
 PER_OCTAVE = 4  # bands of a smoothed spectrum in an octave
 
 
@@ -60,7 +60,7 @@ def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
     signal = np.ascontiguousarray(velocity.T, dtype=np.float64)
     segments = sliding_window_view(signal, length, axis=1)
     power = np.zeros((len(signal), length // 2 + 1))
-    for few in np.split(np.array(starts)[chosen], range(AT_ONCE, len(chosen), AT_ONCE)):
+    for few in np.split(np.array(starts)[chosen], range(BATCH, len(chosen), BATCH)):
         some = segments[:, few]
         # Less its least-squares line, slow motion does not leak to higher frequencies.
         slope = some @ ramp / np.square(ramp).sum()
@@ -462,7 +462,7 @@ MOVES = 0.1
 MOVING_TIME = 2.0  # stretch of time in which it has to move, in [s]
 MOVING_SHARE = 0.75  # share of that time: a motion reverses now and then, a push is over sooner
 CHANGE = 1e-6  # change of a desired position from which it changes, in [rad] or [m]
-AT_ONCE = 1_000_000  # samples that are counted at once
+COUNTED = 1_000_000  # samples that are counted at once
 # Most quantisation noise of a differentiated velocity, RMS in [rad/s]: faults begin there.
 FAINTEST = 0.05
 
@@ -546,8 +546,8 @@ def _moves(run: Run) -> bool:
     fast = run.mask.copy()
     for rows in pieces(run.velocity):
         fast[rows] &= np.abs(run.velocity[rows]).max(axis=1) > MOVES
-    for first in range(0, len(fast) - size + 1, AT_ONCE):
-        count = np.append(0, np.cumsum(fast[first : first + AT_ONCE + size]))
+    for first in range(0, len(fast) - size + 1, COUNTED):
+        count = np.append(0, np.cumsum(fast[first : first + COUNTED + size]))
         if (count[size:] - count[:-size]).max() >= MOVING_SHARE * size:
             return True
     return False
