@@ -227,7 +227,7 @@ KINDS = (
     ),
     Kind(
         "Unitree Go1, targets and errors", "timestamp,real_time,FR_0_target,FR_0_actual,…",
-        go1_tracking, 500.0, LEGS, "position, position_desired", BARE, "--degrees",
+        go1_tracking, 500.0, LEGS, "position, position_desired", BARE, "--units degrees",
     ),
     Kind(
         "Unitree Go1, a policy's counter", "timestamp,FR_0,FR_1…", go1_policy, 50.0, LEGS,
@@ -237,7 +237,7 @@ KINDS = (
         "a motor whose velocity is a tenth of the slope",
         "Time,Position,Velocity,Position Error,Velocity Setpoint,…,Target Pos", motor, 500.0,
         ("joint_0",), "position, velocity, position_desired, velocity_desired",
-        hint="--degrees", told="are 0.1 times the slopes of their positions",
+        hint="--units degrees", told="are 0.1 times the slopes of their positions",
     ),
     Kind(
         "one joint, words and units", "Timestamp,Output Angle [deg],Angular Velocity [dps]…",
@@ -373,8 +373,8 @@ def followed(message, rate):
         options["columns"] = tuple(found[1].rstrip(";,").split(","))
     if (found := re.search(r"--rate ([\d.]+)", command)) and "but --rate" not in command:
         options["rate"] = float(found[1])
-    if found := re.search(r"--units (\w+)|say --(degrees)", command):
-        options["units"] = found[1] or found[2]
+    if found := re.search(r"--units (\w+)", command):
+        options["units"] = found[1]
     return options
 
 

@@ -152,7 +152,6 @@ def log_options(
         str | None, _log_option("Names of a CSV's columns, without a header: time,q1,q2.")
     ] = None,
     units: Annotated[str | None, _log_option("Unit of angles: radians or degrees.")] = None,
-    degrees: Annotated[bool, _log_option("Angles are in degrees.", "--degrees")] = False,
     topic: Annotated[list[str] | None, _log_option("Read this topic of a bag; repeatable.")] = None,
     episode: Annotated[
         list[str] | None, _log_option("Read this episode of a data set; repeatable.")
@@ -172,7 +171,7 @@ def log_options(
         saved=mapping,
         robot=None if robot == "none" else robot,
         rate=rate,
-        units="degrees" if degrees else units,
+        units=units,
         joints=joints.split(",") if joints else None,
         columns=columns.split(",") if columns else None,
         topics=topic,

@@ -1,8 +1,8 @@
 """Clocks of logs: units and order of stamps, rates of logs without, and signals on one time base.
 
 Stamps of separate clocks are aligned by cross-correlation of the desired and the measured
-velocities of the same joints, which gives the offset; residual offsets of short segments give the
-drift. An offset below ``LAG`` is attributed to the controller, not to the clocks.
+velocities of the same joints, which gives the offset; residual offsets of short segments refine it.
+An offset below ``LAG`` is attributed to the controller, not to the clocks.
 A zero-order hold is a slow signal that was sampled faster by holding its values.
 """
 
@@ -326,10 +326,9 @@ SHARE = 0.5  # least share of the shorter log that overlaps the longer one
 LAG = 0.1
 HIGHEST_RATE = 1000.0  # highest rate at which motions are compared, in [Hz]
 COARSE_RATE = 50.0  # rate of the first search, in [Hz]
-# Largest number of segments that the drift is fitted to, and their least length, in [s].
+# Largest number of segments that the offset is averaged over, and their least length, in [s].
 SEGMENTS, SHORTEST = 12, 2.0
-SIGNIFICANT = 5.0  # least ratio of a drift to its standard error
-LEAST_DRIFT = 20e-6  # least drift that is distinguished from none, as of quartz clocks, in [s/s]
+APART = 1e-3  # least change of the offset between the halves of a log that is said, in [s]
 
 HOW = "specify --offset SECONDS, which is added to the desired stamps"
 
@@ -344,8 +343,7 @@ def synchronise(
 ) -> tuple[tuple[Track, ...], str, dict[str, float]]:
     """Tracks on the clock of the measured motion, whose time starts at 0.
 
-    The result has a remark, and by how much the desired clock was shifted, if it was:
-    t_measured = t + seconds + drift t.
+    The result has a remark, and by how many seconds the desired clock was shifted, if it was.
     """
     start = main.stamps.start
     clocks = {
@@ -365,26 +363,22 @@ def synchronise(
     if all(np.array_equal(stamps.time, main_time) for stamps in own):
         return clocked, "", {}
     if offset is not None:
-        seconds, drift, said = offset, 0.0, f"offset {offset:+g} s, as given"
+        seconds, said = offset, f"offset {offset:+g} s, as given"
     else:
         overlap = own[0].time[0] <= main_time[-1] and main_time[0] <= own[0].time[-1]
         apart = "" if overlap else f"{no_overlap(others[0], main.stamps)}, and "
-        seconds, drift, said = _estimated(path, clocked, own, apart)
-        if seconds == drift == 0.0:
+        seconds, said = _estimated(path, clocked, own, apart)
+        if seconds == 0.0:
             return clocked, said, {}
-    first = min(float(stamps.time[0]) for stamps in own)
-    moved = {
-        id(each): replace(each, time=each.time + seconds + drift * (each.time - first))
-        for each in own
-    }
+    moved = {id(each): replace(each, time=each.time + seconds) for each in own}
     shifted = (replace(t, stamps=moved.get(id(t.stamps), t.stamps)) for t in clocked)
-    return tuple(shifted), said, {"seconds": seconds, "drift": drift}
+    return tuple(shifted), said, {"seconds": seconds}
 
 
 def _estimated(
     path: Path, tracks: Sequence[Track], own: Sequence[Stamps], apart: str
-) -> tuple[float, float, str]:
-    """Offset and drift of the desired clock, 0 if it stays, and a remark.
+) -> tuple[float, str]:
+    """Offset of the desired clock, 0 if it stays, and a remark.
 
     Clocks that do not overlap (``apart`` says so) have to be moved.
     """
@@ -394,22 +388,24 @@ def _estimated(
     )
     unknown = "no joint moves in both"
     if pair is None and not apart:
-        return 0.0, 0.0, ""
+        return 0.0, ""
     if pair is not None:
-        seconds, drift, correlation, next_best = _estimate(*pair)
+        seconds, change, correlation, next_best = _estimate(*pair)
         said = (
-            f"offset {seconds:+.4f} s{f', drift {drift * 1e6:+.0f} ppm' if drift else ''}"
-            f" (correlation {correlation:.2f}, next best {next_best:.2f})"
+            f"offset {seconds:+.4f} s (correlation {correlation:.2f}, next best {next_best:.2f})"
         )
         if correlation >= CORRELATION and next_best <= NEXT_BEST * correlation:
-            if not drift and abs(seconds) <= LAG:
-                return 0.0, 0.0, f"{said}: a controller's lag, the stamps are not changed"
-            return seconds, drift, f"{said}: its stamps are shifted by that"
+            drifts = ""
+            if abs(change) >= APART:
+                drifts = f"; the clocks drift: it is {change:+.4f} s larger in the second half"
+            if abs(seconds) <= LAG:
+                return 0.0, f"{said}: a controller's lag, the stamps are not changed{drifts}"
+            return seconds, f"{said}: its stamps are shifted by that{drifts}"
         unknown = f"the offset cannot be estimated ({said})"
     if apart:
         raise LogError(path, f"{apart}{unknown}; {HOW}")
     assumed = "its clock is assumed to be the measured one's, since"
-    return 0.0, 0.0, f"{assumed} {unknown}; {HOW}"
+    return 0.0, f"{assumed} {unknown}; {HOW}"
 
 
 def no_overlap(desired: Stamps, measured: Stamps) -> str:
@@ -423,18 +419,19 @@ def no_overlap(desired: Stamps, measured: Stamps) -> str:
 
 
 def _estimate(measured: Track, desired: Track) -> tuple[float, float, float, float]:
-    """Offset in [s] and drift in [s/s] of the desired clock; the correlations there and next."""
+    """Offset of the desired clock and its change from half to half, in [s]; two correlations."""
     rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in (measured, desired)))
     joints = [joint for joint in measured.joints if joint in desired.joints]
     one, other = (_velocities(track, joints) for track in (measured, desired))
     seconds, correlation, next_best = _search(one, other, min(rate, COARSE_RATE))
-    drift = 0.0
+    change = 0.0
     for _ in range(3):
-        residuals = _residuals(one, other, seconds, drift, rate)
-        if not len(residuals):
-            break
-        seconds, drift = _fitted(residuals, seconds, drift)
-    return seconds, drift, correlation, next_best
+        residual, weight = _residuals(one, other, seconds, rate).T
+        if len(residual):
+            seconds += float(np.average(residual, weights=weight))
+            early, late = np.array_split(residual, 2)
+            change = float(np.mean(late) - np.mean(early)) if len(late) > 1 else 0.0
+    return seconds, change, correlation, next_best
 
 
 def _common_tracks(
@@ -518,15 +515,14 @@ def _correlation(one: Array, other: Array, least: int) -> Array:
     return np.where(stop - start >= least, found, -1.0)
 
 
-def _residuals(measured: Track, desired: Track, seconds: float, drift: float, rate: float) -> Array:
-    """Residual offset of each segment: time, offset and weight, shape (segments, 3)."""
-    known, time = measured.stamps.time, desired.stamps.time
-    shifted = time + seconds + drift * (time - time[0])
+def _residuals(measured: Track, desired: Track, seconds: float, rate: float) -> Array:
+    """Residual offset and weight of each segment, shape (segments, 2)."""
+    known, shifted = measured.stamps.time, desired.stamps.time + seconds
     start = max(known[0], shifted[0]) + 2 * LAG
     stop = min(known[-1], shifted[-1]) - 2 * LAG
     count = min(SEGMENTS, int((stop - start) / SHORTEST))
     if count < 1:
-        return np.empty((0, 3))
+        return np.empty((0, 2))
     moved = replace(desired, stamps=replace(desired.stamps, time=shifted))
     reach = int(np.ceil(2 * LAG * rate))
     found = []
@@ -535,8 +531,8 @@ def _residuals(measured: Track, desired: Track, seconds: float, drift: float, ra
         longer = first + np.arange(-reach, len(instants) + reach) / rate
         residual, correlation = _match(_at(measured, instants), _at(moved, longer), rate)
         if correlation >= CORRELATION:
-            found.append(((first + last) / 2 - shifted[0], residual, correlation))
-    return np.array(found).reshape(-1, 3)
+            found.append((residual, correlation))
+    return np.array(found).reshape(-1, 2)
 
 
 def _match(segment: Array, longer: Array, rate: float) -> tuple[float, float]:
@@ -553,20 +549,6 @@ def _match(segment: Array, longer: Array, rate: float) -> tuple[float, float]:
     rest = ((found * gain - segment) * slope).sum() / (slope**2).sum()
     reach = (len(longer) - len(segment)) // 2
     return (reach - peak) / rate + float(rest), float(near[peak])
-
-
-def _fitted(residuals: Array, seconds: float, drift: float) -> tuple[float, float]:
-    """Offset and drift fitted to the segments; a drift that is not significant is 0."""
-    when, residual, weight = residuals.T
-    total = residual + drift * when
-    if len(residuals) >= 4:
-        matrix = np.stack((np.ones(len(when)), when), axis=1) * weight[:, None]
-        (constant, slope), *_ = np.linalg.lstsq(matrix, total * weight, rcond=None)
-        spread = np.sqrt(np.sum((total - constant - slope * when) ** 2) / (len(when) - 2))
-        error = spread / (np.std(when) * np.sqrt(len(when)))
-        if abs(slope) > max(SIGNIFICANT * error, LEAST_DRIFT):
-            return seconds + float(constant), float(slope)
-    return seconds + float(np.average(total, weights=weight)), 0.0
 
 
 # A hold: slow signals that were sampled faster

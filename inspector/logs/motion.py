@@ -258,7 +258,7 @@ STRETCHES = 50  # of a log, whose ways are compared
 TURNING = ("revolute", "continuous")
 
 HINT = (
-    "if it is in degrees, say --degrees; if the joint is prismatic or continuous, name the robot"
+    "if it is in degrees, say --units degrees; if the joint is prismatic or continuous, name the robot"
     " (--robot)"
 )
 
