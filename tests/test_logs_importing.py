@@ -170,7 +170,7 @@ def test_degrees_are_converted_but_not_of_prismatic_joints(tmp_path):
 )
 def test_degrees_in_place_of_radians_are_refused_with_their_row(tmp_path, column, value):
     path = log(tmp_path, **{column: np.where(TIME < 0.05, 0.0, value)})
-    message = f"row 7: column '{column}' holds {value:g}, too much for radians; if .* --units degrees"
+    message = f"row 7: column '{column}' holds {value:g}, too much for radians; .* --units deg"
     with pytest.raises(LogError, match=message) as caught:
         read_log(path)
     assert caught.value.row == 7

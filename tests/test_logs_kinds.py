@@ -336,7 +336,8 @@ KINDS = (
             folder / "enc.csv", f"time,{names('enc_#', 6)},{names('temp_#', 6)}", T6, Q6, 20 + Q6
         ),
         125.0, numbered("joint_#", 6), "position",
-        hint="--map 'position.joint_{joint}=enc_{joint}'",
+        hint="all of one form: --map 'position.{joint}=enc_{joint}'",
+        typed="such as --map 'position.joint_{joint}=enc_{joint}'",
     ),
     Kind("MATLAB 5, variables", "t, q, qd", mat, 250.0, numbered("joint_#", 6, 0)),
     Kind("MATLAB 5, a struct, transposed", "run.t, run.q, run.qd",
@@ -480,9 +481,8 @@ def test_a_quaternion_is_no_four_joints(tmp_path):
 )
 def test_set_points_and_poses_are_no_measured_joints(tmp_path, header):
     path = written(tmp_path, header, T6, Q6[:, : header.count(",")])
-    with pytest.raises(InspectorError, match="no position or velocity of a joint") as caught:
+    with pytest.raises(InspectorError, match="no position or velocity of a joint"):
         read_log(path)
-    assert "position.joint_{joint}" not in str(caught.value)
 
 
 def test_units_may_differ_by_column(tmp_path):

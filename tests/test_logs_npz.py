@@ -76,6 +76,9 @@ def test_isaacs_arrays_are_recognised_and_its_root_is_mapped(tmp_path):
     assert np.array_equal(run.velocity, VELOCITY)
     up = [0.0, np.sin(0.6), np.cos(0.6)]  # the world's z, seen from a body tilted about x
     assert np.allclose(run.base_velocity, np.concatenate((up, np.multiply(2, up))))
+    alone = read_log(path, mapping=mapping[:1], rate=200).run
+    assert "base_velocity" in alone.meta["differentiated"]
+    assert np.allclose(alone.base_velocity[:, 3:], 0.0)
     with pytest.raises(LogError, match="a velocity in world axes needs a base_pose of the same"):
         read_log(path, mapping=mapping[1:], rate=200)
     wrong = ["base_pose=root_state[1:8]"]

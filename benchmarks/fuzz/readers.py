@@ -38,7 +38,6 @@ from inspector.logs.names import (
     Naming,
     array_signal,
     column_signal,
-    pattern_for,
     says_twice,
     time_column,
 )
@@ -227,7 +226,6 @@ def _hdf5(folder: Path) -> Path:
         file["data/demo_0/time"] = TIME
         file["data/demo_0/obs/joint_pos"] = POSITION
         file["data/demo_0/obs/joint_vel"] = VELOCITY
-        file["data"].attrs["env_args"] = '{"env_kwargs": {"control_freq": 100}}'
         file["data/demo_0"].attrs["dt"] = 0.01
     return folder / "log.hdf5"
 
@@ -417,7 +415,7 @@ def _read_names(path: Path) -> None:
     naming = Naming.of(names, ("elbow",))
     for name in names:
         column_signal(name, naming), array_signal(name), says_twice(name)
-    time_column(names), pattern_for(names)
+    time_column(names)
 
 
 def _read_definition(path: Path) -> None:

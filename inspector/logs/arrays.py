@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.clocks import counting, stamps_of
 from inspector.logs.log import Entry, Field, Log, LogReader, Stamps
-from inspector.logs.mapping import COMMAND, ReadOptions, pose_of
+from inspector.logs.mapping import COMMAND, ReadOptions
 from inspector.logs.names import (
     SIGNALS,
     TIMES,
@@ -86,8 +86,6 @@ RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampl
 STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
 MOTION = {*SIGNALS, QPOS, QVEL} - {"effort"}
 
-# What moves less does not move, in [rad] or [m].
-STILL = 1e-3
 Arrays = Mapping[str, NDArray[Any]]
 
 
@@ -153,7 +151,7 @@ def log_of(
         tuple(fields),
         episode,
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
-        suggested=(*_of_mujoco(arrays, roles), *_base_of_isaac(arrays, roles, samples)),
+        suggested=tuple(_of_mujoco(arrays, roles)),
         time=time,
     )
     return gathered(log, options)
@@ -343,33 +341,6 @@ def _floating(qpos: Real, count: int) -> list[int]:
     return places
 
 
-def _base_of_isaac(arrays: Arrays, roles: Mapping[str, str], samples: int) -> Iterator[Entry]:
-    """Mapping of a root that moves; that of a robot on a table is left out."""
-    found = {match["what"]: name for name in roles if (match := STATES.fullmatch(name))}
-    pose = arrays.get(found.get("root_pose", ""))
-    if pose is None or pose.shape != (samples, 7):
-        return
-    velocity = arrays.get(found.get("root_velocity", ""), np.empty(0))
-    if max(np.ptp(pose, axis=0).max(), np.abs(velocity).max(initial=0)) < STILL:
-        return
-    if velocity.shape != (len(pose), 6):
-        yield Entry("base_pose", "wxyz", found["root_pose"])
-        return
-
-    def agreement(order: str) -> float:
-        """Cosine of the logged angular velocities and the turns of the pose, in world axes."""
-        turned = pose_of(pose, order)[:, 3:]
-        rate = np.gradient(turned, axis=0)
-        vector, scalar = turned[:, :3], turned[:, 3:]
-        # omega = 2 vec(q_dot conj(q))
-        omega = scalar * rate[:, :3] - rate[:, 3:] * vector - np.cross(rate[:, :3], vector)
-        return float(np.vdot(omega, velocity[:, 3:])) / max(float(np.linalg.norm(omega)), 1e-12)
-
-    order = max(("wxyz", "xyzw"), key=agreement)  # Isaac Lab 3.0 changed it
-    yield Entry("base_velocity", "world", found["root_velocity"])
-    yield Entry("base_pose", order, found["root_pose"])
-
-
 def _nothing(episode: str, arrays: Arrays) -> str:
     """Problem of a file that is not known to hold motion: what it holds, and what to type."""
     wide = [(n, each) for n, each in arrays.items() if each.ndim == 2 and meaning(n) != COMMAND]
@@ -378,8 +349,6 @@ def _nothing(episode: str, arrays: Arrays) -> str:
     example = f"--map position={name}"
     if "obs" in name and half:
         example += f"[0:{half}] --map velocity={name}[{half}:{2 * half}]"
-    if name == "states":  # of robosuite, before robomimic has extracted observations
-        example = "--map position=states[1:8] (MuJoCo's flattened states are time, qpos, qvel)"
     shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])
     return (
         f"{episode or 'the file'} holds no known joint positions or velocities; name them, such as"

@@ -45,7 +45,6 @@ DAMAGE = (
 )
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
-TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 DESCRIPTION = "robot_description"  # the last part of the name of the topic with a robot's URDF
 
 # A JointState topic with one of these in its name holds desired motion.
@@ -59,13 +58,7 @@ CONTROLLED = {
     for name, signal in POINT.items()
     if not (desired and signal == "effort")
 }
-# Frames that do not move with the robot, the smoothest first, and frames of a robot's base.
-FRAMES = [
-    f"{world}/{base}"
-    for world in ("odom", "world", "map", "earth")
-    for base in ("base_link", "base_footprint", "base", "pelvis", "torso", "trunk", "root")
-]
-BASE_WIDTHS = {"pose": 7, "twist": 6, **dict.fromkeys(FRAMES, 7)}
+BASE_WIDTHS = {"pose": 7, "twist": 6}
 RECORDER = "the messages have no stamps, those of the recorder are used"
 
 
@@ -141,9 +134,7 @@ def decoder(path: Path, topic: Topic) -> Callable[[bytes], Any]:
 def _stores(path: Path, topic: Topic) -> list[Any]:
     """What may deserialise messages: several where versions of their type are known."""
     definitions = [""]
-    if topic.type in TRANSFORMS:
-        definitions = ["geometry_msgs/TransformStamped[] transforms"]
-    elif topic.type == STATE:
+    if topic.type == STATE:
         names = _fields_in(topic.definition)
         definitions = [each for each in STATES if not names or _fields_in(each) == names]
         if not definitions:
@@ -193,21 +184,10 @@ def _of_odometry(message: Any) -> Iterator[Row]:
     """Row of a ``nav_msgs/Odometry``: pose of the base in the world, velocity in body axes."""
     pose, twist = message.pose.pose, message.twist.twist
     velocity = [getattr(part, axis) for part in (twist.linear, twist.angular) for axis in "xyz"]
-    parts = {"pose": _pose(pose.position, pose.orientation), "twist": velocity}
+    place, turn = pose.position, pose.orientation
+    numbers = [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
+    parts = {"pose": numbers, "twist": velocity}
     yield (), _nanoseconds(message.header.stamp), parts
-
-
-def _of_transforms(message: Any) -> Iterator[Row]:
-    """Rows of transforms from a fixed frame to a base."""
-    for each in message.transforms:
-        pair = f"{each.header.frame_id.lstrip('/')}/{each.child_frame_id.lstrip('/')}"
-        if pair in FRAMES:
-            pose = _pose(each.transform.translation, each.transform.rotation)
-            yield (), _nanoseconds(each.header.stamp), {pair: pose}
-
-
-def _pose(position: Any, turn: Any) -> list[float]:
-    return [position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w]
 
 
 # By the type of messages, the rows of a message, and signal and rank of each of its arrays.
@@ -218,7 +198,6 @@ MOTION: Mapping[str, tuple[Callable[[Any], Iterator[Row]], Mapping[str, tuple[st
         _of_odometry,
         {"pose": ("base_pose", 0), "twist": ("base_velocity", 0)},
     ),
-    **dict.fromkeys(TRANSFORMS, (_of_transforms, dict.fromkeys(FRAMES, ("base_pose", 1)))),
 }
 
 
@@ -270,11 +249,8 @@ class MotionReader:
                 group.arrays[name].frombytes(row.tobytes())
 
     def fields(self) -> Iterator[Field]:
-        """Fields of the messages; of several transforms, the one with the smoothest fixed frame."""
-        groups = [group for group in self._groups.values() if group.arrays]
-        if self._topic.type in TRANSFORMS:
-            groups = sorted(groups, key=lambda group: FRAMES.index(next(iter(group.arrays))))[:1]
-        for group in groups:
+        """Fields of the messages."""
+        for group in self._groups.values():
             received = np.frombuffer(group.received, dtype=np.int64)
             order: Any = slice(None)  # no copy of what is in order
             if (np.diff(received) < 0).any():

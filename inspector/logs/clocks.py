@@ -391,9 +391,7 @@ def _estimated(
         return 0.0, ""
     if pair is not None:
         seconds, change, correlation, next_best = _estimate(*pair)
-        said = (
-            f"offset {seconds:+.4f} s (correlation {correlation:.2f}, next best {next_best:.2f})"
-        )
+        said = f"offset {seconds:+.4f} s (correlation {correlation:.2f}, next best {next_best:.2f})"
         if correlation >= CORRELATION and next_best <= NEXT_BEST * correlation:
             drifts = ""
             if abs(change) >= APART:

@@ -4,11 +4,9 @@ MATLAB's files of version 7.3 are HDF5 too: structs are groups, and arrays are t
 """
 
 import re
-import subprocess
-import sys
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from math import inf, prod
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -36,12 +34,9 @@ from inspector.logs.log import Log, LogReader
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import TIMES, listed
 from inspector.text import counted
-from noiseclassifier.jsontext import from_json
 from noisemodel.runfile import ArchiveError, check_unpacked, one_line
 
 EPISODES = "data"  # the group that holds the episodes of robomimic and Isaac Lab
-# The attribute of that group which tells how robomimic and Isaac Lab set up their simulator.
-ARGUMENTS = "env_args"
 # Names of episodes in a file without that group: Minari's, ManiSkill's and others.
 NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
 # Errors that h5py raises for damaged files.
@@ -49,16 +44,6 @@ DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
 SMALL = 8 * 2**20  # bytes up to which a dataset is read whatever its name is
 NAMES = {*TIMES, *EPISODE_ENDS}
 
-# What reads a text of any length, in a process of its own, which can be ended.
-PRINT_TEXT = """
-import sys, h5py
-file = h5py.File(sys.argv[1])
-text = file.get(sys.argv[2], file).attrs[sys.argv[3]]
-text = text.encode("utf-8", "surrogateescape") if isinstance(text, str) else text
-sys.stdout.buffer.write(text)
-"""
-# Time in [s] to read a text of any length: in a damaged heap libhdf5 searches it for ever.
-TIMEOUT = 10.0
 MATLAB = b"MATLAB 7.3"  # the first bytes of a file that MATLAB wrote
 # An attribute of MATLAB's objects, of which a file holds numbers and references alone.
 OBJECT = "MATLAB_object_decode"
@@ -72,7 +57,6 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     try:
         with h5py.File(path) as file:
             home, episodes = _episodes(path, file, is_matlab=is_matlab)
-            about = _arguments(path, file.get(EPISODES, file).attrs)
     except LogError:
         raise
     except DAMAGE as error:
@@ -80,7 +64,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     return LogReader(
         "MATLAB 7.3" if is_matlab else "HDF5",
         episodes,
-        lambda episode: _read(path, options, home, episode, about, is_matlab=is_matlab),
+        lambda episode: _read(path, options, home, episode, is_matlab=is_matlab),
         lambda: _listing(path, home, episodes),
     )
 
@@ -103,9 +87,7 @@ def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str
     return "", tuple(episodes_of(_values(path, file, datasets)))
 
 
-def _read(
-    path: Path, options: ReadOptions, home: str, episode: str, about: str, *, is_matlab: bool
-) -> Log:
+def _read(path: Path, options: ReadOptions, home: str, episode: str, *, is_matlab: bool) -> Log:
     try:
         with h5py.File(path) as file:
             group = _own(path, file[f"{home}/{episode}"], file) if home else file
@@ -123,13 +105,12 @@ def _read(
         log = log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
         return replace(log, not_read=(*log.not_read, *objects))
     arrays = arrays if home else part_of(arrays, episode)
-    rate = _rate(about)
     return log_of(
         path,
         {name: each for name, each in arrays.items() if each.dtype.kind in "iuf"},
         options,
         episode=episode,
-        stated=(ARGUMENTS, rate) if rate else stated_rate({**attributes, **arrays}),
+        stated=stated_rate({**attributes, **arrays}),
         not_read=left_out,
     )
 
@@ -143,24 +124,6 @@ def _single(attributes: Any) -> dict[str, Any]:
         for name, each in about.items()
         if each.dtype.kind in "iuf" and each.shape is not None and prod(each.shape) == 1
     }
-
-
-def _arguments(path: Path, attributes: Any) -> str:
-    """The environment's arguments of robomimic and Isaac Lab, unless they are larger than any."""
-    if ARGUMENTS not in attributes:
-        return ""
-    about = attributes.get_id(ARGUMENTS)
-    text = h5py.check_string_dtype(about.dtype) is not None and about.shape == ()
-    if not text or about.get_storage_size() > SMALL:
-        return ""
-    command = [sys.executable, "-P", "-c", PRINT_TEXT, str(path), EPISODES, ARGUMENTS]
-    try:
-        done = subprocess.run(command, capture_output=True, timeout=TIMEOUT)
-    except subprocess.TimeoutExpired as error:
-        raise LogError(path, f"damaged: {ARGUMENTS} is not found in {TIMEOUT:g} s") from error
-    if done.returncode:
-        raise LogError(path, f"damaged: {ARGUMENTS} cannot be read")
-    return done.stdout.decode("utf-8", "surrogateescape")
 
 
 def _own(path: Path, each: Any, file: Any) -> Any:
@@ -222,20 +185,6 @@ def _datasets(group: Any, mapped: Collection[str]) -> dict[str, Any]:
                 seen.add(address)
                 waiting.append((f"{path}/", inside))
     return dict(sorted(found.values(), key=lambda each: each[0]))
-
-
-def _rate(env_args: str) -> float | None:
-    """Control rate in [Hz] from the environment's arguments of robomimic or Isaac Lab."""
-    try:
-        args = from_json(env_args)
-        if frequency := args.get("env_kwargs", {}).get("control_freq"):
-            rate = float(frequency)
-        else:
-            sim = args.get("sim_args", {})
-            rate = 1 / (float(sim["dt"]) * float(sim["decimation"]))
-    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError):
-        return None
-    return rate if 0 < rate < inf else None
 
 
 def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...]:

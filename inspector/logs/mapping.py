@@ -25,7 +25,6 @@ from inspector.logs.names import (
     factor_of,
     listed,
     number_of,
-    pattern_for,
     without_unit,
 )
 from inspector.logs.plausibility import WrongRobotError, known_limits
@@ -51,7 +50,8 @@ WIDTHS: Mapping[str, int] = {"base_pose": 7, "base_velocity": 6}
 
 NO_MOTION = (
     "no position or velocity of a joint; name columns JOINT.velocity or JOINT.position, or map"
-    " them with --map velocity.JOINT=COLUMN or --map velocity=ARRAY"
+    " them with --map velocity.JOINT=COLUMN, --map velocity=ARRAY, or all of one form: --map"
+    " 'position.{joint}=enc_{joint}'"
 )
 
 
@@ -362,10 +362,8 @@ def _without_units(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[
 
 def no_motion(path: Path, names: Sequence[str]) -> LogError:
     """Error of a log of which no column is known: what to type, and the columns that it has."""
-    example = pattern_for(names)
-    how = f"no position or velocity of a joint; map columns, such as {example}"
     columns = listed([name for name in names if name])
-    return LogError(path, f"{how if example else NO_MOTION}; columns are {columns}")
+    return LogError(path, f"{NO_MOTION}; columns are {columns}")
 
 
 def _is_column(field: Field) -> bool:

@@ -258,8 +258,8 @@ STRETCHES = 50  # of a log, whose ways are compared
 TURNING = ("revolute", "continuous")
 
 HINT = (
-    "if it is in degrees, say --units degrees; if the joint is prismatic or continuous, name the robot"
-    " (--robot)"
+    "if it is in degrees, say --units degrees; if the joint is prismatic or continuous, name the"
+    " robot (--robot)"
 )
 
 

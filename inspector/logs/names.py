@@ -139,13 +139,6 @@ SIDED = re.compile(
     re.IGNORECASE,
 )
 
-# Names that an example of what to type leaves out.
-UNLIKELY = re.compile(
-    rf"(?:.*{GAP})?(?:errors?|err|torques?|tau|effort|currents?|cur|amps?|volt(?:age|s)?|temp\w*"
-    rf"|force|acc\w*|imu|gyro\w*|tcp|pose|end|fsm|state|status|mode|flags?|is|contact|id|index|seq"
-    rf"|u|{DESIRED})(?:{GAP}.*|[\[(]?\d*[\])]?)|[xyz]|q[wxyz]|time.*|.*time|t",
-    re.IGNORECASE,
-)
 LONGEST = 300  # characters of a name from which on it names no signal: patterns take their square
 
 SIDES = ("before", "within", "after", "last")  # parts of a name that tell whether it is desired
@@ -338,24 +331,6 @@ def listed(names: Sequence[str]) -> str:
     """The first ten of some names, long ones cut off, and how many more there are."""
     shown = ", ".join(name if len(name) <= 80 else f"{name[:77]}..." for name in names[:10])
     return shown + (f" and {len(names) - 10} more" if len(names) > 10 else "")
-
-
-def pattern_for(names: Sequence[str]) -> str:
-    """An option that maps names which differ by a number or a word; empty if there are none."""
-    groups: dict[str, list[str]] = {}
-    for name in names:
-        if len(name) <= LONGEST and not UNLIKELY.fullmatch(without_unit(name)[0]):
-            numbers = [*re.finditer(r"\d+", name)]
-            for each in numbers[-1:]:
-                template = f"{name[: each.start()]}{{joint}}{name[each.end() :]}"
-                groups.setdefault(template, []).append(each.group())
-    if not groups:
-        return ""
-    best = max(groups, key=lambda template: len(groups[template]))
-    if len(groups[best]) < 2 or best.startswith("{joint}"):
-        return ""
-    quantity = "velocity" if re.search(r"vel|speed|omega", best, re.IGNORECASE) else "position"
-    return f"--map '{quantity}.joint_{{joint}}={best}'"
 
 
 def _match(name: str) -> re.Match[str] | None:
