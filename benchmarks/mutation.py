@@ -57,7 +57,7 @@ MEMORY = 12 << 30  # address space of a child, in [byte]
 # in a process that was forked.
 LEFT_OUT = (
     *("scenarios", "domains", "humanoid", "quadruped", "wheel"),
-    *("*viewer", "*screenshot", "*picture", "*notebook"),
+    *("*viewer", "*screenshot", "*picture"),
 )
 # Tests that hang or fail without a change in a process that was forked: they have threads.
 ALONE = (

@@ -1,4 +1,4 @@
-"""Commands, recordings and reports for people; `analyse`, `read_log`, `show` for programs."""
+"""Commands, recordings and reports for people; `analyse` and `read_log` for programs."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from inspector.live import LiveSession
     from inspector.logs.motion import Imported
     from inspector.logs.read import read_log, read_logs
-    from inspector.recording.viewer import show
     from inspector.reference.store import Reference
 
 __all__ = [
@@ -23,7 +22,6 @@ __all__ = [
     "load_library",
     "read_log",
     "read_logs",
-    "show",
 ]
 
 _MODULES = {
@@ -37,7 +35,6 @@ _MODULES = {
     "load_library": "inspector.library",
     "read_log": "inspector.logs.read",
     "read_logs": "inspector.logs.read",
-    "show": "inspector.recording.viewer",
 }
 
 

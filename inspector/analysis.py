@@ -1,6 +1,6 @@
 """The analysis of a run: labels, findings, audit, status, and how loud it is.
 
-`classify`, `view`, `report`, comparisons of two runs, `export`, `inspector.show` and the summary of
+`classify`, `view`, `report`, comparisons of two runs, `export` and the summary of
 `live` print what an `Analysis` says; none of them decides again.
 """
 
@@ -41,7 +41,6 @@ from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
-    from inspector.levels import Spectrogram
     from inspector.localisation.order import Order
     from inspector.localisation.stage import Localisation
     from noisemodel.noise import LinkNoise
@@ -270,7 +269,6 @@ def analyse_file(
     *,
     links: bool = True,
     kind: str = "normal",
-    terms: bool = False,
     unknown: Unknown = Unknown.FINDING,
 ) -> Analysis:
     """Analyse a file for people: with its hash, its links, and what was assumed of a log.
@@ -278,16 +276,15 @@ def analyse_file(
     Args:
         links: Whether to compute the noise link by link, if the run names a robot that is known.
         kind: Kind of the extended noise, see ``noisemodel.noise``.
-        terms: Whether to compute the paper's terms A, B and C one by one.
     """
     opened = path if isinstance(path, Opened) else open_run(path)
     name, digest = opened.source.shown.stem, opened.sha256
     found = analyse(opened.run, library, name=name, sha256=digest, unknown=unknown)
     found = replace(found, assumed=opened.assumed)
-    return with_links(found, kind if links else "", terms=terms)
+    return with_links(found, kind if links else "")
 
 
-def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysis:
+def with_links(analysis: Analysis, kind: str) -> Analysis:
     """Add the noise link by link, if the run names a robot that is known and holds positions."""
     from noisemodel.noise import link_noise
 
@@ -296,7 +293,7 @@ def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysi
     if not kind or not robot_known(run) or run.position is None:
         return found
     try:
-        return replace(found, links=link_noise(run, kind, terms=terms))
+        return replace(found, links=link_noise(run, kind))
     except nm.GeometryError as error:
         raise InspectorError(f"{error}; `--robot none` shows the run without the robot") from error
 
@@ -434,27 +431,6 @@ def worst_joint(analysis: Analysis) -> int | None:
     _, level = analysis.joint_levels
     power = np.nansum(10.0 ** (level / 10.0), axis=0)
     return int(np.argmax(power))
-
-
-def orders(analysis: Analysis) -> "tuple[str, Spectrogram] | None":
-    """A joint and the order spectrogram of the noise over its angle; None without motion.
-
-    The joint is the first finding's with an order, or else the one that vibrates most while it
-    moves; see `inspector.localisation.order`.
-    """
-    from inspector.localisation.order import SLOWEST, order_spectrogram
-
-    run = analysis.run
-    if analysis.audit is None or not run.joint_names:
-        return None
-    known = [run.joint_names.index(each.joint) for each in analysis.orders.values()]
-    _, level = analysis.joint_levels
-    fastest = [np.abs(run.velocity[rows]).max(axis=0) for rows in pieces(run.velocity)]
-    moving = np.max(fastest, axis=0) > SLOWEST
-    power = np.nansum(10.0 ** (level / 10.0), axis=0)
-    joint = known[0] if known else int(np.argmax(np.where(moving, power, -1.0)))
-    found = order_spectrogram(run, analysis.noise, joint)
-    return None if found is None else (run.joint_names[joint], found)
 
 
 def worst_signal(analysis: Analysis, joint: int | None) -> Array:

@@ -55,10 +55,6 @@ class Scale:
         high = max(10.0 * np.ceil(loudest / 10.0), self.high - 30.0)
         return replace(self, low=float(high) - SPAN_DB, high=float(high))
 
-    def down_to(self, low: float | None) -> "Scale":
-        """The scale from a chosen level on, in [dB]; as it is if None."""
-        return self if low is None else replace(self, low=low, high=max(self.high, low + self.step))
-
     @property
     def ticks(self) -> tuple[float, ...]:
         """Levels to be labelled, in [dB], from low to high."""
@@ -69,7 +65,7 @@ class Scale:
 JOINTS = Scale(-60.0, 0.0, "dB re 1 rad/s")
 # Sound power of a link's vibration above 10 Hz. A link of 0.1 m² is at 136 dB at 1 m/s.
 LINKS = Scale(60.0, 120.0, "dB re 1 pW")
-# Amplitude of a joint's velocity in a spectrogram; its low end can be chosen.
+# Amplitude of a joint's velocity in a spectrogram.
 SPECTRUM = Scale(-60.0, 0.0, "dB re 1 rad/s")
 
 

@@ -315,7 +315,6 @@ class LinkNoise:
     time: Array  # centres of the bins, shape (bins,), in [s]
     power: Array  # mean in each bin, shape (bins, links), in [W]
     vibration: Array  # of the measured motion above 10 Hz alone, normal to the surface, as power
-    terms: dict[str, Array]  # total by the paper's term, shape (bins,), in [W]; if requested
     remarks: tuple[str, ...]  # what is missing or assumed, a sentence each
 
     @property
@@ -329,12 +328,10 @@ class LinkNoise:
         return [int(i) for i in np.argsort(-self.vibration.max(axis=0), kind="stable")]
 
 
-def link_noise(
-    run: Run, kind: str = "normal", *, geometry: str = "auto", terms: bool = False
-) -> LinkNoise:
+def link_noise(run: Run, kind: str = "normal", *, geometry: str = "auto") -> LinkNoise:
     """The extended noise of a run of a known robot, with positions, in bins.
 
-    ``kind`` is one of ``KINDS``, ``geometry`` as in `Surface.of`. ``terms`` adds the paper's terms.
+    ``kind`` is one of ``KINDS``, ``geometry`` as in `Surface.of`.
     """
     assert run.robot is not None
     floating = True if run.base_pose is not None else None
@@ -371,10 +368,6 @@ def link_noise(
         time=run.time[bins[:-1]] + np.diff(bins) / 2 / run.rate,
         power=np.sum(power, axis=0),
         vibration=vibration,
-        terms={
-            term: by_samples(robot, surface, run, term, bins).sum(axis=1)
-            for term in ("ABC" if terms else "")
-        },
         remarks=tuple(_remarks(run, robot, surface)),
     )
 

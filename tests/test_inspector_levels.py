@@ -28,7 +28,6 @@ def links(vibration, width=0.01):
         time=width * (np.arange(count) + 0.5),
         power=vibration,
         vibration=vibration,
-        terms={},
         remarks=(),
     )
 

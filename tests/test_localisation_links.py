@@ -21,7 +21,7 @@ def noise(**excess):
     for link, (start, stop, power) in excess.items():
         vibration[(time > start) & (time < stop), LINKS.index(link)] += power
     movers = tuple(map(frozenset, MOVERS))
-    return LinkNoise("normal", LINKS, movers, time, vibration, vibration, {}, ())
+    return LinkNoise("normal", LINKS, movers, time, vibration, vibration, ())
 
 
 def blow(*joints, onset=1.0):

@@ -151,7 +151,6 @@ def test_runs_that_cannot_be_read_are_named_and_the_others_are_shown(tmp_path):
     ("runs", "options", "text"),
     [
         (3, ["--align", "auto"], "--align takes two runs or more, --align auto two"),
-        (3, ["--terms"], "--terms takes one run"),
         (1, ["--align", "start"], "--align takes two runs or more, --align auto two"),
     ],
 )

@@ -93,7 +93,7 @@ def whole(tmp_path_factory):
     rr.set_strict_mode(True)
     folder = tmp_path_factory.mktemp("whole")
     run = panda_run()
-    found = inspected(run, folder, some_labels(), kind="paper", terms=True)
+    found = inspected(run, folder, some_labels(), kind="paper")
     write(found, folder / "out.rrd", sound=SOUND)
     return folder / "out.rrd", run
 
@@ -109,13 +109,13 @@ COLUMNS = {
     r"/level/noise": LINE,
     r"/probability/(failure|alarm)": LINE,
     r"/span": LINE,
-    r"/power/(total|terms/[ABC])": LINE,
+    r"/power/total": LINE,
     r"/joints/(velocity|velocity_desired|position)/0": LINE,
     r"/detail/0/(noise|velocity)": LINE,
-    r"/(spectrogram|orders)/bands/\d\d": ROW,
-    r"/axis/(class|noise|level|probability|spectrogram|orders|joints|links)/(left|right)": LABELS,
+    r"/spectrogram/bands/\d\d": ROW,
+    r"/axis/(class|noise|level|probability|spectrogram|joints|links)/(left|right)": LABELS,
     r"/axis/key/right": LABELS,
-    r"/axis/(spectrogram|orders|joints|links|key)/right/scale": STRIP,
+    r"/axis/(spectrogram|joints|links|key)/right/scale": STRIP,
     r"/verdict/band": STRIP,
     r"/verdict/words": LABELS,
     r"/sound": {"AssetAudio:blob", "AssetAudio:media_type"},
@@ -200,7 +200,7 @@ def test_all_plots_over_time_reach_from_the_start_of_the_run_to_its_end(whole):
     assert np.isnan(values).all()
     known = over_time(path)
     assert {"/class", "/noise", "/level", "/probability", "/spectrogram"} <= set(known)
-    assert {"/orders", "/strips/joints", "/strips/links", "/score", "/power"} <= set(known)
+    assert {"/strips/joints", "/strips/links", "/score", "/power"} <= set(known)
     assert all("/span" in v["ViewContents:query"] for v in known.values())
 
 
@@ -359,21 +359,6 @@ def test_the_verdict_is_said_first_in_its_colour(whole, tmp_path):
         assert read(path, "/verdict/words", "Points2D:labels")[1] == [[told]]
         _, ((band,),) = read(path, "/verdict/band", "LineStrips2D:colors")
         assert band.to_bytes(4, "big")[:3] == bytes(colors.VERDICTS[shade])
-
-
-def test_a_lower_floor_is_never_darker(tmp_path):
-    bright = []
-    for floor in (-40.0, None, -100.0):
-        write(
-            inspected(panda_run(robot=None), tmp_path), tmp_path / "o", floor=floor, overwrite=True
-        )
-        bright.append(
-            sum(brightest(tmp_path / "o", f"/spectrogram/bands/{r:02d}") for r in (20, 30, 40))
-        )
-        _, (labels,) = read(tmp_path / "o", "/axis/spectrogram/right", "Points2D:labels")
-        if floor is not None:
-            assert labels[0] == f"{floor:.0f}".replace("-", "\u2212")
-    assert bright == sorted(bright)
 
 
 def test_gaps_are_hatched_and_named_in_every_panel(tmp_path):
@@ -558,13 +543,11 @@ def test_a_long_run_has_no_more_points_than_a_short_one(tmp_path):
     assert max(values)[0] == pytest.approx(np.abs(velocity).max())
 
 
-def test_the_same_input_makes_the_same_recording_id_and_shows_terms_on_demand(whole, tmp_path):
+def test_the_same_input_makes_the_same_recording_id(whole, tmp_path):
     path, run = whole
     write(inspected(run, tmp_path), tmp_path / "again.rrd")
     ids = {RrdReader(each).recordings()[0].recording_id for each in (path, tmp_path / "again.rrd")}
     assert len(ids) == 1
-    assert "/power/total" in entities(tmp_path / "again.rrd")
-    assert "/power/terms/A" not in entities(tmp_path / "again.rrd")
 
 
 def test_a_joint_that_the_robot_lacks_is_named(tmp_path):

@@ -46,8 +46,6 @@ Shown = Annotated[
 Target = Annotated[
     Path | None, option("Write a recording .rrd, a picture .png or a .html.", "--output", "-o")
 ]
-Floor = Annotated[float | None, option("Darkest level of spectrograms, in dB re 1 rad/s.", max=0.0)]
-Terms = Annotated[bool, option("Show the terms A, B and C of the paper separately.", "--terms")]
 At = Annotated[float | None, option("Time of a picture, in s; else the worst finding.")]
 Web = Annotated[bool, option("Serve it to a browser on this machine until Ctrl-C.", "--web")]
 Port = Annotated[int, option("Port of --web; 0 takes a free one.", min=0, max=65535)]
@@ -67,8 +65,6 @@ class Request:
     reading: Reading
     library: Library
     kind: str  # of the noise of the links
-    floor: float | None
-    terms: bool
     at: float | None  # time of a picture, in [s]; None where that is the worst finding's
     align: str | None
     reference: Path | None
@@ -81,8 +77,6 @@ def view(
     output: Target = None,
     model: shared.ModelFiles = None,
     kind: shared.Kind = "normal",
-    floor: Floor = None,
-    terms: Terms = False,
     at: At = None,
     web: Web = False,
     port: Port = 0,
@@ -107,7 +101,7 @@ def view(
     target = output or viewer.scratch_path(paths[0].with_name(f"{together}.npz"))
     library = load_library(model)
     overwrite = overwrite or output is None
-    request = Request(ctx.obj, library, kind, floor, terms, at, align, reference, overwrite)
+    request = Request(ctx.obj, library, kind, at, align, reference, overwrite)
     _check(paths, target, request)
     refuse_existing(target, overwrite=overwrite)
     if target.suffix.lower() in (".png", ".html"):
@@ -129,8 +123,6 @@ def _check(paths: list[Path], target: Path, asked: Request) -> None:
         raise typer.BadParameter(f"{target}: name a .rrd, .png or .html file", param_hint="'-o'")
     of_one = {
         "--reference": asked.reference is not None,
-        "--terms": asked.terms,
-        "--floor": asked.floor is not None,
         suffix: suffix in (".png", ".html"),
     }
     for name, given in of_one.items():
@@ -161,7 +153,7 @@ def _picture(run: Path, output: Path, request: Request) -> None:
             found, _, beside = _analysed(source, request)
             recording = Path(folder) / "run.rrd"
             seconds = sonification.worst_time(found) if at is None else at
-            write(found, recording, floor=request.floor, beside=beside)
+            write(found, recording, beside=beside)
         complaints = viewer.shoot(recording, output, seconds, overwrite=request.overwrite)
     typer.echo(f"{output}: {run} at {seconds:.2f} s")
     for complaint in complaints:
@@ -180,7 +172,6 @@ def _page(run: Path, output: Path, request: Request) -> None:
         verdict=verdict,
         beside=beside,
         overwrite=request.overwrite,
-        floor=request.floor,
     )
     typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
 
@@ -203,7 +194,7 @@ def _read(paths: list[Path], reading: Reading) -> list[Opened]:
 def _analysed(run: Opened, request: Request) -> tuple[Analysis, Verdict | None, Comparison | None]:
     """A run with what was found in it, beside its reference if there is one."""
     path = run.source.shown
-    found = analyse_file(run, request.library, kind=request.kind, terms=request.terms)
+    found = analyse_file(run, request.library, kind=request.kind)
     if request.reference is None:
         return found, None, None
     references = References.found([path], request.reference, request.reading)
@@ -218,8 +209,8 @@ def _one(runs: list[Opened], target: Path, request: Request) -> float:
 
     (run,) = runs
     found, verdict, beside = _analysed(run, request)
-    floor, overwrite, sound = request.floor, request.overwrite, sonification.of_recording(found)
-    write(found, target, overwrite=overwrite, sound=sound, floor=floor, beside=beside)
+    sound = sonification.of_recording(found)
+    write(found, target, overwrite=request.overwrite, sound=sound, beside=beside)
     typer.echo(f"{run.source.shown}: {found.headline}")
     if verdict is None:
         lines = [findings.sentence(found, event) for event in found.findings]

@@ -23,9 +23,6 @@ line of fixed frequency. While the speed hardly varies both explain the same, an
 The resolution of an order is the inverse of the number of periods, of which `PERIODS` are needed.
 Neither share depends on the scale of the vibration or the direction of time. The limits were chosen
 on simulated findings.
-
-For pictures, `order_spectrogram` resamples each window to equal steps of the joint's angle: what
-goes with the joint's speed stays at one height.
 """
 
 import math
@@ -36,11 +33,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inspector.levels import Spectrogram, amplitudes, in_bands
 from noiseclassifier import Event
 from noisemodel import Block, Run
-from noisemodel.noise import in_both, vibrating
-from noisemodel.runfile import pieces
+from noisemodel.noise import in_both
 from noisemodel.types import Array, Real
 
 LOWEST = 10.0  # lowest frequency, in [Hz]; what is slower is motion
@@ -281,56 +276,3 @@ def _peak(orders: Real, lines: Array) -> float:
     before, top, after = lines[best - 1 : best + 2].tolist()
     offset = (before - after) / (before - 2.0 * top + after) / 2.0
     return float(orders[best] + offset * (orders[1] - orders[0]))
-
-
-# Length of a window of a spectrogram, in [s]: at 1 rad/s it resolves 8 periods per turn.
-WINDOW = 0.8
-SHOWN = (10.0, 3000.0)  # orders that are shown, in periods per turn
-LINES = 96  # orders that are shown, in equal ratios
-COLUMNS = 200  # most windows of a spectrogram
-
-
-def order_spectrogram(run: Run, noise: Array, joint: int) -> Spectrogram | None:
-    """Compute the order spectrogram of a noise over the angle of one joint.
-
-    Args:
-        noise: Shape (samples,), in [rad/s].
-        joint: Column of the joint.
-
-    Returns:
-        Amplitudes whose frequencies are orders, in periods per turn: at most 200 columns; 0 and not
-        valid in windows in which the joint is at rest or turns back. None if there are no others.
-    """
-    size = round(WINDOW * run.rate)
-    if len(run.time) < size or size < 16:
-        return None
-    speed = np.concatenate(
-        [run.velocity[rows][:, joint].astype(np.float64) for rows in pieces(run.velocity)]
-    )
-    speed = speed - vibrating(speed[:, None], run.mask, run.rate)[:, 0]
-    hop = max(1, size // 8, -(-(len(speed) - size) // (COLUMNS - 1)))
-    firsts = np.arange(0, len(speed) - size + 1, hop)
-    edges = np.geomspace(*SHOWN, LINES + 1)
-    amplitude = np.zeros((LINES, len(firsts)))
-    moves = np.zeros(len(firsts), dtype=bool)
-    for column, first in enumerate(firsts.tolist()):
-        part = slice(first, first + size)
-        own = speed[part] * np.sign(speed[part].sum())
-        if run.mask[part].all() and own.min() > SLOWEST:
-            moves[column] = True
-            amplitude[:, column] = _over_angle(noise[part], own / run.rate, edges)
-    if not moves.any():
-        return None
-    middles = np.asarray(float(run.time[0]) + (firsts + size / 2) / run.rate, dtype=np.float64)
-    shown = np.asarray(np.sqrt(edges[:-1] * edges[1:]))
-    return Spectrogram(middles, shown, amplitude, moves)
-
-
-def _over_angle(wave: Array, steps: Array, edges: Array) -> Array:
-    """Largest amplitudes between some orders, by how far the joint turns in each sample."""
-    angle = np.concatenate(([0.0], np.cumsum(steps[:-1])))
-    even = np.interp(np.linspace(0.0, angle[-1], len(wave), endpoint=False), angle, wave)
-    found = amplitudes(even[None])[0]
-    own = np.arange(1, len(found) + 1) * 2.0 * np.pi / angle[-1]
-    inside = (edges[1:] > own[0]) & (edges[:-1] < own[-1])
-    return np.asarray(in_bands(own, found[:, None], edges)[:, 0] * inside)

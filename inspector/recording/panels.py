@@ -4,7 +4,7 @@ One run, two, many and a stream draw the same panels; each only chooses which.
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from typing import TypeAlias
@@ -499,11 +499,8 @@ def log_links(
 ) -> Timed:
     """Log the noise of a robot's links: levels of those that vibrate most, power, colours."""
     time, level = levels.link_levels(noise)
-    powers = {"total": noise.total, **{f"terms/{name}": own for name, own in noise.terms.items()}}
-    shades = [colors.NOISE, *colors.of_series(len(noise.terms))]
-    for (path, power), shade in zip(powers.items(), shades, strict=True):
-        shown = np.maximum(decibel(power / REFERENCE_POWER), POWER_FLOOR_DB)
-        axes.log_line(recording, f"/power/{path}", noise.time, shown, shade)
+    power = np.maximum(decibel(noise.total / REFERENCE_POWER), POWER_FLOOR_DB)
+    axes.log_line(recording, "/power/total", noise.time, power, colors.NOISE)
     scale = levels.LINKS.following(level)
     log_robot_levels(recording, tree, noise, scale)
     axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
@@ -586,35 +583,31 @@ def log_heat(
     *,
     path: str = "",
     below: str = "/bands",
-    orders: bool = False,
 ) -> Timed:
     """Log a spectrogram, as `in_levels` has it, with its axis and its scale."""
     time, edges, level = spectrum
     half = np.diff(time).min(initial=WINDOW) / 2
-    unit = "periods per turn" if orders else "Hz"
     return axes.log_levels(
         recording,
         panel,
         np.append(time - half, time[-1] + half),
         level[::-1],
         scale,
-        band_axis(panel, edges, axis, "{:g}".format if orders else axes.hertz),
+        band_axis(panel, edges, axis),
         title=title,
-        names=[f"{centre:.0f} {unit}" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1].tolist()],
+        names=[f"{centre:.0f} Hz" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1].tolist()],
         width=LINE_WIDTH,
         path=path,
         below=below,
     )
 
 
-def band_axis(
-    panel: Panel, edges: Array, title: str, written: Callable[[float], str] = axes.hertz
-) -> list[Label]:
+def band_axis(panel: Panel, edges: Array, title: str) -> list[Label]:
     """Title and ticks at the left of a panel of bands, whose axis is logarithmic."""
     low, high = float(edges[0]), float(edges[-1])
     span = np.log(max(high / low, 1.01))
     marks = [
-        Label(float(np.log(tick / low) / span), written(tick), 40.0)
+        Label(float(np.log(tick / low) / span), axes.hertz(tick), 40.0)
         for tick in axes.ticks(low, max(high, 1.01 * low), panel)
     ]
     return [Label(0.5, title, -22.0), *marks]

@@ -12,7 +12,7 @@ import rerun as rr
 from rerun.urdf import UrdfTree
 
 from inspector import levels
-from inspector.analysis import LOUDEST, Analysis, orders, worst, worst_joint, worst_signal
+from inspector.analysis import LOUDEST, Analysis, worst, worst_joint, worst_signal
 from inspector.levels import spectrogram
 from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.unstable import Part
@@ -86,7 +86,6 @@ def write(
     *,
     overwrite: bool = False,
     sound: bytes = b"",
-    floor: float | None = None,
     beside: Comparison | None = None,
 ) -> None:
     """Write the recording of an inspected run, whole or not at all.
@@ -96,7 +95,6 @@ def write(
     Args:
         sound: The run made audible, a WAV file that starts with the run; none if empty.
         beside: The run beside its reference; None without one.
-        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
     run, moments = analysis.run, worst(analysis)
     beside = None if beside is None or beside.empty else beside
@@ -113,7 +111,7 @@ def write(
         over_time = [
             *panels.log_classes(recording, analysis),
             *panels.log_curves(recording, analysis, beside),
-            (_log_spectra(recording, analysis, floor, sound), panels.HEIGHT + TITLES),
+            (_log_spectra(recording, analysis, sound), panels.HEIGHT + TITLES),
             _log_strips(recording, analysis, tree, beside),
         ]
         _log_text(recording, analysis)
@@ -141,31 +139,20 @@ def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tup
     return parts
 
 
-def _log_spectra(
-    recording: rr.RecordingStream, analysis: Analysis, floor: float | None, sound: bytes
-) -> Part:
+def _log_spectra(recording: rr.RecordingStream, analysis: Analysis, sound: bytes) -> Part:
     """Log the spectrograms of the worst joint and the sound; they, and sound powers."""
     run, links, joint = analysis.run, analysis.links, worst_joint(analysis)
     fast = worst_signal(analysis, joint)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
-    scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
+    scale = levels.SPECTRUM.following(spectrum.decibel)
     name = "the noise" if joint is None else run.joint_names[joint]
-    shown = {"spectrogram": (spectrum, "velocity\nspectrum", f"Spectrogram of {name}")}
-    if known := orders(analysis):  # what goes with the speed of a joint is level there
-        shown["orders"] = (known[1], "periods\nper turn", f"Orders of {known[0]}")
-    parts: list[Part] = []
-    for kind, (own, axis, title) in shown.items():
-        panel, bands = axes.Panel(kind, panels.HEIGHT), panels.in_levels(own)
-        panels.log_gaps(recording, f"/{kind}", run, (0.0, axes.TOP))
-        turns = kind == "orders"
-        part, _ = panels.log_heat(recording, panel, bands, scale, axis, title, orders=turns)
-        parts.append(part)
+    panel, bands = axes.Panel("spectrogram", panels.HEIGHT), panels.in_levels(spectrum)
+    panels.log_gaps(recording, "/spectrogram", run, (0.0, axes.TOP))
+    axis, title = "velocity\nspectrum", f"Spectrogram of {name}"
+    part, _ = panels.log_heat(recording, panel, bands, scale, axis, title)
+    parts = [part]
     if links is not None:
-        paths = ["/power/total", axes.SPAN]
-        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", paths))
-        if links.terms:
-            paths = ["/power/terms/**", *paths]
-            parts.append(unstable.plot("Terms A, B, C", "/power", paths, legend=True))
+        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", axes.ALL))
     if sound:
         unstable.log_audio(recording, "/sound", sound, float(run.time[0]))
         parts.append(unstable.audio("Listen", "/sound"))

@@ -1,4 +1,4 @@
-"""Rerun's viewer: a recording in a window, a browser, a notebook's cell or a picture."""
+"""Rerun's viewer: a recording in a window, a browser or a picture."""
 
 import hashlib
 import os
@@ -14,14 +14,12 @@ import tempfile
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager, suppress
 from ctypes.util import find_library
 from dataclasses import dataclass
 from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler
-from importlib import import_module
 from importlib.util import find_spec
-from io import StringIO
 from pathlib import Path
 from threading import Thread
 from typing import IO, TYPE_CHECKING, Any, TypeVar
@@ -444,97 +442,3 @@ def _environment(folder: str) -> dict[str, str]:
 
 def _drivers(pattern: str) -> list[Path]:
     return sorted(path for folder in DRIVER_FOLDERS for path in folder.glob(f"{pattern}.json"))
-
-
-# Width and height of a notebook's viewer, in pixels; it is as wide as its cell.
-CELL = ("auto", 760)
-# Begins the viewer's code, which is 23 MB long. If that were the widget's own code, and took more
-# than two seconds to begin, anywidget (0.11) would forget what is sent to the widget: size, data.
-LOADER = """
-export default {
-  async render({ model, el }) {
-    const code = new Blob([model.get("_code")], { type: "text/javascript" });
-    const url = URL.createObjectURL(code);
-    const { default: viewer } = await import(url);
-    URL.revokeObjectURL(url);
-    return viewer.render({ model, el });
-  },
-};
-"""
-
-
-def show(
-    run: nm.Run | str | Path,
-    *,
-    robot: bool = True,
-    kind: str = "normal",
-    size: tuple[int | str, int] = CELL,
-) -> None:
-    """Show a run in rerun's viewer: joints, noise, spectrogram, classes, the moving robot.
-
-    In a notebook the viewer appears below the cell, after some seconds: all of it, 23 MB, is sent
-    by the kernel's machine, unless ``RERUN_NOTEBOOK_ASSET`` is set, which is rerun's. From plain
-    Python a window opens, which stays when the program ends.
-
-    Args:
-        run: A run, or a run file.
-        robot: Whether to draw the robot.
-        kind: Kind of the extended noise.
-        size: Width and height of a notebook's viewer, in pixels; ``"auto"`` is as wide as the cell.
-
-    Raises:
-        ViewerError: If there is neither a notebook nor a display, or the viewer is not installed.
-        InspectorError: If the robot's shape cannot be had.
-        NoiseModelError: If the run cannot be read, or its robot.
-    """
-    from inspector.analysis import analyse_file
-    from inspector.export.sound import of_recording
-    from inspector.library import load_library
-    from inspector.recording.run import write
-
-    inside = in_notebook()
-    if inside and find_spec("rerun_notebook") is None:
-        raise ViewerError(
-            'a notebook takes rerun\'s widget; `pip install "rerun-sdk[notebook]"` brings it'
-        )
-    with tempfile.TemporaryDirectory() as folder:
-        if isinstance(run, nm.Run):
-            path, name = Path(folder) / "run.npz", Path("shown.npz")
-            run.save(path)
-        else:
-            path = name = Path(run)
-        recording = Path(folder) / "run.rrd" if inside else scratch_path(name)
-        found = analyse_file(path, load_library(), links=robot, kind=kind)
-        write(found, recording, overwrite=True, sound=of_recording(found))
-        if inside:
-            _show_in_cell(recording, size)
-            return
-    if not has_display():
-        raise ViewerError(
-            f"there is no display; the recording is in {recording},"
-            f" `inspector view --web` shows a run file in a browser"
-        )
-    problem = open_window(recording)
-    if problem:
-        raise DisplayError(f"{problem}; the recording is in {recording}")
-
-
-def in_notebook() -> bool:
-    """Whether this runs in a kernel that shows widgets, as Jupyter's does."""
-    loaded = sys.modules.get("IPython")
-    return loaded is not None and hasattr(loaded.get_ipython(), "kernel")
-
-
-def _show_in_cell(recording: Path, size: tuple[int | str, int]) -> None:
-    """Show a recording below the cell that runs, by a widget whose data come from this machine."""
-    # Otherwise the widget fetches its code from app.rerun.io.
-    os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "inline")
-    with redirect_stdout(StringIO()):  # it prints that it does so
-        rerun = import_module("rerun_notebook")
-    kind, code = rerun.Viewer, str(rerun.ESM_MOD)
-    if not code.startswith(("http://", "https://")):
-        sent = import_module("traitlets").Unicode(code).tag(sync=True)
-        kind = type("Viewer", (kind,), {"_esm": LOADER, "_code": sent})
-    widget = kind(width=size[0], height=size[1])
-    import_module("IPython.display").display(widget)
-    widget.send_rrd(recording.read_bytes())

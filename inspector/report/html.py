@@ -63,14 +63,12 @@ def page(
     audit: str = "",
     verdict: Verdict | None = None,
     beside: Comparison | None = None,
-    floor: float | None = None,
 ) -> str:
     """Write the page of an inspected run; it says the same as `findings.report`.
 
     Args:
         audit: What the log can show, a line each; may be empty.
         verdict: The verdict beside a reference, and how the run compares with it in `beside`.
-        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
     html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
@@ -87,7 +85,7 @@ def page(
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
         _add_list(body, "Does not count", excused(verdict))
     add_text(body, "h2", "Over time")
-    image = f"data:image/png;base64,{_encoded(picture(analysis, beside, floor=floor))}"
+    image = f"data:image/png;base64,{_encoded(picture(analysis, beside))}"
     described = f"Noise, classes and spectrograms over {analysis.run.duration:.2f} s"
     ET.SubElement(body, "img", src=image, alt=f"{described}; the lists have the findings")
     add_text(body, "h2", "Sound")

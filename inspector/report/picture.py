@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inspector import colors, levels
-from inspector.analysis import SHOWN, Analysis, chosen, gaps, orders, worst_joint, worst_signal
+from inspector.analysis import SHOWN, Analysis, chosen, gaps, worst_joint, worst_signal
 from inspector.errors import InspectorError
 from inspector.levels import Scale, Spectrogram, extremes, spectrogram
 from inspector.reference.judging import Comparison
@@ -40,16 +40,10 @@ def require(what: str = "a picture") -> None:
         raise InspectorError(f'{what} needs matplotlib; `pip install "noise-inspector[report]"`')
 
 
-def picture(
-    analysis: Analysis, beside: Comparison | None = None, *, floor: float | None = None
-) -> bytes:
-    """Draw an inspected run; how it compares with a reference takes the place of the probability.
-
-    Args:
-        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
-    """
+def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
+    """Draw a run; how it compares with a reference takes the place of the probability."""
     run, links = analysis.run, analysis.links
-    names, ordered = classes_of(analysis), orders(analysis)
+    names = classes_of(analysis)
     strips = [_strip(analysis, *analysis.joint_levels, run.joint_names)]
     if links is not None:
         strips.append(_strip(analysis, *levels.link_levels(links), links.links))
@@ -64,7 +58,6 @@ def picture(
         "probability": (0.8 * alarmed, 0.0),
         "over": (ROW * len(over), TITLE),
         "spectrogram": (2.0, 0.0),
-        "orders": (1.5 if ordered else 0.0, 0.0),
         "joints": (ROW * len(strips[0][2]), TITLE),
         "links": (ROW * len(strips[1][2]) if links is not None else 0.0, TITLE),
     }
@@ -80,12 +73,9 @@ def picture(
     worst = worst_joint(analysis)
     fast = worst_signal(analysis, worst)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
-    scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
+    scale = levels.SPECTRUM.following(spectrum.decibel)
     title = f"{'noise' if worst is None else _short(run.joint_names[worst])}\n[Hz]"
     _spectrum(axes["spectrogram"], spectrum, scale, title)
-    if ordered is not None:
-        joint, spectrum = ordered
-        _spectrum(axes["orders"], spectrum, scale, f"periods per turn\nof {_short(joint)}")
     if "joints" in axes:
         _strips(axes["joints"], strips[0], levels.JOINTS.following(strips[0][1]), "joints")
     if "links" in axes:
