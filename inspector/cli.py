@@ -76,7 +76,7 @@ EXAMPLES = {
     "import": "import log.csv -o run.npz",
     "export": "export run.npz -o run.mcap",
     "train": "train data/ --part training --rate 1000 -o model.npz",
-    "tune": "tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl",
+    "tune": "tune data/ --profile logbands --grid C=1,10 -o t.jsonl",
     "evaluate": "evaluate model.npz data/ --part test",
     "simulate": "simulate run talos --scenario 7",
     "help": "help logs",
@@ -163,8 +163,8 @@ class _Command(TyperCommand):
 
 
 def _converted(function: Callable[..., Any], name: str, **settings: Any) -> Any:
-    """A function as a command of click's."""
-    single = typer.Typer(add_completion=False)
+    """A function as a command of click's; its help is plain, since rich is slow to import."""
+    single = typer.Typer(add_completion=False, rich_markup_mode=None)
     single.command(name, **settings)(function)
     return typer.main.get_command(single)
 
@@ -237,6 +237,7 @@ app = typer.Typer(
     cls=_Group,
     invoke_without_command=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 

@@ -21,21 +21,17 @@ from pathlib import Path
 
 import numpy as np
 
-from inspector.analysis import analyse
-from inspector.audit.signals import without_placeholder
-from inspector.errors import Status, without_path
-from inspector.library import Library
+from inspector.errors import without_path
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.text import cell, counted, progress
 from inspector.verdict import EXPECTED
-from noiseclassifier.matching import duration, spans_of
 from noisemodel import Run
 from noisemodel.run import stretches
 from noisemodel.types import Array, Real
 
-FORMAT = "noise-smoothness/1"
-FAST, TRACKED = 10.0, 4.0  # lowest frequencies of the level and of the tracking error, in [Hz]
+FORMAT = "noise-smoothness/2"
+FAST = 10.0  # lowest frequency of the level, in [Hz]
 STANDING = 0.01  # highest speed of an episode without motion: half a degree a second, in [rad/s]
 # Of SPARC: highest frequency in [Hz], least amplitude, powers of two of zero padding (2015).
 CUTOFF, THRESHOLD, PADDING = 10.0, 0.05, 4
@@ -149,13 +145,11 @@ _SCORES = (
     Score("ldlj", "LDLJ", "", "log dimensionless jerk", 1),
     Score("action_rate", "action rate", "rad²", "mean square difference of successive actions"),
     Score("action_curvature", "2nd diff.", "rad²", "mean square second difference of actions"),
-    Score("flagged", "flagged", "", "share of time with a finding of the classifier"),
-    Score("tracking", f"error >{TRACKED:g} Hz", "rad", f"tracking error above {TRACKED:g} Hz"),
 )
 # All scores by name, in the order of the columns.
 SCORES: Mapping[str, Score] = {score.name: score for score in _SCORES}
-# Scores by how well they separate chattering from clean rollouts (docs/smoothness.md).
-ORDERS = ("action_curvature", "level", "ldlj", "tracking", "action_rate", "sparc")
+# Scores by how well they separate chattering from clean rollouts (docs/metrics.md).
+ORDERS = ("action_curvature", "level", "ldlj", "action_rate", "sparc")
 
 
 @dataclass(frozen=True)
@@ -168,8 +162,6 @@ class Episode:
     rate: float  # of what was scored, in [Hz]
     scores: Mapping[str, float | None]  # in the order of ``SCORES``
     reasons: Mapping[str, str] = field(default_factory=dict)  # why a score is missing
-    # What the scores of actions and of tracking are of, positions or velocities.
-    quantities: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()  # what was decided, a sentence each
 
     @property
@@ -178,115 +170,65 @@ class Episode:
         return f"{self.log} episode {self.episode}" if self.episode else self.log
 
 
-def scored(run: Run, log: str, *, episode: str = "", library: Library | None = None) -> Episode:
+def scored(run: Run, log: str, *, episode: str = "") -> Episode:
     """Scores of a run; one that it does not define is None, with the reason.
 
     The longest stretch without a gap is scored, of a log with held values at the rate of its
     values. Velocities that were differentiated and smoothed during the import are replaced by first
     differences of the positions: the smoothing would take the chatter away.
-
-    Args:
-        library: Models to choose from; None for no labels.
     """
-    flagged = (None, "not classified (--no-labels)") if library is None else _flagged(run, library)
-    run, left_out = without_placeholder(run)
-    remarks = [left_out] if left_out else []
+    remarks = []
     slower = without_hold(run)
     if slower is not run:
         remarks.append(f"Values are held: scored at {slower.rate:g} Hz, their rate.")
-    run = slower
+    run, rate = slower, slower.rate
     part = max(stretches(run.mask, len(run.time)), key=_length, default=slice(0, 1))
     if _length(part) < run.mask.sum():
         remarks.append("The longest stretch without a gap was scored.")
     if "velocity" in run.meta.get("differentiated", {}) and run.position is not None:
-        velocity = np.diff(_angles(run.position[part]), axis=0) * run.rate
+        velocity = np.diff(_angles(run.position[part]), axis=0) * rate
         remarks.append("Velocities are first differences of positions.")
     else:
         velocity = np.asarray(run.velocity[part], dtype=np.float64)
-    rate, seconds = run.rate, _length(part) / run.rate
-    found: dict[str, tuple[float | None, str]] = {"flagged": flagged}
-    found["level"] = level_above(velocity, rate, FAST), _too_little(rate, seconds, FAST)
+    seconds = _length(part) / rate
+    found: dict[str, tuple[float | None, str]] = {}
+    reason = f"{seconds:.3g} s are too short for {FAST:g} Hz"
+    if rate < 2 * BAND * FAST:
+        reason = f"a log of {rate:g} Hz has too little above {FAST:g} Hz"
+    found["level"] = level_above(velocity, rate, FAST), reason
     if len(velocity) and float(speed_of(velocity).max()) >= STANDING:
         reason = "the motion is too short, or has no jerk"
         found["sparc"] = sparc(speed_of(velocity), rate), reason
         found["ldlj"] = log_dimensionless_jerk(velocity, rate), reason
     else:
         found["sparc"] = found["ldlj"] = None, f"no joint is faster than {STANDING:g} rad/s"
-    quantities: dict[str, str] = {}
-    if (commanded := _action(run, part)) is None:
-        found["action_rate"] = found["action_curvature"] = None, "the log has no desired motion"
+    if run.position_desired is None:
+        found["action_rate"] = found["action_curvature"] = None, "the log has no desired positions"
     else:
-        action, quantity = commanded
+        action = _actions(_angles(run.position_desired[part]))
         found["action_rate"] = squared_difference(action), "too few actions"
         found["action_curvature"] = squared_difference(action, order=2), "too few actions"
-        quantities |= {"action_rate": quantity, "action_curvature": quantity}
-    if (tracked := _error(run, part)) is None:
-        found["tracking"] = None, "the log has no desired motion of its joints"
-    else:
-        error, quantities["tracking"] = tracked
-        reason = _too_little(rate, seconds, TRACKED)
-        found["tracking"] = level_above(error, rate, TRACKED), reason
     scores = {name: found[name][0] for name in SCORES}
     missing = {name: found[name][1] for name, score in scores.items() if score is None}
-    return Episode(log, episode, seconds, rate, scores, missing, quantities, tuple(remarks))
+    return Episode(log, episode, seconds, rate, scores, missing, tuple(remarks))
 
 
 def _length(part: slice) -> int:
     return int(part.stop - part.start)
 
 
-def _action(run: Run, part: slice) -> tuple[Array, str] | None:
-    """What was commanded, once for each action, shape (actions, joints), and of what it is."""
-    if run.position_desired is not None:
-        action, quantity = _angles(run.position_desired[part]), "positions"
-    elif run.velocity_desired is not None:
-        action = np.asarray(run.velocity_desired[part], dtype=np.float64)
-        quantity = "velocities"
-    else:
-        return None
-    held = round(hold_length(action))
+def _actions(commanded: Array) -> Array:
+    """What was commanded, once for each action, shape (actions, joints)."""
+    held = round(hold_length(commanded))
     if held < 2:
-        return action, quantity
-    changes = np.flatnonzero((action[1:] != action[:-1]).any(axis=1)) + 1
-    return action[changes[0] % held :: held], quantity
-
-
-def _error(run: Run, part: slice) -> tuple[Array, str] | None:
-    """Tracking error of the joints that have a desired motion, and of what it is."""
-    joints = [name for name in run.joint_names if name in run.desired_joint_names]
-    measured = [run.joint_names.index(name) for name in joints]
-    desired = [run.desired_joint_names.index(name) for name in joints]
-    pairs = {
-        "positions": (run.position, run.position_desired),
-        "velocities": (run.velocity, run.velocity_desired),
-    }
-    for quantity, (actual, wanted) in pairs.items():
-        if actual is not None and wanted is not None and joints:
-            error = np.asarray(actual[part][:, measured] - wanted[part][:, desired], np.float64)
-            return (_angles(error) if quantity == "positions" else error), quantity
-    return None
+        return commanded
+    changes = np.flatnonzero((commanded[1:] != commanded[:-1]).any(axis=1)) + 1
+    return commanded[changes[0] % held :: held]
 
 
 def _angles(position: Real) -> Array:
     """Positions without the jumps of angles that wrap, shape (samples, joints)."""
     return np.unwrap(np.asarray(position, dtype=np.float64), axis=0)
-
-
-def _flagged(run: Run, library: Library) -> tuple[float | None, str]:
-    """Share of the labelled time with a finding, and why there is none."""
-    found = analyse(run, library)
-    if found.status is Status.CANNOT_TELL or found.labels is None:
-        return None, found.reason.rstrip(".")
-    covered = sum(stop - start for start, stop, _ in found.lane)
-    total = duration(spans_of(found.findings))
-    return (min(total / covered, 1.0), "") if covered else (None, "no frame has a label")
-
-
-def _too_little(rate: float, duration: float, frequency: float) -> str:
-    """Why a log has no level above a frequency."""
-    if rate < 2 * BAND * frequency:
-        return f"a log of {rate:g} Hz has too little above {frequency:g} Hz"
-    return f"{duration:.3g} s are too short for {frequency:g} Hz"
 
 
 # --- episodes of logs
@@ -300,9 +242,7 @@ class Failed:
     problem: str
 
 
-def scored_episodes(
-    paths: Sequence[Path], reading: Reading, library: Library | None
-) -> list[Episode | Failed]:
+def scored_episodes(paths: Sequence[Path], reading: Reading) -> list[Episode | Failed]:
     """Read and score the episodes of logs and folders; one that cannot be read stops no other."""
     found, failed = list[Source](), list[Episode | Failed]()
     for path in paths:
@@ -314,8 +254,7 @@ def scored_episodes(
     def score(each: Source) -> Episode | Failed:
         log, name = str(each.path), each.episode
         try:
-            run = open_source(each, reading).run
-            return scored(run, log, episode=name, library=library)
+            return scored(open_source(each, reading).run, log, episode=name)
         except EXPECTED as error:
             shown = f"{log} episode {name}" if name else log
             return Failed(shown, without_path(error, each.path))
@@ -346,15 +285,14 @@ def default_order(episodes: Sequence[Episode]) -> str:
 
     Episodes of data sets, which are demonstrations and rollouts of policies, are ordered by their
     actions; logs by their measured velocities, since several often share one desired motion. A
-    score is skipped if an episode lacks it, if it is of two quantities, or if all have it equal.
+    score is skipped if an episode lacks it, or if all have it equal.
     """
     actions = all(episode.episode for episode in episodes)
     names = ORDERS if actions else sorted(ORDERS, key=lambda name: name.startswith("action"))
     known = []
     for name in names:
         values = {episode.scores[name] for episode in episodes}
-        kinds = {episode.quantities.get(name) for episode in episodes}
-        if len(kinds) == 1 and None not in values:
+        if None not in values:
             known.append((len(values) == 1, name))
     # The first that tells episodes apart, else the first that all have.
     return min(known, key=lambda each: each[0], default=(True, "level"))[1]
@@ -429,7 +367,6 @@ def as_json(ranking: Ranking) -> str:
     }
     settings = {
         "level_above_hz": FAST,
-        "tracking_above_hz": TRACKED,
         "sparc_cutoff_hz": CUTOFF,
         "sparc_threshold": THRESHOLD,
         "sparc_padding": PADDING,
@@ -439,7 +376,6 @@ def as_json(ranking: Ranking) -> str:
             "rank": rank,
             **{name: getattr(each, name) for name in ("log", "episode", "duration", "rate")},
             **each.scores,
-            "of": dict(each.quantities),
             "missing": dict(each.reasons),
             "remarks": list(each.remarks),
         }
@@ -475,11 +411,6 @@ def _notes(ranking: Ranking) -> Iterator[str]:
             text = f"empty{where(reasons.total())}, {reason}{more}"
             missing.setdefault(text, []).append(score.title)
     yield from (f"{', '.join(titles)}: {text}" for text, titles in missing.items())
-    for name, titles in (("action_curvature", "action rate and 2nd diff."), ("tracking", "error")):
-        kinds = Counter(each.quantities[name] for each in episodes if name in each.quantities)
-        for kind, count in kinds.items():
-            unit = ", rad/s in place of rad" if kind == "velocities" else ""
-            yield f"{titles}: of {kind}{unit}{where(count)}"
     remarks = Counter(remark for episode in episodes for remark in episode.remarks)
     for remark, count in remarks.items():
         yield remark if count == len(episodes) else f"{count} of {len(episodes)}: {remark}"
@@ -511,6 +442,4 @@ def _short(names: Sequence[str]) -> list[str]:
 def _cell(name: str, value: float | None) -> str:
     if value is None:
         return ""
-    if name == "flagged":
-        return f"{100 * value:.0f} %"
     return f"{value:.2f}" if name in ("sparc", "ldlj") else f"{value:.3g}"

@@ -1,6 +1,5 @@
 """What the command line takes, and what it refuses before any work is done."""
 
-import re
 import shlex
 import sys
 from importlib import metadata
@@ -130,12 +129,6 @@ def test_the_example_of_a_command_is_accepted(path, monkeypatch):
     inspector.main(args=arguments, standalone_mode=False)
     assert program == "inspector"
     assert called == [("simulate", "run") if path == ("simulate",) else path]
-
-
-def test_no_help_holds_brackets_that_would_be_taken_for_markup():
-    for command in COMMANDS.values():
-        texts = [command.help, *(getattr(option, "help", "") or "" for option in command.params)]
-        assert not [text for text in texts if re.search(r"\[[a-z#/@!]", text)]
 
 
 def test_at_most_100_characters_tell_what_was_assumed_and_v_tells_all(capsys):

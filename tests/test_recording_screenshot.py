@@ -95,5 +95,5 @@ def test_a_wrong_suffix_or_time_is_wrong_usage(arguments, text, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     status, _, err = call(*arguments)
     assert status == 2
-    assert text in " ".join(err.replace("│", " ").split())
+    assert text in " ".join(err.split())
     assert not list(tmp_path.iterdir())

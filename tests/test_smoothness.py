@@ -4,7 +4,6 @@ import csv
 import io
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -136,7 +135,6 @@ def test_standstill_constant_speed_and_a_rate_that_is_too_low_are_not_nan():
     assert level_above(constant, 20.0, 10.0) is None
 
 
-ROOT = Path(__file__).parents[1]
 RATE = 50.0
 TIME = np.arange(200) / RATE
 
@@ -168,7 +166,7 @@ def rollout(chatter=0.0, frequency=18.0, phase=0.0, *, samples=200, **changes):
 @given(st.floats(1e-3, 0.3), st.floats(11.0, 24.0), st.floats(0.0, 6.3))
 def test_chatter_never_ranks_an_episode_smoother(size, frequency, phase):
     clean, rough = scored(rollout(), "clean"), scored(rollout(size, frequency, phase), "rough")
-    for by in ("", "level", "ldlj", "action_rate", "action_curvature", "tracking"):
+    for by in ("", "level", "ldlj", "action_rate", "action_curvature"):
         order = ranked([rough, clean], by=by)
         assert [episode.log for episode in order.episodes] == ["clean", "rough"], by
 
@@ -243,20 +241,19 @@ def test_an_angle_that_wraps_is_no_jump():
         scored(rollout(position=each, position_desired=each, velocity=0 * each + 3.0), "")
         for each in (turning, wrapped)
     ]
-    for name in ("action_rate", "action_curvature", "tracking"):
+    for name in ("action_rate", "action_curvature"):
         first, second = (episode.scores[name] for episode in episodes)
         assert second == pytest.approx(first, abs=1e-12)
 
 
-def test_the_order_is_by_actions_only_where_all_episodes_have_them_of_one_quantity():
-    positions = scored(rollout(), "positions")
-    none = scored(rollout(position_desired=None), "none")
-    velocities = scored(rollout(position_desired=None, velocity_desired=rollout().velocity), "v")
-    of_set = replace(positions, episode="0")
+def test_the_order_is_by_actions_where_all_are_episodes_of_data_sets_with_actions():
+    none, logged = scored(rollout(position_desired=None), "none"), scored(rollout(), "logged")
+    assert none.reasons["action_rate"] == "the log has no desired positions"
+    of_set = replace(logged, episode="0")
     assert default_order([of_set]) == "action_curvature"
-    assert default_order([positions]) == "level"  # logs, by their measured velocities
-    assert default_order([positions, none]) == "level"
-    assert default_order([of_set, replace(velocities, episode="1")]) == "level"
+    assert default_order([logged]) == "level"  # logs, by their measured velocities
+    assert default_order([logged, none]) == "level"
+    assert default_order([of_set, replace(none, episode="1")]) == "level"
     assert ranked([scored(rollout(samples=2), "", episode="0")]).by == "action_rate"
 
 
@@ -301,9 +298,8 @@ def test_a_folder_is_ranked_in_one_table(folder):
     lines = out.splitlines()
     assert lines[0] == "3 episodes, the smoothest first by level of the velocities above 10 Hz"
     assert [line.split()[1] for line in lines[4:7]] == ["smooth.npz", "middle.npz", "rough.npz"]
-    assert "flagged: empty, logged at 50 Hz" in out
     assert lines[-1] == f"The roughest by >10 Hz: inspector view {folder / 'rough.npz'}"
-    assert out.count("empty") == 1
+    assert "empty" not in out
 
 
 def test_csv_and_json_have_the_same_numbers(folder):
@@ -312,22 +308,22 @@ def test_csv_and_json_have_the_same_numbers(folder):
         call("smoothness", folder, "--format", each, "--by", "ldlj")[1] for each in ("csv", "json")
     )
     rows, found = list(csv.DictReader(io.StringIO(table))), json.loads(document)
-    assert (found["format"], found["settings"]["sparc_cutoff_hz"]) == ("noise-smoothness/1", 10.0)
+    assert (found["format"], found["settings"]["sparc_cutoff_hz"]) == ("noise-smoothness/2", 10.0)
     assert [row["rank"] for row in rows] == ["1", "2", "3"]
     for row, episode in zip(rows, found["episodes"], strict=True):
-        assert (row["log"], row["flagged"]) == (episode["log"], "")
-        assert episode["flagged"] is None
-        assert "80 Hz" in episode["missing"]["flagged"]
+        assert (row["log"], episode["missing"]) == (episode["log"], {})
         assert float(row["ldlj"]) == pytest.approx(episode["ldlj"], rel=1e-5)
 
 
 def test_one_bad_log_is_named_and_the_others_are_ranked(folder):
     (folder / "bad.csv").write_text("hello\nworld\n")
-    status, out, err = call("smoothness", folder, "--no-labels")
+    rollout(position_desired=None).save(folder / "free.npz")
+    status, out, err = call("smoothness", folder)
     assert status == 3
-    assert out.startswith("3 episodes")
+    assert out.startswith("4 episodes")
     assert err.startswith(f"inspector: {folder / 'bad.csv'}: ")
-    assert "not classified (--no-labels)" in out
+    missing = "action rate, 2nd diff.: empty for 1 of 4, the log has no desired positions"
+    assert missing in out.splitlines()
 
 
 def test_a_folder_without_logs_says_what_it_looked_for(tmp_path):
@@ -354,11 +350,3 @@ def test_a_lerobot_data_set_is_ranked_by_episode(tmp_path):
         lines[-1]
         == f"The roughest by 2nd diff.: inspector import {data} --episode 0 -o roughest.npz"
     )
-
-
-def test_a_run_at_a_higher_rate_has_a_share_of_time_flagged():
-    status, out, _ = call("smoothness", ROOT / "assets" / "runs" / "demo.npz", "--format", "json")
-    assert status == 0
-    (episode,) = json.loads(out)["episodes"]
-    assert 0.0 < episode["flagged"] < 1.0
-    assert episode["missing"] == {}

@@ -42,20 +42,19 @@ ReportFolder = Annotated[
 ]
 Resume = Annotated[Path | None, option("Keep verdicts in this file; continue if it exists.")]
 
-_gate = partial(option, rich_help_panel="What fails a run")
-
 Accepted = Annotated[
     Path | None,
-    _gate("Accepted runs, or a folder of good ones; by default the nearest reference/."),
+    option("Accepted runs, or a folder of good ones; by default the nearest reference/."),
 ]
 FailOnClass = Annotated[
-    list[str] | None, _gate("Only findings of this class; repeatable, or a,b,c.")
+    list[str] | None, option("Fail only on findings of this class; repeatable, or a,b,c.")
 ]
 MinScore = Annotated[
-    float | None, _gate("Only findings of this score or more, 0 to 1.", min=0.0, max=1.0)
+    float | None, option("Fail only on findings of this score or more, 0 to 1.", min=0.0, max=1.0)
 ]
 MinDuration = Annotated[
-    float, _gate("Only findings of so many seconds.", min=0.0, callback=shared.finite)
+    float,
+    option("Fail only on findings of so many seconds.", min=0.0, callback=shared.finite),
 ]
 
 
@@ -74,7 +73,7 @@ def classify(
     resume: Resume = None,
     unknown: shared.UnknownFrames = Unknown.FINDING,
     reference: Accepted = None,
-    no_reference: Annotated[bool, _gate("Use the general model alone.", "--no-reference")] = False,
+    no_reference: Annotated[bool, option("Use the general model alone.", "--no-reference")] = False,
     fail_on_class: FailOnClass = None,
     min_score: MinScore = None,
     min_duration: MinDuration = 0.0,
@@ -316,12 +315,8 @@ def audit(
 ) -> None:
     """Print what logs can show: rates, quantisation, failure classes.
 
-    Exit status:
-
-      0  every log can show a failure class
-      2  wrong usage
-      3  bad input: a file cannot be read
-      4  cannot tell: a log can show no failure class
+    Exit status: 0 every log can show a failure class, 2 wrong usage, 3 bad input, 4 cannot tell: a
+    log can show no failure class.
     """
     from inspector.audit import audit as audits
 
@@ -343,7 +338,7 @@ def audit(
 # --- smoothness
 
 # Those of ``inspector.smoothness``, which would take too long to import here.
-Scores = Literal["level", "sparc", "ldlj", "action_rate", "action_curvature", "flagged", "tracking"]
+Scores = Literal["level", "sparc", "ldlj", "action_rate", "action_curvature"]
 
 
 def smoothness(
@@ -357,10 +352,6 @@ def smoothness(
         option("The score to order by; by default level, action_curvature for data sets."),
     ] = None,
     format: Annotated[Literal["text", "csv", "json"], option("Output format.")] = "text",  # noqa: A002
-    labels: Annotated[
-        bool, option("Classify episodes from 80 Hz on.", "--labels/--no-labels")
-    ] = True,
-    model: shared.ModelFiles = None,
 ) -> None:
     """Rank episodes of policies and demonstrations by smoothness.
 
@@ -368,8 +359,7 @@ def smoothness(
     """
     from inspector import smoothness as ranking
 
-    library = load_library(model) if labels else None
-    order = ranking.ranked(ranking.scored_episodes(logs, ctx.obj, library), by=by or "")
+    order = ranking.ranked(ranking.scored_episodes(logs, ctx.obj), by=by or "")
     write = {"text": ranking.as_text, "csv": ranking.as_csv, "json": ranking.as_json}
     typer.echo(write[format](order))
     for each in order.failed:

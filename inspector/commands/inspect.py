@@ -268,8 +268,6 @@ def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: b
 
 # --- noise
 
-_model_option = partial(option, rich_help_panel="Comparing noise models")
-
 COMPARED = ("simplified", "C", "paper", "mean", "rms", "normal")
 
 NoiseRuns = Annotated[list[Path] | None, argument("A run file or log; with --compare several.")]
@@ -277,12 +275,10 @@ Kinds = Annotated[
     list[str] | None, option("simplified, paper, A, B, C, mean, rms, normal; repeatable.")
 ]
 Csv = Annotated[Path | None, option("Write the noise over time, or all numbers.")]
-Compare = Annotated[
-    bool, _model_option("Compare noise models on run files with positions.", "--compare")
-]
-Robots = Annotated[str, _model_option("Compare them on robots that move: talos,go2 or all.")]
-Geometry = Annotated[shared.Geometries, _model_option("Shapes: visual, collision, hull or auto.")]
-Seed = Annotated[int, _model_option("Random seed of the generated motion.", min=0)]
+Compare = Annotated[bool, option("Compare noise models on run files with positions.", "--compare")]
+Robots = Annotated[str, option("Compare them on robots that move: talos,go2 or all.")]
+Geometry = Annotated[shared.Geometries, option("Shapes of the links to compare them with.")]
+Seed = Annotated[int, option("Random seed of the generated motion.", min=0)]
 
 
 def noise(
@@ -418,11 +414,11 @@ def live(
 ) -> None:
     """Show samples from standard input as they arrive.
 
-    Findings are printed as they come.
+    Findings are printed as they come. Ctrl-C ends the recording.
 
     CSV has a header: time,elbow.velocity,elbow.velocity_desired,elbow.position
+
     JSON lines have one object each: {"time": 0.1, "velocity": [0.2]}
-    Ctrl-C ends the recording.
 
     Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost, 70 bug.
     """

@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn, TypeVar, get_args
@@ -109,25 +108,23 @@ ReportUrl = Annotated[str, option("Where the report's folder is published.")]
 
 # --- how logs are read
 
-_log_option = partial(option, rich_help_panel="Reading logs")
-
 Limits = Annotated[
     list[str] | None,
-    _log_option(
+    option(
         f"Raise a size limit: {', '.join(LIMITS)}; repeatable.",
         callback=_raise_limits,
         metavar="NAME=N",
     ),
 ]
 PackageRoot = Annotated[
-    Path | None, _log_option("A further folder of packages, for robots' meshes.", callback=_allow)
+    Path | None, option("A further folder of packages, for robots' meshes.", callback=_allow)
 ]
 MaxUnpacked = Annotated[
     float | None,
-    _log_option("Refuse compressed files that expand beyond this many GB.", callback=_raise_limit),
+    option("Refuse compressed files that expand beyond this many GB.", callback=_raise_limit),
 ]
 Robot = Annotated[
-    str | None, _log_option('Robot name (see `inspector robots`), URDF or MJCF, or "none".')
+    str | None, option('Robot name (see `inspector robots`), URDF or MJCF, or "none".')
 ]
 
 
@@ -137,31 +134,31 @@ def log_options(
     max_unpacked: MaxUnpacked = None,
     limit: Limits = None,
     rate: Annotated[
-        float | None, _log_option("Rate of the log in [Hz], if it is known.", min=1.0)
+        float | None, option("Rate of the log in [Hz], if it is known.", min=1.0)
     ] = None,
     force: Annotated[
-        bool, _log_option("Take --rate even if positions and velocities contradict it.", "--force")
+        bool, option("Take --rate even if positions and velocities contradict it.", "--force")
     ] = False,
     map_: Annotated[
         list[str] | None,
-        _log_option("velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable.", "--map"),
+        option("velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable.", "--map"),
     ] = None,
-    mapping: Annotated[Path | None, _log_option("A saved mapping (TOML).")] = None,
-    joints: Annotated[str | None, _log_option("Names of the columns of arrays: a,b,c.")] = None,
+    mapping: Annotated[Path | None, option("A saved mapping (TOML).")] = None,
+    joints: Annotated[str | None, option("Names of the columns of arrays: a,b,c.")] = None,
     columns: Annotated[
-        str | None, _log_option("Names of a CSV's columns, without a header: time,q1,q2.")
+        str | None, option("Names of a CSV's columns, without a header: time,q1,q2.")
     ] = None,
-    units: Annotated[str | None, _log_option("Unit of angles: radians or degrees.")] = None,
-    topic: Annotated[list[str] | None, _log_option("Read this topic of a bag; repeatable.")] = None,
+    units: Annotated[str | None, option("Unit of angles: radians or degrees.")] = None,
+    topic: Annotated[list[str] | None, option("Read this topic of a bag; repeatable.")] = None,
     episode: Annotated[
-        list[str] | None, _log_option("Read this episode of a data set; repeatable.")
+        list[str] | None, option("Read this episode of a data set; repeatable.")
     ] = None,
     desired: Annotated[
-        Path | None, _log_option("Another log, with the desired motion on its own clock.")
+        Path | None, option("Another log, with the desired motion on its own clock.")
     ] = None,
     offset: Annotated[
         float | None,
-        _log_option("Add to the timestamps of --desired, in seconds; else estimated."),
+        option("Add to the timestamps of --desired, in seconds; else estimated."),
     ] = None,
 ) -> Reading:
     """Options on reading logs: in the help of `import` only; others take them, too (`cli`)."""

@@ -27,6 +27,8 @@ class OneRunUnlessNamed(TyperGroup):
 app = typer.Typer(
     cls=OneRunUnlessNamed,
     no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
     help="""Simulate labelled runs of robots with defects.
 
     Needs the extra `sim`. The default command is `run`.
