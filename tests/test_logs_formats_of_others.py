@@ -162,10 +162,10 @@ FORMATS = (
         "ROS 1, rostopic echo -p", "%time,field.header.seq,…,field.name0,field.velocity0",
         table(ROSTOPIC, (P, V, E), stamp=ticks(1e9),
               cells=("1", f"{EPOCH}000000000", "base", "shoulder", "elbow")),
-        (P, V, E), ELBOW,
+        (P, V, E), FROM_0,
         ("stamps are in nanoseconds",
-         UNREAD.format("3 columns", ", ".join(f"field.header.{e}"
-                                              for e in ("seq", "stamp", "frame_id"))), START),
+         UNREAD.format("5 columns", ", ".join(f"field.{e}" for e in (
+             "header.seq", "header.stamp", "header.frame_id", "name0", "name1"))), START),
     ),
     Format(
         "libfranka, logToCSV",

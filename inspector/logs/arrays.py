@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.clocks import counting, stamps_of
 from inspector.logs.log import Entry, Field, Log, LogReader, Stamps
-from inspector.logs.mapping import COMMAND, ReadOptions
+from inspector.logs.mapping import COMMAND, ReadOptions, no_motion
 from inspector.logs.names import (
     SIGNALS,
     TIMES,
@@ -33,6 +33,7 @@ from inspector.logs.names import (
     array_signal,
     column_signal,
     listed,
+    says_twice,
     time_column,
 )
 from noisemodel import Run, RunError, runfile
@@ -104,17 +105,25 @@ def log_of(
     episode: str = "",
     stated: tuple[str, float | None] = ("", None),
     joints: Mapping[str, tuple[str, ...]] | None = None,
+    stamps: Stamps | None = None,
     not_read: Sequence[str] = (),
+    remarks: tuple[str, ...] = (),
 ) -> Log:
     """Log of the arrays of one episode.
 
     Args:
         stated: What states the rate, and the rate, in [Hz].
         joints: Names of the columns of arrays, by the arrays' names.
+        stamps: Of all arrays; those of one of the arrays unless given.
     """
     every, arrays = arrays, _tables(arrays)
     options = options.for_columns(path, [*arrays])
-    mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
+    mapped = {
+        name
+        for entry in options.entries
+        if entry.signal != "time"
+        for name in (entry.source, entry.part()[0])
+    }
     naming = Naming.of((n for n, e in arrays.items() if e.ndim == 1), options.known_joints)
     columns = {  # that say in their names what they hold
         n
@@ -124,13 +133,16 @@ def log_of(
     roles = _roles(arrays, mapped, naming)
     motion = [name for name, what in roles.items() if what in MOTION or name in mapped]
     if not motion:
-        raise LogError(path, _nothing(episode, every))
-    time, arrays = _time(arrays, options, columns)
-    arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
-    samples = len(arrays[motion[0]])
-    stamps = Stamps.counted(samples, stated)
-    if time:
-        stamps = replace(stamps_of(path, time, arrays[time], options.rate), stated=stated)
+        raise _nothing(path, episode, every, not_read)
+    if stamps:
+        time, samples = stamps.name, len(stamps.time)
+    else:
+        time, arrays = _time(arrays, options, columns)
+        arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
+        samples = len(arrays[motion[0]])
+        stamps = Stamps.counted(samples, stated)
+        if time:
+            stamps = replace(stamps_of(path, time, arrays[time], options.rate), stated=stated)
     named = {**(joints or {}), **_arms(arrays, roles)}
     fields = [
         Field(
@@ -140,7 +152,8 @@ def log_of(
             joints=named.get(name, ()),
             signal=what if what in (*SIGNALS, COMMAND) and name not in columns else "",
             source=path.name,
-            rank=0 if STATES.fullmatch(name) else 1,
+            # The second of two sides is a command beside the desired motion: ``cmd.q_d[0]``.
+            rank=0 if STATES.fullmatch(name) else 1 + says_twice(name),
         )
         for name, what in roles.items()
         if len(arrays[name]) == samples and name != time
@@ -151,6 +164,7 @@ def log_of(
         tuple(fields),
         episode,
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
+        remarks=remarks,
         suggested=tuple(_of_mujoco(arrays, roles)),
         time=time,
     )
@@ -341,8 +355,10 @@ def _floating(qpos: Real, count: int) -> list[int]:
     return places
 
 
-def _nothing(episode: str, arrays: Arrays) -> str:
-    """Problem of a file that is not known to hold motion: what it holds, and what to type."""
+def _nothing(path: Path, episode: str, arrays: Arrays, not_read: Sequence[str]) -> LogError:
+    """Error of a file that is not known to hold motion: what it holds, and what to type."""
+    if arrays and all(each.ndim == 1 for each in arrays.values()):
+        return no_motion(path, [*arrays, *not_read])
     wide = [(n, each) for n, each in arrays.items() if each.ndim == 2 and meaning(n) != COMMAND]
     name, values = max(wide, key=lambda each: len(each[1]), default=("qpos", np.zeros((2, 7))))
     half = values.shape[1] // 2
@@ -350,9 +366,10 @@ def _nothing(episode: str, arrays: Arrays) -> str:
     if "obs" in name and half:
         example += f"[0:{half}] --map velocity={name}[{half}:{2 * half}]"
     shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])
-    return (
+    return LogError(
+        path,
         f"{episode or 'the file'} holds no known joint positions or velocities; name them, such as"
-        f" {example}; it has {shapes}"
+        f" {example}; it has {shapes}",
     )
 
 

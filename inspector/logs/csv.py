@@ -17,9 +17,9 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.arrays import CELLS, gathered
+from inspector.logs.arrays import CELLS, log_of
 from inspector.logs.clocks import counting, stamps_since
-from inspector.logs.log import Field, Log, LogReader, Stamps
+from inspector.logs.log import Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions, no_motion
 from inspector.logs.names import (
     JOINT_SIGNALS,
@@ -27,7 +27,6 @@ from inspector.logs.names import (
     Naming,
     array_signal,
     column_signal,
-    says_twice,
     time_column,
 )
 from inspector.logs.names import UNITS as SIGNAL_UNITS
@@ -50,8 +49,6 @@ PIECE = 2**20  # characters that are read at once
 SECONDS = re.compile(r"(?P<record>.*?)secs?(?:onds)?", re.IGNORECASE)
 # Endings of the two columns of a stamp in whole seconds, and nanoseconds since.
 NANOSECONDS = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
-# Beginning of rostopic's columns with the joints' names, which end with a number.
-NAME = "field.name"
 YEARS = range(1900, 2100)  # of dates; stamps that are larger are in another unit than seconds
 DAY = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -112,10 +109,9 @@ def _read(path: Path, options: ReadOptions) -> Log:
         names = [name for place, name in enumerate(header) if name and place not in (time, rest)]
         options = options.for_columns(path, names)
         wanted = _wanted(path, layout, time, rest, options)
-        named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
         counter = None if time is not None else _counter(path, stream, layout, wanted)
         times = (time if counter is None else counter, rest)
-        rows, values, cells, joints = _table(path, stream, layout, wanted, times, [*named])
+        rows, values, cells = _table(path, stream, layout, wanted, times)
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
     if counter is not None and _counts(cells):
@@ -127,26 +123,15 @@ def _read(path: Path, options: ReadOptions) -> Log:
         since = np.array([float(stamp - exact[0]) for stamp in exact])
         stamps = stamps_since(path, header[time], exact[0], since, options.rate, rows)
     _check_sparse(path, [header[place] for place in wanted], values, rows)
-    if len(joints) > 1:
-        raise LogError(path, f"the joints' names change ({header[min(named)]}); split the log")
-    of_joints = dict(zip(named.values(), next(iter(joints), ()), strict=True))
-    fields: list[Field] = []
-    for at, name in enumerate(header[place] for place in wanted):
-        column = values[:, at : at + 1]
-        known = column_signal(name)
-        joint = of_joints.get(f"{NAME}{known[1]}") if known else None
-        signal, of = (known[0], (joint,)) if known and joint else ("", ())
-        rank = int(says_twice(name))
-        fields.append(Field(name, column, stamps, of, signal, source=path.name, rank=rank))
-    read = {time, rest, *wanted, *named}
-    log = Log(
+    read = {time, rest, *wanted}
+    return log_of(
         path,
-        tuple(fields),
-        not_read=tuple(n for place, n in enumerate(header) if n and place not in read),
+        {header[place]: values[:, at] for at, place in enumerate(wanted)},
+        options,
+        stamps=stamps,
+        not_read=[n for place, n in enumerate(header) if n and place not in read],
         remarks=layout.remarks,
-        time="" if time is None else header[time],
     )
-    return gathered(log, options)
 
 
 # Header and columns
@@ -314,10 +299,9 @@ def _table(
     layout: Layout,
     wanted: Sequence[int],
     time: tuple[int | None, int | None],
-    named: Sequence[int],
-) -> tuple["array[int]", Array, list[str], set[tuple[str, ...]]]:
-    """Line numbers, numbers, stamps and the sets of joints' names of all rows."""
-    rows, table, stamps, joints = array("q"), array("d"), list[str](), set[tuple[str, ...]]()
+) -> tuple["array[int]", Array, list[str]]:
+    """Line numbers, numbers and stamps of all rows."""
+    rows, table, stamps = array("q"), array("d"), list[str]()
     pick = itemgetter(*wanted, wanted[0])
     names = [layout.header[place] for place in wanted]
     for _ in range(layout.skip):
@@ -326,7 +310,7 @@ def _table(
     while text := _piece(path, stream):
         lines = text.count("\n")
         found = None
-        if len(text) >= PIECE and rest is None and not named:
+        if len(text) >= PIECE and rest is None:
             found = numbers_in(text.encode(), len(layout.header), layout.delimiter, wanted, at)
         if found is not None:
             table.frombytes(found[0].tobytes())
@@ -343,10 +327,8 @@ def _table(
                 if at is not None:
                     part = "" if rest is None else f".{cells[rest].strip():0>9}"
                     stamps.append(cells[at].strip() + part)
-                if named:
-                    joints.add(tuple(cells[place] for place in named))
         first += lines
-    return rows, np.frombuffer(table).reshape(len(rows), len(wanted)), stamps, joints
+    return rows, np.frombuffer(table).reshape(len(rows), len(wanted)), stamps
 
 
 def _piece(path: Path, stream: TextIO) -> str:
