@@ -6,7 +6,7 @@ from commandline import call
 from csvlogs import log
 from samplelogs import JOINTS, Talk, joint_states, motion, numbers, write_bag, write_lerobot
 
-from noisemodel import Robot, Run
+from noisemodel import Run
 
 TALK = Talk()
 POSITION, VELOCITY = numbers(), numbers(seed=1)
@@ -91,22 +91,6 @@ def test_a_mapping_is_saved_and_used_again(tmp_path):
     status, _, _ = importing(tmp_path / "log.npz", "--mapping", kept, "-o", tmp_path / "b.npz")
     assert status == 0
     assert Run.load(tmp_path / "b.npz").joint_names == JOINTS
-
-
-def test_the_robot_of_a_bag_is_kept_beside_the_run(tmp_path):
-    text = Robot.load("panda").path.read_text()
-    names = [f"panda_joint{n}" for n in range(1, 8)]
-    states = joint_states(TALK, names=names, position=numbers(7), velocity=numbers(7))
-    description = [(states[0][0], TALK.make("std_msgs/String", data=text))]
-    topics = {"/joint_states": states, "/robot_description": description}
-    path = write_bag(tmp_path / "bag", TALK, topics)
-    status, out, _ = importing(path, "-o", tmp_path / "run.npz")
-    assert status == 0
-    assert "run.urdf: the robot, as the log describes it" in out
-    run = Run.load(tmp_path / "run.npz")
-    assert Robot.load(run.robot).configuration(run)[0].shape == (400, 9)
-    (tmp_path / "run.npz").unlink()
-    assert "run.urdf: exists already" in importing(path, "-o", tmp_path / "run.npz")[2]
 
 
 def test_two_logs_of_one_name_are_not_written_over_each_other(tmp_path):

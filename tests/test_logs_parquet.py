@@ -39,13 +39,13 @@ def test_columns_of_lists_are_arrays_of_joints(tmp_path):
     assert np.array_equal(run.velocity, VELOCITY)
 
 
-def test_columns_of_mujocos_state_and_a_counter_are_read_as_in_other_tables(tmp_path):
+def test_columns_of_mujocos_state_are_read_as_in_other_tables(tmp_path):
     columns = {f"qpos_{n}": POSITION[:, n] for n in range(3)}
     columns |= {f"ctrl_{n}": POSITION[:, n] for n in range(3)}
-    imported = read_log(wide(tmp_path, step=np.arange(400), **columns), rate=100)
+    imported = read_log(wide(tmp_path, **columns), rate=100)
     assert np.array_equal(imported.run.position_desired, POSITION)
     assert imported.remarks[:2] == (
-        "log.parquet: 'step' counts samples: 100 Hz, as --rate says",
+        "log.parquet: there are no stamps: 100 Hz, as --rate says",
         "log.parquet: taken: position = qpos[0:3], position_desired = ctrl (position follows it)",
     )
 

@@ -23,7 +23,7 @@ from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.clocks import counting, stamps_of
+from inspector.logs.clocks import stamps_of
 from inspector.logs.log import Entry, Field, Log, LogReader, Stamps
 from inspector.logs.mapping import COMMAND, ReadOptions, no_motion
 from inspector.logs.names import (
@@ -137,7 +137,7 @@ def log_of(
     if stamps:
         time, samples = stamps.name, len(stamps.time)
     else:
-        time, arrays = _time(arrays, options, columns)
+        time, arrays = _time(arrays, options)
         arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
         samples = len(arrays[motion[0]])
         stamps = Stamps.counted(samples, stated)
@@ -274,7 +274,7 @@ def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
     }
 
 
-def _time(arrays: Arrays, options: ReadOptions, columns: set[str]) -> tuple[str, Arrays]:
+def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
     """Name of the array with the stamps, empty without; a part of one is an array then."""
     source = options.time
     name, part = (source, slice(None)) if source in arrays else Entry("", "", source).part()
@@ -282,10 +282,7 @@ def _time(arrays: Arrays, options: ReadOptions, columns: set[str]) -> tuple[str,
         values = arrays[name].reshape(len(arrays[name]), -1)[:, part]
         if values.size:
             return source, {**arrays, source: values[:, 0]}
-    samples = max((len(each) for each in arrays.values()), default=0)
-    rows = {name: each for name, each in arrays.items() if each.ndim == 1}
-    counters = {n: each for n, each in rows.items() if len(each) == samples and n not in columns}
-    return time_column([*rows]) or counting(counters), arrays
+    return time_column([name for name, each in arrays.items() if each.ndim == 1]), arrays
 
 
 def _of_one_length(

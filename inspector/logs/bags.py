@@ -14,7 +14,7 @@ import sqlite3
 import struct
 from array import array
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -45,7 +45,6 @@ DAMAGE = (
 )
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
-DESCRIPTION = "robot_description"  # the last part of the name of the topic with a robot's URDF
 
 # A JointState topic with one of these in its name holds desired motion.
 COMMANDED = ("command", "desired", "target", "reference", "setpoint")
@@ -272,35 +271,6 @@ class MotionReader:
                 )
 
 
-class Descriptions:
-    """``std_msgs/String``: the robot's URDF, the last that holds one."""
-
-    def __init__(self, path: Path, topic: Topic) -> None:
-        self._decode = decoder(path, topic)
-        self.urdf = ""
-
-    def add(self, received: int, data: bytes) -> None:
-        """Add a message."""
-        text = str(self._decode(data).data)
-        if "<robot" in text:
-            self.urdf = text
-
-    def fields(self) -> Sequence[Field]:
-        """No fields: a URDF has no motion."""
-        return ()
-
-
-TopicReader: TypeAlias = MotionReader | Descriptions
-TYPES = tuple(MOTION)  # types of messages with motion
-
-
-def topic_reader(path: Path, topic: Topic) -> TopicReader | None:
-    """Reader of a topic; None if its type is not read."""
-    if topic.type == "std_msgs/msg/String" and topic.name.endswith(DESCRIPTION):
-        return Descriptions(path, topic)
-    return MotionReader(path, topic) if topic.type in MOTION else None
-
-
 # Bags
 
 LATEST = 2**62  # stamps lie before, in [ns]; differences of later ones are no 64-bit integers
@@ -316,7 +286,7 @@ class Bag:
     counts: Counter[str] = field(default_factory=Counter)  # messages, by topic
     times: list[int] = field(default_factory=list)  # of the first and the last message, in [ns]
     lost: list[str] = field(default_factory=list)  # a sentence each
-    readers: dict[str, TopicReader] = field(default_factory=dict)  # of topics that are read
+    readers: dict[str, MotionReader] = field(default_factory=dict)  # of topics that are read
 
     def __str__(self) -> str:
         return f"the bag has {listed([*map(str, self.topics.values())]) or 'no topics'}"
@@ -334,18 +304,18 @@ def _listing(path: Path) -> tuple[str, ...]:
     for topic in sorted(bag.topics.values(), key=lambda each: each.name):
         count = bag.counts[topic.name]
         rate = f"{count / seconds:.6g} Hz" if count > 1 and seconds else ""
-        known = topic.type in TYPES or topic.name.endswith(DESCRIPTION)
         words = (topic.name, topic.type, counted(count, "message"), rate)
-        rows.append("  ".join(filter(None, (*words, "read" if known else "not read"))))
+        read = "read" if topic.type in MOTION else "not read"
+        rows.append("  ".join(filter(None, (*words, read))))
     return (*rows, *bag.lost)
 
 
 def _read(path: Path, options: ReadOptions) -> Log:
     chosen = options.topics
-    bag = _scanned(path, lambda name: not chosen or name in chosen or name.endswith(DESCRIPTION))
+    bag = _scanned(path, lambda name: not chosen or name in chosen)
     for name in options.topics:
-        if name not in bag.topics or bag.topics[name].type not in TYPES:
-            problem = f"there is no topic {name!r} of a type that is read ({', '.join(TYPES)})"
+        if name not in bag.topics or bag.topics[name].type not in MOTION:
+            problem = f"there is no topic {name!r} of a type that is read ({', '.join(MOTION)})"
             raise LogError(path, f"{problem}; {bag}")
     read = {name: reader for name, reader in bag.readers.items() if bag.counts[name]}
     if not read:
@@ -353,7 +323,6 @@ def _read(path: Path, options: ReadOptions) -> Log:
     fields = [each for reader in read.values() for each in reader.fields()]
     if not any(each.signal.startswith(("position", "velocity")) for each in fields):
         raise LogError(path, f"no message holds joints; {bag}")
-    urdfs = [each.urdf for each in read.values() if isinstance(each, Descriptions) and each.urdf]
     return Log(
         path,
         tuple(each for each in fields if each.signal),
@@ -363,7 +332,6 @@ def _read(path: Path, options: ReadOptions) -> Log:
             if name not in read
         ),
         remarks=tuple(bag.lost),
-        urdf=urdfs[-1] if urdfs else "",
         meta={"topics": sorted({each.source for each in fields})},
     )
 
@@ -377,8 +345,8 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
             if isinstance(each, Topic):
                 if each.name not in bag.topics:
                     bag.topics[each.name] = each
-                    if wanted(each.name) and (reader := topic_reader(path, each)):
-                        bag.readers[each.name] = reader
+                    if wanted(each.name) and each.type in MOTION:
+                        bag.readers[each.name] = MotionReader(path, each)
                 continue
             name, received, data = each
             bag.counts[name] += 1

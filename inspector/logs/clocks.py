@@ -56,7 +56,7 @@ def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | No
     known = TIME_UNITS.get(without_unit(name)[1], "")
     start = {unit: first * float(UNITS[unit]) for unit in UNITS}
     absolute = any(EPOCH[0] < each < EPOCH[1] for each in start.values())
-    if not known and not absolute and is_counter(steps, first):
+    if not known and not absolute and _is_counter(steps, first):
         return SAMPLES
     rising = steps[steps > 0]
     step = float(np.median(rising)) if len(rising) else 0.0
@@ -84,7 +84,7 @@ def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | No
     )
 
 
-def is_counter(steps: NDArray[Any], first: float) -> bool:
+def _is_counter(steps: NDArray[Any], first: float) -> bool:
     """Whether stamps are whole numbers that grow by one, but for some holes."""
     return bool(
         len(steps)
@@ -93,16 +93,6 @@ def is_counter(steps: NDArray[Any], first: float) -> bool:
         and np.median(steps) == 1
         and (steps == np.rint(steps)).all()
     )
-
-
-def counting(columns: Mapping[str, NDArray[Any]]) -> str:
-    """Name of the first column that counts samples; empty if none does."""
-    for name, values in columns.items():
-        if values.dtype.kind in "iuf" and values.ndim == 1 and len(values) > 2:
-            whole = values.astype(np.float64)
-            if np.isfinite(whole).all() and is_counter(np.diff(whole), whole[0]):
-                return name
-    return ""
 
 
 def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -> Stamps:

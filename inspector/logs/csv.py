@@ -18,7 +18,7 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, log_of
-from inspector.logs.clocks import counting, stamps_since
+from inspector.logs.clocks import stamps_since
 from inspector.logs.log import Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions, no_motion
 from inspector.logs.names import (
@@ -109,13 +109,9 @@ def _read(path: Path, options: ReadOptions) -> Log:
         names = [name for place, name in enumerate(header) if name and place not in (time, rest)]
         options = options.for_columns(path, names)
         wanted = _wanted(path, layout, time, rest, options)
-        counter = None if time is not None else _counter(path, stream, layout, wanted)
-        times = (time if counter is None else counter, rest)
-        rows, values, cells = _table(path, stream, layout, wanted, times)
+        rows, values, cells = _table(path, stream, layout, wanted, (time, rest))
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
-    if counter is not None and _counts(cells):
-        time = counter
     if time is None:
         stamps = replace(Stamps.counted(len(rows)), rows=rows)
     else:  # absolute stamps exceed the precision of a float
@@ -237,26 +233,6 @@ def _times(header: Sequence[str], options: ReadOptions) -> tuple[int | None, int
         words = (f"{seconds['record']}{word}".lower() for word in NANOSECONDS)
         rest = next((places[word] for word in words if word in places), None)
     return header.index(name), rest
-
-
-def _counter(path: Path, stream: TextIO, layout: Layout, wanted: Sequence[int]) -> int | None:
-    """Place of the column that counts the samples in the first rows; None if none does."""
-    lines = list(islice(_lines(path, stream), layout.skip, layout.skip + HEAD))
-    stream.seek(0)
-    rows = []
-    with suppress(LogError):  # the last row may be quoted over more lines
-        rows = [cells for _, cells in _rows(path, "".join(lines), layout.skip, layout)]
-    for place, name in enumerate(layout.header):
-        if name and place not in wanted and _counts([cells[place] for cells in rows]):
-            return place
-    return None
-
-
-def _counts(cells: Sequence[str]) -> bool:
-    """Whether cells are whole numbers that grow, mostly by one."""
-    with suppress(ValueError):
-        return bool(counting({"cells": np.array(cells, dtype=np.float64)}))
-    return False
 
 
 def _wanted(

@@ -185,7 +185,6 @@ class Log:
     not_read: tuple[str, ...] = ()  # names of what was not read
     remarks: tuple[str, ...] = ()  # what was lost or decided, a sentence each
     units: str = ""  # why the unit of angles is not known, if the format does not define it
-    urdf: str = ""  # text of the URDF in the log
     suggested: tuple[Entry, ...] = ()  # the format's mapping; the options' takes precedence
     meta: Mapping[str, Any] = field(default_factory=dict)
     time: str = ""  # name of the column or array with the stamps

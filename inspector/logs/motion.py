@@ -44,7 +44,6 @@ class Imported:
     run: Run
     remarks: tuple[str, ...]  #: what was decided during the import, a sentence each
     name: str = ""  #: of the log and of the episode
-    urdf: str = ""  #: text of the URDF in the log, if no robot was specified
 
 
 def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
@@ -447,7 +446,7 @@ def _evenly(places: Indices) -> Array:
 # The run
 
 
-def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str) -> Imported:
+def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     """Run of one log, or of one with the measured and one with the desired motion.
 
     Samples whose stamps are not uniform are resampled to the specified rate, or to the nearest
@@ -478,7 +477,6 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
         "jitter": {"rms": own.clock.jitter_rms, "max": own.clock.jitter_max},
     }
     meta |= {"offset": offset} if offset else {}
-    urdf = logs[0].urdf if robot and not options.robot else ""
     covered, slack = float(own.time[-1]), UNIFORM / own.clock.rate
     logs.clear()
     del tracks, main  # each signal is freed when it has been resampled
@@ -498,7 +496,7 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
         remarks.append(f"cut to the {run.duration:.6g} s that {extent} cover")
     if start:
         remarks.append(f"time starts at 0; the first stamp, {meta['start']} s, is in meta")
-    return Imported(run, (*remarks, *told), name, urdf)
+    return Imported(run, (*remarks, *told), name)
 
 
 def _check_mapping(logs: Sequence[Log], options: ReadOptions) -> None:

@@ -152,9 +152,6 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
         raise no_motion(path, schema.names)
     if time in schema.names:
         wanted.append(time)
-    else:  # one of the columns of integers may count the samples
-        integers = [each.name for each in schema if pyarrow.types.is_integer(each.type)]
-        wanted += [name for name in integers if name not in (*wanted, EPISODE)]
     table = _table([path], wanted, episode)
     arrays = {
         name: values[:, 0] if values.shape[1] == 1 else values

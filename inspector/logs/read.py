@@ -6,7 +6,6 @@ files one by one or a folder of them at a time.
 
 import hashlib
 import os
-import tempfile
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,8 +22,8 @@ from inspector.logs.motion import Imported, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
 from inspector.logs.plausibility import check_joints, contradictions, limit_warnings, named
 from inspector.text import counted, printable
-from noisemodel import NoiseModelError, OutputError, Robot, RobotError, Run, RunFileError, runfile
-from noisemodel.files import also_reading, refuse_existing, replacing
+from noisemodel import NoiseModelError, OutputError, Robot, Run, RunFileError, runfile
+from noisemodel.files import also_reading, refuse_existing
 from noisemodel.robot import joint_limits
 from noisemodel.run import NotUniformError
 
@@ -33,6 +32,7 @@ MAGIC = {
     b"\x89MCAP0\r\n": "bags",
     b"SQLite format 3\x00": "bags",
     b"#ROSBAG V": "bags",
+    b"\x28\xb5\x2f\xfd": "bags",  # a file of a bag that zstd packed
     b"PAR1": "parquet",
     b"\x89HDF\r\n\x1a\n": "hdf5",
     b"PK\x03\x04": "arrays",
@@ -228,31 +228,13 @@ def _read_episode(
         run = opened.run()
         robot_name = options.robot or run.robot
         return Imported(replace(run, robot=robot_name), ("a run file, unchanged",), name)
-    log = opened.read(episode)
-    problem = ""
-    if robot is None and log.urdf:
-        robot, problem = _robot_of(log.urdf)
-    logs = [prepared(log, options, robot)]
-    del log  # its tracks remain, and are freed one by one as they are resampled
+    logs = [prepared(opened.read(episode), options, robot)]
     if desired:
         same_episode = episode if episode in desired.episodes else desired.episodes[0]
         if len(logs[0].in_degrees) == 2:  # of one robot, in one unit
             options = replace(options, units="degrees")
         logs.append(prepared(desired.read(same_episode), options, robot))
-    imported = run_of(logs, options, robot, name)
-    unchecked = [f"{problem}; joints are not checked"] if problem else []
-    return replace(imported, remarks=(*imported.remarks, *unchecked))
-
-
-def _robot_of(urdf: str) -> tuple[Robot | None, str]:
-    """Robot of the URDF in a log, or None and why it cannot be read."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "robot_description.urdf"
-        path.write_text(urdf, encoding="utf-8")
-        try:
-            return Robot.load(path), ""
-        except RobotError as error:
-            return None, str(error).replace(str(path), "the log's robot description")
+    return run_of(logs, options, name)
 
 
 # Run files and logs alike
@@ -413,8 +395,6 @@ def assumed(imported: Imported, path: Path) -> str:
     parts.append(f"robot {run.robot}" if run.robot else "no robot (--robot NAME)")
     if lacking:
         parts.append(f"not in the log, assumed stationary: {listed(lacking)}")
-    if imported.urdf:
-        parts.append("the log describes its robot, which `import` keeps")
     told = (each for each in remarks if not each.startswith("time starts at 0"))  # of `import`
     parts += [each.removeprefix(f"{path.name}: ") for each in told]
     return "; ".join(" ".join(part.split()) for part in parts)
@@ -540,14 +520,8 @@ def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path
 
 
 def _written(imported: Imported, target: Path, *, overwrite: bool) -> Written:
-    """Write a run, and beside it the robot that the log describes."""
-    run, remarks = imported.run, list(imported.remarks)
-    if imported.urdf:
-        urdf = target.with_suffix(".urdf")
-        with replacing(urdf, overwrite=overwrite) as temporary:
-            temporary.write_bytes(imported.urdf.encode())
-        run = replace(run, robot=str(urdf))
-        remarks.append(f"{urdf.name}: the robot, as the log describes it")
-    remarks += [*contradictions(run), *limit_warnings(run)]
+    """Write a run."""
+    run = imported.run
     run.save(target, overwrite=overwrite)
-    return Written(target, run.duration, run.rate, tuple(remarks))
+    remarks = (*imported.remarks, *contradictions(run), *limit_warnings(run))
+    return Written(target, run.duration, run.rate, remarks)
