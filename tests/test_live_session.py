@@ -127,19 +127,6 @@ def test_findings_are_listed_as_they_come_and_are_those_of_the_summary(tmp_path,
     np.testing.assert_allclose(listed[-len(found) :], [e.start for e in summary.findings])
 
 
-def test_the_robot_glows_while_it_hums_and_is_quiet_before(panda):
-    path, _, _ = panda
-    mesh = "/robot/panda/visual_geometries/panda_link7/visual_0"
-    time, shades = read(path, mesh, "Asset3D:albedo_factor")
-    level = [sum(shade[0].to_bytes(4, "big")[:3]) for shade in shades]
-    assert time[0] == 0.0
-    during = max(each for at, each in zip(time, level, strict=True) if 1.0 <= at < 2.0)
-    assert during > level[0]
-    assert level[-1] < during
-    _, base = read(path, mesh.replace("link7", "link0"), "Asset3D:albedo_factor")
-    assert len(base) == 1
-
-
 def window(path):
     """What plots over time show, in each layout that was sent: start and end, with their kinds."""
     reader, found = RrdReader(path), []

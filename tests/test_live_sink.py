@@ -1,5 +1,4 @@
 import os
-import re
 import signal
 import socket
 import subprocess
@@ -68,46 +67,30 @@ def test_a_viewer_that_ends_is_warned_of_once_and_the_rest_goes_on(tmp_path, mon
         assert path.stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("saved", [False, True])
-def test_a_late_viewer_is_told_once_and_sent_more_when_it_has_caught_up(
-    tmp_path, monkeypatch, saved
-):
+def test_a_viewer_that_hangs_is_told_of_once_and_the_file_is_whole(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "CHECK_INTERVAL", 0.05)
     monkeypatch.setattr(viewer, "CONNECT_TIMEOUT", 60.0)
-    monkeypatch.setattr(module, "FLUSH_TIMEOUT", 60.0)
+    monkeypatch.setattr(module, "FLUSH_TIMEOUT", 0.2)
     monkeypatch.setattr(module, "LATE", 0.5)
-    path, warned = tmp_path / "live.rrd" if saved else None, []
+    path, warned = tmp_path / "live.rrd", []
     with receiver(tmp_path) as (port, process):
         session = inspector.LiveSession(
             1000.0, connect=str(port), save=path, on_warning=warned.append
         )
         session.push(**second(0.0))
         os.killpg(process.process.pid, signal.SIGSTOP)
-        first = push_until(session, 1, lambda: warned)
-        late = session.summary.warnings["samples that were not sent to a late viewer"]
+        seconds = 1
+        while not warned and seconds < 500:
+            session.push(**second(seconds))
+            time.sleep(0.02)
+            seconds += 1
         os.killpg(process.process.pid, signal.SIGCONT)
-        last = push_until(session, first, lambda: not session._sink.late)
         summary = session.close()
     (line,) = warned
-    assert re.fullmatch(
-        r"the viewer is \d+ s behind the stream, noticed at \d+\.\d{3} s: it is sent nothing"
-        r" until it has caught up",
-        line,
-    )
-    assert 0 < late <= 1000 * first
-    assert len(summary.warnings) == 1
-    assert summary.samples == 1000 * last
-    if saved:
-        assert has_end(path)
-
-
-def push_until(session, first, holds):
-    """Push seconds until something holds."""
-    while not holds() and first < 500:
-        session.push(**second(first))
-        time.sleep(0.02)
-        first += 1
-    return first
+    assert line.startswith("the viewer is gone or hangs, noticed at ")
+    assert 0 < summary.warnings["samples that the viewer may not have shown"] <= 1000 * seconds
+    assert summary.samples == 1000 * seconds
+    assert has_end(path)
 
 
 def test_a_viewer_that_never_catches_up_holds_neither_the_file_nor_the_end_up(

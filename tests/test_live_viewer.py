@@ -35,9 +35,7 @@ def test_a_viewer_follows_a_session_and_reports_no_error(monkeypatch):
     assert recording_end(state).max() == pytest.approx(2.999, abs=1e-6)
     assert len(state.recordings) == 1
     assert following(state)
-    assert {"Robot, links coloured by level above 10 Hz", "Classes", "Noise"} <= {
-        v.name for v in views
-    }
+    assert {"Robot", "Classes", "Noise"} <= {v.name for v in views}
     assert not [report for view in views for report in view.reports]
     assert not errors
 

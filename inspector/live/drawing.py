@@ -4,10 +4,8 @@ import re
 import time
 import uuid
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event as Signal
@@ -21,7 +19,7 @@ from rerun.blueprint import Blueprint
 
 import noisemodel as nm
 from inspector import colors
-from inspector.levels import LINKS, SPECTRUM, amplitudes, extremes, in_bands, window_length
+from inspector.levels import SPECTRUM, amplitudes, extremes, in_bands, window_length
 from inspector.live.labels import Labeller
 from inspector.live.samples import SinkError
 from inspector.recording import axes, panels, unstable, viewer
@@ -33,8 +31,7 @@ from inspector.recording.viewer import HOST
 from inspector.report.findings import spoken
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
-from noisemodel.noise import FAST, REFERENCE_POWER, by_moments, decibel, second_moments, vibrating
-from noisemodel.robot import Limits, joint_limits
+from noisemodel.noise import decibel
 from noisemodel.types import Array, Mask
 
 # Another than recordings of whole runs have: the viewer keeps a layout for each application.
@@ -53,8 +50,7 @@ class Sink:
     def __init__(
         self, save: Path | None = None, connect: str | None = None, *, overwrite: bool = False
     ) -> None:
-        self.saved, self.gone = save is not None, False  # gone: there was a viewer
-        self.late = 0.0  # how far it was behind at the last check, if more than `LATE`, in [s]
+        self.saved, self.gone = save is not None, False  # gone: there was a viewer, or it is late
         self._address = (HOST, PORT)
         self._checked = time.monotonic()
         self._asked: float | None = None  # since when the viewer lacks what had been sent by then
@@ -80,8 +76,8 @@ class Sink:
 
     @property
     def open(self) -> list[rr.RecordingStream]:
-        """The sinks that take what is logged: a file does when its viewer is gone or late."""
-        shown = None if self.gone or self.late else self._viewer
+        """The sinks that take what is logged: a file does when its viewer is gone."""
+        shown = None if self.gone else self._viewer
         return [each for each in (self._file, shown) if each is not None]
 
     @property
@@ -95,9 +91,8 @@ class Sink:
             return False
         self._checked = time.monotonic()
         behind = 0.0 if self._asked is None else self._checked - self._asked
-        self.gone = not viewer.listens(*self._address)
-        self.late = behind if behind > LATE else 0.0
-        return not (self.gone or self.late)
+        self.gone = behind > LATE or not viewer.listens(*self._address)
+        return not self.gone
 
     def _follow(self, shown: rr.RecordingStream) -> None:
         """Note since when the viewer is behind, until the recording ends."""
@@ -115,7 +110,7 @@ class Sink:
 
     def close(self) -> bool:
         """Send what waits, and put the file in its place if it is whole."""
-        taken = not (self.gone or self.late)
+        taken = not self.gone
         if taken and self._viewer is not None:
             try:
                 self._viewer.flush(timeout_sec=FLUSH_TIMEOUT)
@@ -235,36 +230,6 @@ def nanoseconds(time: Array) -> NDArray[np.int64]:
     return np.round(1e9 * time).astype(np.int64)
 
 
-class Windows:
-    """Cuts samples into windows that overlap, whatever the pieces in which they come."""
-
-    def __init__(self, length: int, hop: int) -> None:
-        self._length, self._hop = length, hop
-        self.clear()
-
-    def clear(self, before: int = 0) -> None:
-        """Begin anew, after so many samples that are not valid."""
-        self._samples, self._valid = np.zeros((before, 1)), np.zeros(before, dtype=bool)
-
-    def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask, NDArray[np.int64]]:
-        """Windows that are complete, which touch no gap, and samples from their starts to the end.
-
-        Windows have the shape (windows, columns, length).
-        """
-        held = np.broadcast_to(self._samples, (len(self._valid), samples.shape[1]))
-        samples = np.concatenate((held, samples))
-        valid = np.concatenate((self._valid, valid))
-        length, hop = self._length, self._hop
-        count = max(0, (len(samples) - length) // hop + 1)
-        self._samples, self._valid = samples[count * hop :], valid[count * hop :]
-        since = len(samples) - hop * np.arange(count)
-        if not count:
-            return np.empty((0, samples.shape[1], length)), valid[:0], since
-        view = np.lib.stride_tricks.sliding_window_view
-        whole = view(valid, length)[::hop][:count].all(axis=1)
-        return view(samples, length, axis=0)[::hop][:count], np.asarray(whole), since
-
-
 class SpectrogramStream:
     """Levels of the loudest joint in bands of a logarithmic axis, on a fixed scale."""
 
@@ -273,84 +238,43 @@ class SpectrogramStream:
         self._hop = max(1, self._length // 4)
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
         self.edges = np.geomspace(self._frequency[0], self._frequency[-1], panels.BANDS + 1)
-        self._windows = Windows(self._length, self._hop)
+        self._hold(0)
+
+    def _hold(self, samples: int) -> None:
+        """Begin anew, after so many samples that are not valid."""
+        self._samples, self._valid = np.zeros((samples, 1)), np.zeros(samples, dtype=bool)
 
     def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
         """Take samples; centres of windows in [s], and levels, shape (columns, bands)."""
-        windows, whole, since = self._windows.push(velocity, valid)
-        if not len(windows):
+        length, hop = self._length, self._hop
+        held = np.broadcast_to(self._samples, (len(self._valid), velocity.shape[1]))
+        samples = np.concatenate((held, velocity))
+        valid = np.concatenate((self._valid, valid))
+        count = max(0, (len(samples) - length) // hop + 1)
+        self._samples, self._valid = samples[count * hop :], valid[count * hop :]
+        if not count:
             return np.empty(0), np.empty((0, panels.BANDS))
+        view = np.lib.stride_tricks.sliding_window_view
+        windows = view(samples, length, axis=0)[::hop][:count]  # (windows, joints, length)
+        whole = view(valid, length)[::hop][:count].all(axis=1)
         # In a window, slow motion is a line all but: what is left of it is below 10 Hz.
-        ramp = np.arange(self._length) - (self._length - 1) / 2
+        ramp = np.arange(length) - (length - 1) / 2
         slope = windows @ ramp / (ramp @ ramp)
-        level_windows = (windows - slope[..., None] * ramp).reshape(-1, self._length)
+        level_windows = (windows - slope[..., None] * ramp).reshape(-1, length)
         every = amplitudes(level_windows).reshape(*windows.shape[:2], -1)
         amplitude = every.max(axis=1).T * whole
         level = 2 * decibel(in_bands(self._frequency, amplitude, self.edges))
         level = np.clip(SPECTRUM.place(level), 0.0, 1.0).T
-        return np.asarray(end - (since - self._length / 2) / self._rate), level
+        since = len(samples) - hop * np.arange(count)  # samples from starts to the end
+        return np.asarray(end - (since - length / 2) / self._rate), level
 
     def skip(self) -> None:
         """Begin anew after a gap, with a window that touches it and is dark."""
-        self._windows.clear(self._hop)
+        self._hold(self._hop)
 
 
-STEP = 0.2  # time over which a level of a link is taken, in [s]
-
-
-class LinkLevels:
-    """Levels above 10 Hz of a robot's links, every 0.2 s, half a period of 10 Hz late."""
-
-    def __init__(
-        self, robot: str, joint_names: Sequence[str], rate: float, *, floating: bool
-    ) -> None:
-        self._robot = nm.Robot.load(robot, floating_base=True if floating else None)
-        self._surface = nm.Surface.of(self._robot, "auto")
-        self.links = self._surface.names
-        self._names, self._rate = tuple(joint_names), rate
-        self._size, self._around = max(1, round(STEP * rate)), max(1, round(rate / FAST / 2))
-        self._windows = Windows(self._size + 2 * self._around, self._size)
-
-    def skip(self) -> None:
-        """Begin anew after a gap."""
-        self._windows.clear()
-
-    def push(self, signals: Mapping[str, Array], end: float) -> list[tuple[float, Array]]:
-        """Take samples that follow each other, up to a time in [s].
-
-        Returns:
-            Start of each step that is complete now and whose samples are all known, in [s], and the
-            levels of all links, shape (links,), in [dB re 1 pW]; silence is at -inf.
-        """
-        floats = self._robot.floating_base and "base_velocity" in signals
-        kinds = ["velocity", "position", *(["base_velocity"] if floats else [])]
-        rows = np.hstack([signals[kind] for kind in kinds])
-        edges = np.cumsum([signals[kind].shape[1] for kind in kinds])[:-1]
-        known = np.asarray(np.isfinite(rows).all(axis=1))
-        windows, whole, since = self._windows.push(rows, known)
-        starts = end - (since - self._around) / self._rate
-        return [
-            (start, self._level(dict(zip(kinds, np.split(window.T, edges, axis=1), strict=True))))
-            for start, window in zip(starts[whole].tolist(), windows[whole], strict=True)
-        ]
-
-    def _level(self, signals: Mapping[str, Any]) -> Array:
-        time = np.arange(len(signals["velocity"])) / self._rate
-        run = nm.Run(time=time, joint_names=self._names, **signals)
-        position, velocity = self._robot.configuration(run)
-        step = slice(self._around, self._around + self._size)
-        fast = vibrating(velocity, run.mask, self._rate)[step]
-        moments = second_moments(fast, run.mask[step], size=self._size)
-        pose = position[len(time) // 2][None]
-        (power,) = by_moments(self._robot, self._surface, pose, [("normal", moments)])
-        return decibel(power[0] / REFERENCE_POWER)
-
-
-SHADES = 16
-KEY = Panel("key", 360.0)  # the scale beside the robot
-ROOM = 1.3  # what the camera sees of a robot that moves its base, by its size as it stands at first
-POSES = 200  # random poses within the limits of the joints, of which the camera sees all
-# How far the floor reaches from the first pose, in [m].
+ROOM = 1.6  # what the camera sees, by the size of the robot as it stands at first
+# How far the floor of a robot that moves its base reaches from the first pose, in [m].
 AROUND = np.array([[-20.0, -20.0], [20.0, 20.0]])
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -361,76 +285,39 @@ class LiveRobot:
     def __init__(
         self, messages: Messages, robot: str, joint_names: Sequence[str], *, floating: bool
     ) -> None:
-        from scipy.spatial.transform import Rotation
-
-        self._messages, self._rotation, self._named = messages, Rotation, tuple(joint_names)
+        self._messages, self._named = messages, tuple(joint_names)
         with TemporaryDirectory() as folder:
             tree = self._tree = scene.load(robot, Path(folder), joint_names)
             self._outermost = scene.outermost(scene.drawn_file(robot, Path(folder)))
-            scene.log_shapes(messages.recording, tree)
-            self._shapes = scene.shapes_by_link(tree)
-        self._shades: dict[str, bytes] = {}
+            scene.log_shapes(messages.recording, tree, coloured=True)
         angles = self._angles(np.zeros((1, len(joint_names))))
-        joints = [joint for joint in tree.joints() if joint.name in angles]
-        self._names = [joint.name for joint in joints]
-        slides = np.array([joint.joint_type == "prismatic" for joint in joints])[:, None]
-        axis = np.array([joint.axis for joint in joints])
-        self._slide, self._spin = np.where(slides, axis, 0.0), np.where(slides, 0.0, axis)
-        self._place = np.array([joint.origin_xyz for joint in joints])
-        self._turn = Rotation.from_euler("xyz", [joint.origin_rpy for joint in joints])
+        self._joints = [joint for joint in tree.joints() if joint.name in angles]
         base = [str(tree.root_link().name), scene.VIEW] if floating else []
-        self.children = [joint.child_link for joint in joints] + base
-        self._carriers = [joint.parent_link for joint in joints] + len(base) * [scene.WORLD]
-        axes.log_scale(messages.recording, KEY, LINKS, "dB re\n1 pW")
-        limits = joint_limits(robot)
-        ranges = [_range(limits.get(name, Limits())) for name in joint_names]
-        self._low, self._high = np.array(ranges).T
+        self.children = [joint.child_link for joint in self._joints] + base
+        self._carriers = [joint.parent_link for joint in self._joints] + len(base) * [scene.WORLD]
 
     def _angles(self, position: Array) -> dict[str, Array]:
         """Positions of all joints that move, mimics included, by positions (samples, joints)."""
         return scene.angles(self._tree, dict(zip(self._named, position.T, strict=True)))
 
     def camera(self, position: Array, base_pose: Array | None) -> Camera:
-        """Place the camera, before it is known what will come.
-
-        A robot on a base is seen wherever its joints can take it; one that moves its base as it
-        stands at first, with room to move.
-        """
-        first = np.nan_to_num(position)[None]
+        """Place the camera by the first pose, before it is known what will come."""
+        pose = None
         if base_pose is not None:
             unknown = np.concatenate((np.zeros(3), UPRIGHT))
             pose = (base_pose if np.isfinite(base_pose).all() else unknown)[None]
-            seen = scene.fitted(self._reached(first, pose), room=ROOM)
-            seen = scene.standing(seen, self._tree, moves=True)
-            floor = pose[:, :2] + AROUND
-            scene.log_floor(self._messages.recording, self._tree, seen, floor)
-            return seen
-        floor = scene.fitted(self._reached(first, None)).floor
-        random = np.random.default_rng(0)
-        everywhere = random.uniform(self._low, self._high, (POSES, len(position)))
-        seen = scene.fitted(self._reached(np.concatenate((first, everywhere)), None))
-        return scene.standing(replace(seen, floor=floor), self._tree, moves=False)
-
-    def _reached(self, position: Array, pose: Array | None) -> Iterator[Array]:
-        return scene.reached(self._tree, self._outermost, self._angles(position), pose)
-
-    def colour(self, time: float, links: Sequence[str], level: Array) -> None:
-        """Colour the links from a time on, where that changes, by levels in [dB re 1 pW]."""
-        levels = dict(zip(links, level.tolist(), strict=True))
-        each = np.array([levels.get(link, -np.inf) for link in self._shapes])
-        index = nanoseconds(np.array([time]))
-        for link, own in zip(self._shapes, LINKS.colours(each, shades=SHADES), strict=True):
-            if self._shades.get(link) != own.tobytes():
-                self._shades[link] = own.tobytes()
-                for path, kind in self._shapes[link]:
-                    columns = partial(scene.coloured, kind)
-                    self._messages.add(path, index, own[None], columns, urgent=True)
+        angles = self._angles(np.nan_to_num(position)[None])
+        parts = scene.reached(self._tree, self._outermost, angles, pose)
+        seen = scene.standing(scene.fitted(parts, room=ROOM), self._tree, moves=pose is not None)
+        if pose is not None:
+            scene.log_floor(self._messages.recording, self._tree, seen, pose[:, :2] + AROUND)
+        return seen
 
     def show(self, time: float, position: Array, base_pose: Array | None) -> None:
         """Move the robot, if its pose is known, at a time in [s]."""
         if not all(np.isfinite(each).all() for each in (position, base_pose) if each is not None):
             return
-        poses = np.hstack(self.transforms(position))
+        poses = self.transforms(position)
         if base_pose is not None:
             below = np.concatenate((base_pose[:3] * scene.ON_FLOOR, UPRIGHT))
             poses = np.vstack((poses, base_pose, below))
@@ -446,19 +333,15 @@ class LiveRobot:
             child_frame=count * self.children,
         )
 
-    def transforms(self, position: Array) -> tuple[Array, Array]:
-        """Places and quaternions of links in the axes of their carriers, mimics included."""
+    def transforms(self, position: Array) -> Array:
+        """Place and quaternion of each link that a joint moves, in the axes of its carrier."""
+        from scipy.spatial.transform import Rotation
+
         angles = self._angles(position[None])
-        angle = np.stack([angles[name] for name in self._names])
-        turned = self._turn * self._rotation.from_rotvec(angle * self._spin)
-        return self._place + self._turn.apply(angle * self._slide), turned.as_quat()
-
-
-def _range(limits: Limits) -> tuple[float, float]:
-    """Where a joint may be, in [rad] or [m]: a turn at most; one that slides without end rests."""
-    if limits.turns:
-        return max(limits.lower, -np.pi), min(limits.upper, np.pi)
-    return (limits.lower, limits.upper) if limits.upper - limits.lower < np.inf else (0.0, 0.0)
+        turns, places = zip(
+            *(scene.pose(joint, angles[joint.name][0]) for joint in self._joints), strict=True
+        )
+        return np.hstack((np.stack(places), Rotation.from_matrix(np.stack(turns)).as_quat()))
 
 
 JOINT_POINTS = 400.0  # points of a joint's line in a second, as a recording of ten seconds has
@@ -481,20 +364,14 @@ class Drawing:
         joint_names: Sequence[str],
         widths: Mapping[str, int],
         labeller: Labeller,
-        warn: Callable[[str], None],
     ) -> None:
         self._sink, self._recording, self._rate = sink, sink.recording, rate
         self._messages = Messages(sink.recording, watched=sink.watched)
         self._spectrogram = SpectrogramStream(rate)
         self._robot: LiveRobot | None = None
-        self._links: LinkLevels | None = None
         if robot is not None:
             floating = "base_pose" in widths
             self._robot = LiveRobot(self._messages, robot, joint_names, floating=floating)
-            try:
-                self._links = LinkLevels(robot, joint_names, rate, floating=floating)
-            except nm.NoiseModelError as error:  # its surface cannot be had
-                warn(f"The links are not coloured: {error}.")
         self._hop, classes = labeller.hop, labeller.classes
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
@@ -560,26 +437,20 @@ class Drawing:
             pose = signals.get("base_pose")
             first = None if pose is None else pose[0]
             self._camera = self._robot.camera(signals["position"][0], first)
-            self._robot.colour(time, (), np.empty(0))
         self.findings(time, ())
         self._recording.send_blueprint(self._layout())
 
-    def piece(self, time: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
-        """Draw the spectrogram and the levels of links of a stretch without missing samples."""
-        velocity = np.where(valid[:, None], signals["velocity"], 0.0)
+    def piece(self, time: Array, valid: Mask, velocity: Array) -> None:
+        """Draw the spectrogram of a stretch without missing samples."""
+        velocity = np.where(valid[:, None], velocity, 0.0)
         end = float(time[-1]) + 1.0 / self._rate
         centres, level = self._spectrogram.push(velocity, valid, end)
         if self._sink.open:
             self._messages.add(BANDS_PATH, nanoseconds(centres), level, _heat_map)
-            if self._links is not None and self._robot is not None:
-                for start, each in self._links.push(signals, end):
-                    self._robot.colour(start, self._links.links, each)
 
     def skip(self) -> None:
         """Begin anew after a gap."""
         self._spectrogram.skip()
-        if self._links is not None:
-            self._links.skip()
 
     def batch(self, time: Array, motion: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
         """Draw the noise, the joints' signals and the robot of the next stretch, where valid."""
@@ -617,8 +488,6 @@ class Drawing:
             self._lane_end = begin + round(1e9 * self._hop)
             points += [begin, int(self._lane_end) - 1]
             shown += 2 * [[label == name for name in self._rows]]
-        if self._sink.late:  # what is not sent leaves a gap
-            self._lane_end = -np.inf
         times = np.array(points, dtype=np.int64)
         self._messages.add("/class/found", times, np.array(shown), _found, urgent=True)
 
@@ -677,7 +546,7 @@ class Drawing:
             left.insert(0, (unstable.drawing("/verdict"), 0.32))
             signals["Scores"] = (SCORES, list(BELOW))
         if self._camera is not None:
-            robot = panels.robot_view(self._camera, coloured=self._links is not None)
+            robot = unstable.robot("Robot", "/robot", self._camera)
             left.insert(len(left) - 1, (robot, 3.4))
         plots = [
             axes.timed(

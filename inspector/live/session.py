@@ -35,7 +35,6 @@ from noisemodel.robot import joint_limits
 from noisemodel.types import Array, Mask
 
 UNSEEN = "samples that the viewer may not have shown"
-LATE_SAMPLES = "samples that were not sent to a late viewer"
 BATCH = 0.05  # samples are worked on in batches of this duration, in [s]
 FASTEST = 1e6  # highest rate, in [Hz]
 MOST_DROPPED = 0.05  # share of the samples that may be left out for a verdict of `ok`
@@ -276,9 +275,7 @@ class LiveSession:
         self._news = News(self._tell, self._labeller.length + SETTLED * self._labeller.hop)
         self._watch = LimitWatch(names, robot) if robot else None
         drawn = robot if "position" in widths else None
-        self._drawing = Drawing(
-            self._sink, self._rate, drawn, names, widths, self._labeller, self._on_warning
-        )
+        self._drawing = Drawing(self._sink, self._rate, drawn, names, widths, self._labeller)
         if self._labeller.remark:
             self._on_warning(self._labeller.remark)
         if robot and drawn is None:
@@ -352,8 +349,7 @@ class LiveSession:
                 self._labeller.skip(int(lost[first]))
                 self._drawing.skip()
             self._label(time[piece], motion[piece], valid[piece])
-            own = {name: signal[piece] for name, signal in signals.items()}
-            self._drawing.piece(time[piece], valid[piece], own)
+            self._drawing.piece(time[piece], valid[piece], signals["velocity"][piece])
         if self._sink.open:
             self._drawing.batch(time, motion, valid, signals)
         if self._watch is not None:
@@ -382,20 +378,16 @@ class LiveSession:
             self._drawing.findings(end, self._found, end - 2 * self._labeller.hop)
 
     def _check_viewer(self, samples: int) -> None:
-        """Count samples until the viewer is known to be there; warn if it is gone or late."""
+        """Count samples until the viewer is known to be there; warn if it is gone."""
         self._unconfirmed += samples
         if self._sink.check_viewer():
             self._unconfirmed = 0
-        if self._sink.gone or self._sink.late:
+        if self._sink.gone:
             self._note_unseen()
 
     def _note_unseen(self) -> None:
         """Count the samples since the viewer was last known to be there and to keep up."""
-        kind, state = UNSEEN, "is gone or hangs"
         rest = "the file goes on" if self._sink.saved else "samples are only labelled and counted"
-        if self._sink.late:
-            kind, state = LATE_SAMPLES, f"is {self._sink.late:.0f} s behind the stream"
-            rest = "it is sent nothing until it has caught up"
-        line = f"the viewer {state}, noticed at {self._now:.3f} s: {rest}"
-        self.note(kind, line, self._unconfirmed)
+        line = f"the viewer is gone or hangs, noticed at {self._now:.3f} s: {rest}"
+        self.note(UNSEEN, line, self._unconfirmed)
         self._unconfirmed = 0

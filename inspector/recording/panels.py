@@ -549,12 +549,10 @@ def log_strip(
     )
 
 
-def robot_view(camera: Camera, *, coloured: bool = True) -> Part:
-    """A robot, and the scale of its colours if it has any."""
-    title = "Robot, links coloured by level above 10 Hz" if coloured else "Robot"
-    robot = unstable.robot(title, "/robot", camera)
-    key = unstable.drawing(f"/axis/{KEY.name}/right")
-    return unstable.beside((robot, 88.0), (key, 12.0)) if coloured else robot
+def robot_view(camera: Camera) -> Part:
+    """A robot, and the scale of its colours."""
+    robot = unstable.robot("Robot, links coloured by level above 10 Hz", "/robot", camera)
+    return unstable.beside((robot, 88.0), (unstable.drawing(f"/axis/{KEY.name}/right"), 12.0))
 
 
 BANDS = 48

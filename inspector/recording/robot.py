@@ -113,12 +113,6 @@ def shapes_by_link(tree: UrdfTree) -> dict[str, list[tuple[str, str]]]:
     return found
 
 
-def coloured(kind: str, shades: NDArray[np.uint8]) -> Iterable[Any]:
-    """Columns of the colours of a shape, shape (steps, 4)."""
-    columns: Iterable[Any] = getattr(rr, kind).columns(**{COLOURED[kind]: shades})
-    return columns
-
-
 def log_robots(
     recording: rr.RecordingStream, runs: Mapping[str, Run], folder: Path, *, aspect: float
 ) -> list[tuple[UrdfTree, Camera]]:
@@ -194,11 +188,12 @@ def angles(tree: UrdfTree, columns: Mapping[str, Array]) -> dict[str, Array]:
     return found
 
 
-def log_shapes(recording: rr.RecordingStream, tree: UrdfTree) -> None:
-    """Log a robot at rest, without its colours."""
+def log_shapes(recording: rr.RecordingStream, tree: UrdfTree, *, coloured: bool = False) -> None:
+    """Log a robot at rest, with its own colours or without."""
     unstable.log_up(recording)
     colours = [":".join(pair) for pair in COLOURED.items()]
-    recording.send_chunks(tree.stream().drop(components=colours))
+    shapes = tree.stream()
+    recording.send_chunks(shapes if coloured else shapes.drop(components=colours))
 
 
 def log_colours(
@@ -220,7 +215,7 @@ def log_colours(
         changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
         index = [axes.at(time[changed])]
         for path, kind in shapes:
-            columns = coloured(kind, own[changed])
+            columns = getattr(rr, kind).columns(**{COLOURED[kind]: own[changed]})
             recording.send_columns(path, indexes=index, columns=columns)
 
 
@@ -459,24 +454,24 @@ def outermost(urdf: Path) -> dict[str, Array]:
 
 
 def reached(
-    tree: UrdfTree, drawn: Mapping[str, Array], angles: Mapping[str, Array], pose: Array | None
+    tree: UrdfTree, drawn: Mapping[str, Array], angles: Mapping[str, Array], base: Array | None
 ) -> Iterator[Array]:
     """Points of each link in all frames, from the place on the floor below the base, in [m].
 
     Args:
         angles: Of joints that move, each of shape (frames,), in [rad] or [m].
-        pose: x, y, z and quaternion x, y, z, w of a base that moves, shape (frames, 7).
+        base: x, y, z and quaternion x, y, z, w of a base that moves, shape (frames, 7).
     """
     from scipy.spatial.transform import Rotation
 
     at_root = np.eye(3), np.zeros(3)
-    if pose is not None:
-        turned = Rotation.from_quat(pose[:, 3:]).as_matrix()
-        at_root = turned, pose[:, :3] * (1.0 - ON_FLOOR)
+    if base is not None:
+        turned = Rotation.from_quat(base[:, 3:]).as_matrix()
+        at_root = turned, base[:, :3] * (1.0 - ON_FLOOR)
     poses = {tree.root_link().name: at_root}
     for joint in outwards(tree):
         turned, shifted = poses[joint.parent_link]
-        own_turn, own_shift = _pose(joint, angles.get(joint.name, np.zeros(())))
+        own_turn, own_shift = pose(joint, angles.get(joint.name, np.zeros(())))
         place = (turned @ own_shift[..., None])[..., 0] + shifted
         poses[joint.child_link] = turned @ own_turn, place
     drawn = drawn or dict.fromkeys(poses, np.zeros((1, 3)))
@@ -487,7 +482,7 @@ def reached(
         yield (placed + shifted.reshape(-1, 3, 1)).swapaxes(1, 2).reshape(-1, 3)
 
 
-def _pose(joint: UrdfJoint, angle: Array) -> tuple[Array, Array]:
+def pose(joint: UrdfJoint, angle: Array) -> tuple[Array, Array]:
     """Pose of a joint's child in the axes of its parent, for each angle in [rad] or [m]."""
     from scipy.spatial.transform import Rotation
 
