@@ -67,12 +67,11 @@ def test_a_louder_fault_never_loses_a_label_that_a_fainter_one_has(noise):
     assert times[-1] == pytest.approx(1.0)
 
 
-def test_a_fault_below_the_noise_has_no_label_and_its_event_says_so():
-    found = logged(run_with(3e-4), TWIN, replace(PLAIN, noise=0.02), seed=1)
-    assert {block.label for block in found.blocks} == {"ok"}
-    assert found.meta["events"][0]["labelled"] == 0.0
-    seen = logged(run_with(0.3), TWIN, replace(PLAIN, noise=0.02), seed=1)
-    assert seen.meta["events"][0]["labelled"] == pytest.approx(1.0)
+@pytest.mark.parametrize(("fault", "labelled"), [(3e-4, 0.0), (0.3, 1.0)])
+def test_a_fault_below_the_noise_has_no_label_and_its_event_says_so(fault, labelled):
+    found = logged(run_with(fault), TWIN, replace(PLAIN, noise=0.02), seed=1)
+    assert ({block.label for block in found.blocks} == {"ok"}) == (labelled == 0.0)
+    assert found.meta["events"][0]["labelled"] == pytest.approx(labelled)
 
 
 def test_a_fault_above_the_log_s_bandwidth_has_no_label():
@@ -108,11 +107,6 @@ def test_differentiated_velocities_have_the_steps_of_the_encoder():
     assert 0.1 * step < np.sqrt(np.mean(error[10:] ** 2)) < step
 
 
-def test_held_samples_repeat():
-    found = logged(TWIN, TWIN, replace(PLAIN, hold=10), seed=1)
-    assert np.array_equal(found.velocity[::10], found.velocity[9::10])
-
-
 def test_lower_rates_have_fewer_samples_and_blocks_within_them():
     found = logged(run_with(0.3), TWIN, replace(PLAIN, rate=125.0), seed=1)
     assert found.rate == pytest.approx(125.0)
@@ -120,7 +114,9 @@ def test_lower_rates_have_fewer_samples_and_blocks_within_them():
     assert max(block.stop for block in found.blocks) <= 5.0
 
 
-def test_desired_velocities_may_be_zero_or_missing():
+def test_desired_velocities_may_be_zero_or_missing_and_held_samples_repeat():
+    held = logged(TWIN, TWIN, replace(PLAIN, hold=10), seed=1).velocity
+    assert np.array_equal(held[::10], held[9::10])
     assert not logged(TWIN, TWIN, replace(PLAIN, desired="zero"), seed=1).velocity_desired.any()
     assert logged(TWIN, TWIN, replace(PLAIN, desired="missing"), seed=1).velocity_desired is None
 

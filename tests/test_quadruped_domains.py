@@ -11,7 +11,7 @@ from noiseclassifier.scenarios.domains import LIMITS, quadruped_motion, steady
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import no_defect
 from noiseclassifier.scenarios.motions import RATE, Trot
-from noiseclassifier.scenarios.quadruped import SHIFT, TILT, poses, stand
+from noiseclassifier.scenarios.quadruped import SHIFT, TILT, stand
 from noiseclassifier.scenarios.quadruped import plan as planned
 from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.simulation import Start, _trial
@@ -93,21 +93,19 @@ def test_the_body_of_a_walk_moves_as_its_feet_push_it():
     np.testing.assert_allclose(walk.push[5:-5], acceleration[5:-5] / GRAVITY, atol=0.01)
 
 
-def test_a_standing_robot_lifts_no_foot_and_moves_its_body():
+def test_a_standing_robot_lifts_no_foot_and_moves_its_body_smoothly():
+    rigid = plan(gait="stand")
+    assert not np.hstack(
+        (rigid.tilt, np.diff(rigid.centre, axis=0, prepend=rigid.centre[:1]))
+    ).any()
     still = plan(gait="stand", posing=(1.0, 1.0))
+    rates = np.gradient(np.hstack((still.tilt, still.centre)), 1e-3, axis=0)
+    assert 0 < np.abs(rates).max() < 1.5
     assert not still.swing.any()
     assert not np.ptp(still.places, axis=0).any()
     assert 0.02 < np.abs(still.tilt).max() <= max(TILT)
     assert 0.01 < np.ptp(still.centre, axis=0).max() / still.units.length < 2 * max(SHIFT)
     np.testing.assert_array_equal(still.tilt[[0, -1]], 0)
-
-
-def test_poses_are_smooth_and_none_without_an_amplitude():
-    time = np.arange(4000) * 1e-3
-    moved = poses(time, np.random.default_rng(1), 1.0, size=0.3)
-    rates = np.gradient(np.hstack(moved), 1e-3, axis=0)
-    assert 0 < np.abs(rates).max() < 1.5
-    assert not np.hstack(poses(time, np.random.default_rng(1), 0.0, size=0.3)).any()
 
 
 def test_a_pause_is_without_steps_and_a_short_run_has_none():
