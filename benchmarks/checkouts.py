@@ -1,24 +1,19 @@
 """Compare noises, features and scores of two checkouts bit for bit.
 
     python benchmarks/checkouts.py --before OLD_CHECKOUT [--after .] [--runs demo my_run.npz …]
-        [--python-before PYTHON] [--python-after PYTHON] [--output build/checkouts]
+        [--output build/checkouts]
 
-The same probe runs in each checkout, by that checkout's Python: its `.venv`, or this one if it has
-none. Inputs are the demo run, simulated runs of four robots (simulated once, in the checkout
-AFTER), and the stand-in for NoisyTest's data set, where `../shared/tools/standin_lola.py` is at
-hand. Compared are the simplified noise, the extended noise of each link, and, for each model file
-that BEFORE ships, which both read, features, decisions and scores of all frames; of two runs also
-the simulated run file. On the stand-in, a model of each kind is trained, and its decisions and
-scores are compared. Labels and findings are not compared: the rule that makes them of scores
-changes from 0.1 to 0.2.
+Each checkout computes by its own code, in the Python of its `.venv`, or in this one. Inputs are the
+demo run and simulated runs of four robots, which the checkout AFTER simulates once. Compared are
+the simplified noise, the extended noise of each link, and, for each model file that BEFORE ships,
+features, decisions and scores of all frames; of two runs also the simulated run file. Labels and
+findings are not compared: the rule that makes them of scores changes from 0.6 to 0.7.
 
-`docs/renamed.csv` says what a checkout that is older than this file calls by another name. Exit
-status 1 if anything differs, or if nothing was compared. Noises of all links take about 1 GB in
-the output folder; inputs stay there for the next time, results are removed at the end.
+Exit status 1 if anything differs, or if nothing was compared. Noises of all links take about 1 GB
+in the output folder; simulated runs stay there for the next time.
 """
 
 import argparse
-import csv
 import filecmp
 import json
 import os
@@ -27,17 +22,14 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[1]
-PROBE = ROOT / "benchmarks" / "checkoutsprobe.py"
-RENAMED = ROOT / "docs" / "renamed.csv"
-STANDIN = ROOT.parent / "shared" / "tools" / "standin_lola.py"
-
 DEMO = ROOT / "assets" / "runs" / "demo.npz"
 
 # Robot, scenario, seed and duration in [s] of a simulated run.
@@ -57,29 +49,33 @@ SIMULATED: dict[str, Case] = {
     "solo12-decalibrated": ("solo12", "decalibrated", 1, 4.0),
     "solo12-multisine": ("solo12", "multisine-30-40", 2, 3.0),
 }
-SHIPPED = ("demo", "lola", *SIMULATED)  # what is compared unless runs are named
-TASKS = ("simulate", "runs", "logs", "train", "models")  # what a probe is given, each by name
+SHIPPED = ("demo", *SIMULATED)  # what is compared unless runs are named
 AGAIN = ("panda-early-height", "go2-force-jump")  # runs that both checkouts simulate
+KINDS = ("paper", "normal")  # kinds of the extended noise that are compared
+CHUNK = 64  # frames whose features are computed at once
+
+
+# --- a checkout, and what it computes
 
 
 @dataclass(frozen=True)
 class Checkout:
-    """A checkout and the Python that runs it."""
+    """A checkout and where its processes keep their caches."""
 
     folder: Path
-    python: Path
     scratch: Path
 
     @classmethod
-    def of(cls, folder: Path, python: Path | None, scratch: Path) -> "Checkout":
-        """Describe a checkout; its Python is that of its `.venv` unless given, or this one.
-
-        What an earlier call has left in its cache is removed: other code may have computed it.
-        """
-        own = folder.resolve() / ".venv" / "bin" / "python"
-        python = python or (own if own.exists() else Path(sys.executable))
+    def of(cls, folder: Path, scratch: Path) -> "Checkout":
+        """A checkout without what an earlier call left in its cache: other code computed it."""
         shutil.rmtree(scratch / "cache", ignore_errors=True)
-        return cls(folder.resolve(), python.absolute(), scratch)
+        return cls(folder.resolve(), scratch)
+
+    @property
+    def python(self) -> Path:
+        """The Python of its `.venv`, or this one."""
+        own = self.folder / ".venv" / "bin" / "python"
+        return own if own.exists() else Path(sys.executable)
 
     @property
     def models(self) -> dict[str, Path]:
@@ -89,24 +85,13 @@ class Checkout:
         return {path.stem: path for path in sorted(found)}
 
     @property
-    def renamed(self) -> dict[str, str]:
-        """Its names by those of this version; nothing of a checkout with the new layout."""
-        return {} if self._nested else {new: old for old, new in reversed(names()) if new}
-
-    @property
-    def _nested(self) -> bool:
-        """Whether the classifier is a package of a name of its own, in `models/`."""
-        return (self.folder / "models" / "noiseclassifier").is_dir()
-
-    @property
-    def _paths(self) -> list[Path]:
-        return [self.folder, *([self.folder / "models"] if self._nested else [])]
-
-    @property
     def environment(self) -> dict[str, str]:
         """Variables of its processes: its own code and caches, one thread."""
+        paths = [self.folder]
+        if (self.folder / "models" / "noiseclassifier").is_dir():  # from 0.7 on
+            paths.append(self.folder / "models")
         return os.environ | {
-            "PYTHONPATH": os.pathsep.join(map(str, self._paths)),
+            "PYTHONPATH": os.pathsep.join(map(str, paths)),
             "PYTHONPYCACHEPREFIX": str(self.scratch / "bytecode"),
             "PYTHONDONTWRITEBYTECODE": "",
             "XDG_CACHE_HOME": str(self.scratch / "cache"),
@@ -114,18 +99,99 @@ class Checkout:
             "OPENBLAS_NUM_THREADS": "1",
         }
 
-    def probe(self, output: Path, **job: Mapping[str, object]) -> None:
-        """Compute results in this checkout."""
+    def compute(
+        self,
+        output: Path,
+        *,
+        cases: Mapping[str, Case],
+        runs: Mapping[str, Path] | None = None,
+        models: Mapping[str, Path] | None = None,
+    ) -> None:
+        """Simulate cases and look at runs in this checkout."""
         output.mkdir(parents=True)
-        tasks = {task: job.get(task, {}) for task in TASKS}
-        place = {"checkout": self.folder, "output": output, "renamed": self.renamed}
+        job = {"checkout": self.folder, "output": output, "cases": cases}
+        job |= {"runs": runs or {}, "models": models or {}}
         file = output.with_suffix(".json")
-        file.write_text(json.dumps({**place, **tasks}, default=str))
-        done = subprocess.run(
-            [self.python, "-P", PROBE, file], cwd=self.folder, env=self.environment, check=False
-        )
+        file.write_text(json.dumps(job, default=str))
+        command = [self.python, "-P", __file__, "--compute", file]
+        done = subprocess.run(command, cwd=self.folder, env=self.environment, check=False)
         if done.returncode:
-            raise SystemExit(f"the probe failed in {self.folder} (exit {done.returncode})")
+            raise SystemExit(f"{self.folder} computes nothing (exit {done.returncode})")
+
+
+def computed(job: Mapping[str, Any]) -> None:
+    """Do a job in the process of a checkout: a file `<output>/<run>/<what>.npz` of each result."""
+    nested = (Path(job["checkout"]) / "models" / "noiseclassifier").is_dir()  # from 0.7 on
+    nm, nc = import_module("noisemodel"), import_module("noiseclassifier" if nested else "models")
+    scenarios = import_module("noiseclassifier.scenarios" if nested else "scenarios")
+    for package in (nm, nc, scenarios):
+        found = Path(str(package.__file__)).resolve()
+        if not found.is_relative_to(job["checkout"]):
+            raise SystemExit(f"{package.__name__} is {found}, not of {job['checkout']}")
+    output = Path(job["output"])
+    for name, (robot, scenario, seed, duration) in job["cases"].items():
+        (output / name).mkdir(parents=True, exist_ok=True)
+        run = scenarios.simulate(robot, scenario, seed, duration=duration)
+        run.save(output / name / "simulated run.npz")
+    models = {name: nc.load(path) for name, path in job["models"].items()}
+    for name, path in job["runs"].items():
+        run = nm.Run.load(path)
+        results = {"simplified noise": {"noise": nm.simplified(run.motion, run.velocity_desired)}}
+        results |= _link_noise(nm, run)
+        for model, found in models.items():
+            results[model] = _scores(nm, nc, run, found)
+        (output / name).mkdir(parents=True, exist_ok=True)
+        for what, arrays in results.items():
+            if arrays:
+                np.savez(output / name / f"{what}.npz", **arrays)
+
+
+def _link_noise(nm: Any, run: Any) -> dict[str, dict[str, Any]]:
+    """The extended noise of a run that has a robot and positions."""
+    if run.robot not in nm.ROBOTS or run.position is None:
+        return {}
+    floating = True if run.base_pose is not None else None
+    robot = nm.Robot.load(run.robot, floating_base=floating)
+    surface, (q, v) = nm.Surface.of(robot), robot.configuration(run)
+    q_desired, v_desired = robot.desired(run) or (None, None)
+    return {
+        f"extended noise, {kind}": {
+            "power": nm.extended(
+                robot, surface, q, v, kind, q_desired=q_desired, v_desired=v_desired
+            ).power
+        }
+        for kind in KINDS
+    }
+
+
+def _scores(nm: Any, nc: Any, run: Any, model: Any) -> dict[str, Any]:
+    """Features and decisions of all frames, and scores as `classify` gives them.
+
+    The run is decimated to the rate of a model of one rate; a run that is slower, or lacks signals,
+    has none. Of a model with a reference, features and decisions are those without it.
+    """
+    signals = {**nm.norms(run), **nm.by_joint(run)}
+    classifier = model.at(run.rate, signals) if hasattr(model, "recipe") else model
+    profile = classifier.profile
+    if run.rate < profile.rate * (1 - 1e-3):
+        return {}
+    if run.rate > profile.rate * (1 + 1e-3):
+        run = nm.decimated(run, profile.rate)
+        signals = {**nm.norms(run), **nm.by_joint(run)}
+    if not set(profile.signals) <= set(signals):
+        return {}
+    given = {one: signals[one] for one in profile.signals}
+    rows = np.vstack(list(given.values()))
+    signal = rows if len(rows) > 1 else rows[0]
+    frames = nc.frame(signal, length=profile.length, hop=profile.hop)
+    parts = np.split(frames, range(CHUNK, len(frames), CHUNK))
+    features = np.concatenate([nc.features(one, profile) for one in parts])
+    labels = classifier.classify(given, profile.rate, valid=run.valid)
+    kept = {"signals": rows, "features": features, "decisions": classifier.decide(features)}
+    return kept | {"start": labels.start, "stop": labels.stop, "scores": labels.scores}
+
+
+# --- two folders of results
 
 
 @dataclass(frozen=True)
@@ -139,12 +205,6 @@ class Comparison:
     def __str__(self) -> str:
         word = "different" if self.differences else "same"
         return f"{word:9}  {self.item}: {'; '.join(self.differences) or self.contents}"
-
-
-def names() -> list[tuple[str, str]]:
-    """Old and new dotted name of each row of the list of renamed names."""
-    with RENAMED.open(newline="") as file:
-        return [(row["old"], row["new"]) for row in csv.DictReader(file)]
 
 
 def compare(before: Path, after: Path) -> list[Comparison]:
@@ -195,57 +255,27 @@ def closing(found: Sequence[Comparison]) -> tuple[str, int]:
     return f"{len(found)} compared: {same} the same, {different} different", int(different > 0)
 
 
-def standin(folder: Path) -> Path | None:
-    """Folder of the stand-in for NoisyTest's data set, made if need be; None without its maker."""
-    if not folder.exists() and STANDIN.exists():
-        fresh = folder.with_suffix(".part")
-        shutil.rmtree(fresh, ignore_errors=True)
-        subprocess.run([sys.executable, STANDIN, fresh], check=True, stdout=subprocess.DEVNULL)
-        fresh.rename(folder)
-    return folder if folder.exists() else None
-
-
-def simulated(checkout: Checkout, folder: Path, cases: Mapping[str, Case]) -> dict[str, Path]:
-    """Run files of simulated runs, by name; those that the folder lacks are simulated."""
-    files = {name: folder / name / "simulated run.npz" for name in cases}
-    for name in [name for name, file in files.items() if not file.exists()]:
-        fresh = folder.with_suffix(".part")
-        shutil.rmtree(fresh, ignore_errors=True)
-        checkout.probe(fresh, simulate={name: cases[name]})
-        folder.mkdir(parents=True, exist_ok=True)
-        (fresh / name).rename(folder / name)
-    return files
-
-
 def compare_checkouts(
     before: Checkout, after: Checkout, folder: Path, wanted: Sequence[str]
 ) -> list[Comparison]:
     """Compute everything in both checkouts, and compare it."""
-    chosen = {name: case for name, case in SIMULATED.items() if name in wanted}
-    runs = simulated(after, folder / "runs", chosen)
+    runs = {Path(name).stem: Path(name).resolve() for name in wanted if name not in SHIPPED}
     runs |= {"demo": DEMO} if "demo" in wanted else {}
-    given = [Path(name).resolve() for name in wanted if name not in SHIPPED]
-    runs |= {path.stem: path for path in given}
-    logs: dict[str, Path] = {}
-    train: dict[str, Path] = {}
-    if "lola" in wanted:
-        if lola := standin(folder / "lola"):
-            paths = sorted(lola.glob("*/*.log"))
-            logs = {f"lola/{path.parent.name}/{path.stem}": path for path in paths}
-            train = {"lola": lola}
-        else:
-            print(f"skipped    lola: its maker is not there ({STANDIN})")
-    simulate = {name: SIMULATED[name] for name in AGAIN if name in wanted}
-    tasks = (simulate, runs, logs, train, before.models)
-    for side, checkout in (("before", before), ("after", after)):
-        shutil.rmtree(folder / side, ignore_errors=True)
-        checkout.probe(folder / side, **dict(zip(TASKS, tasks, strict=True)))
-    versions = [(folder / side / "versions.json").read_text() for side in ("before", "after")]
-    if versions[0] != versions[1]:
-        print(f"caution    not the same packages: {versions[0]} before, {versions[1]} after")
-    found = compare(folder / "before", folder / "after")
-    for side in ("before", "after"):
-        shutil.rmtree(folder / side)
+    for name in (name for name in SIMULATED if name in wanted):
+        runs[name] = folder / "runs" / name / "simulated run.npz"
+        if not runs[name].exists():
+            shutil.rmtree(folder / "fresh", ignore_errors=True)
+            after.compute(folder / "fresh", cases={name: SIMULATED[name]})
+            (folder / "runs").mkdir(exist_ok=True)
+            (folder / "fresh" / name).rename(folder / "runs" / name)
+    cases = {name: SIMULATED[name] for name in AGAIN if name in wanted}
+    sides = {before: folder / "before", after: folder / "after"}
+    for checkout, output in sides.items():
+        shutil.rmtree(output, ignore_errors=True)
+        checkout.compute(output, cases=cases, runs=runs, models=before.models)
+    found = compare(*sides.values())
+    for output in sides.values():
+        shutil.rmtree(output)
     return found
 
 
@@ -254,20 +284,24 @@ def main() -> int:
     arguments = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    arguments.add_argument("--before", type=Path, required=True, metavar="FOLDER")
+    arguments.add_argument("--before", type=Path, metavar="FOLDER")
     arguments.add_argument("--after", type=Path, default=ROOT, metavar="FOLDER")
-    arguments.add_argument("--python-before", type=Path, metavar="PYTHON")
-    arguments.add_argument("--python-after", type=Path, metavar="PYTHON")
     arguments.add_argument(
         "--runs", nargs="+", default=SHIPPED, help=f"of {', '.join(SHIPPED)}, or run files"
     )
     arguments.add_argument("--output", type=Path, default=ROOT / "build" / "checkouts")
+    arguments.add_argument("--compute", type=Path, help=argparse.SUPPRESS)  # in a checkout
     given = arguments.parse_args()
+    if given.compute:
+        computed(json.loads(given.compute.read_text()))
+        return 0
+    if given.before is None:
+        arguments.error("name the older checkout with --before")
     if unknown := [name for name in given.runs if name not in SHIPPED and not Path(name).is_file()]:
         arguments.error(f"no run file {', '.join(unknown)}; known by name: {', '.join(SHIPPED)}")
     folder = given.output.resolve()
-    before = Checkout.of(given.before, given.python_before, folder / "scratch" / "before")
-    after = Checkout.of(given.after, given.python_after, folder / "scratch" / "after")
+    before = Checkout.of(given.before, folder / "scratch" / "before")
+    after = Checkout.of(given.after, folder / "scratch" / "after")
     found = compare_checkouts(before, after, folder, given.runs)
     line, status = closing(found)
     print(*found, line, sep="\n")

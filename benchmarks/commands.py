@@ -44,10 +44,10 @@ def rows(before: Path | None) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write(folder)
-        ours = Checkout.of(ROOT, Path(sys.executable), folder / "ours")
+        ours = Checkout.of(ROOT, folder / "ours")
         sides = {"ours": ours}
         if before:
-            sides["before"] = Checkout.of(before, None, folder / "before")
+            sides["before"] = Checkout.of(before, folder / "before")
         for title, (arguments, seconds, most) in cases(folder).items():
             # An older `view` writes to other options.
             which = {"ours": ours} if arguments[0] == "view" else sides
