@@ -121,13 +121,15 @@ class Checkout:
 
 def computed(job: Mapping[str, Any]) -> None:
     """Do a job in the process of a checkout: a file `<output>/<run>/<what>.npz` of each result."""
-    nested = (Path(job["checkout"]) / "models" / "noiseclassifier").is_dir()  # from 0.7 on
-    nm, nc = import_module("noisemodel"), import_module("noiseclassifier" if nested else "models")
-    scenarios = import_module("noiseclassifier.scenarios" if nested else "scenarios")
-    for package in (nm, nc, scenarios):
-        found = Path(str(package.__file__)).resolve()
-        if not found.is_relative_to(job["checkout"]):
-            raise SystemExit(f"{package.__name__} is {found}, not of {job['checkout']}")
+    folder = Path(job["checkout"])
+    names = ("noisemodel", "models", "scenarios")  # up to 0.6
+    if (folder / "models" / "noiseclassifier").is_dir():
+        names = ("noisemodel", "noiseclassifier", "noiseclassifier.scenarios")
+    for name in names:
+        found = Path(str(import_module(name).__file__)).resolve()
+        if not found.is_relative_to(folder):
+            raise SystemExit(f"{name} is {found}, not of {folder}")
+    nm, nc, scenarios = map(import_module, names)
     output = Path(job["output"])
     for name, (robot, scenario, seed, duration) in job["cases"].items():
         (output / name).mkdir(parents=True, exist_ok=True)
