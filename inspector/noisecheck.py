@@ -129,7 +129,7 @@ class Noise:
             measured.append(_levels(run, scenario, file=file, sha256=store.digest(run)))
             events[file] = self._judged(run, scenario)[1].events
         wanted, by = store.wanted_in(measured, events), store.who()
-        store.accept_into(accepted, measured, wanted=wanted, reason=reason, by=by, renames=False)
+        store.accept_into(accepted, measured, wanted=wanted, reason=reason, by=by)
 
     def _allowed(self, allow: str | Iterable[Allowed]) -> tuple[Allowed, ...]:
         """What may be there, of classes that there are."""

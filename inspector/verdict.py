@@ -293,7 +293,6 @@ class Verdict:
     expectations: str = ""  # the store that was applied
     ignored: bool = False  # in the exit status: bad input
     picture: Path | None = None
-    picture_url: str = ""  # where that will be published
     lost: tuple[str, ...] = ()  # outputs that could not be written, a sentence each
     trace: str = ""  # of an internal error
     begin: float = 0.0  # time of the first sample, in [s]

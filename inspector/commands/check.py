@@ -21,7 +21,7 @@ from inspector.reference.difference import Difference, difference
 from inspector.reference.difference import Gate as DifferenceGate
 from inspector.reference.verdicts import Gate, References, classes_found
 from inspector.report import html
-from inspector.report.formats import DIFF_FORMATS, FORMATS, published, text
+from inspector.report.formats import DIFF_FORMATS, FORMATS, text
 from inspector.report.picture import over_reference, require
 from inspector.text import progress
 from inspector.verdict import UNREAD, Verdict, classify_files, exit_status, read_results
@@ -68,7 +68,6 @@ def classify(
     model: shared.ModelFiles = None,
     write: shared.Write = None,
     report: ReportFolder = None,
-    report_url: shared.ReportUrl = "",
     overwrite: shared.Overwrite = False,
     resume: Resume = None,
     unknown: shared.UnknownFrames = Unknown.FINDING,
@@ -104,11 +103,7 @@ def classify(
     known = {each.path: each for each in progress(classified, "classify", total=len(found))}
     judged = [references.judge(known[path], gate, date.today()) for path in shown]
     verdicts = [
-        replace(
-            each,
-            ignored=on_bad_input == "ignore" and each.status is Status.BAD_INPUT,
-            picture_url=published(each.picture, report, report_url),
-        )
+        replace(each, ignored=on_bad_input == "ignore" and each.status is Status.BAD_INPUT)
         for each in judged
     ]
     verdicts += references.absent(verdicts, [each for each in runs if each.is_dir()])
@@ -180,7 +175,6 @@ def diff(
         Path | None,
         option("Write recording, picture and diff.json of the worst to this folder."),
     ] = None,
-    report_url: shared.ReportUrl = "",
     write: shared.Write = None,
     on_bad_input: shared.OnBadInput = "fail",
     jobs: shared.NumberOfJobs = 1,
@@ -192,7 +186,7 @@ def diff(
     """Compare runs with earlier ones: worse, better or same.
 
     A scenario is worse if it is louder after the change than each run before. Scenarios that are
-    missing, renamed, cut or frozen fail too.
+    missing, cut or frozen fail too.
 
     Exit status: 0 as before, 1 worse, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost.
     """
@@ -207,8 +201,7 @@ def diff(
     _name_failed(found.failed)
     gate = DifferenceGate(fail_on != "worse", fail_on != "new", on_bad_input == "fail")
     drawn = report / PICTURE if report and any(row.worst for row in found.rows) else None
-    address = published(drawn, report, report_url)
-    found = replace(found, gate=gate, picture=drawn, picture_url=address)
+    found = replace(found, gate=gate, picture=drawn)
     shared.end(found.exit_status, shared.written(found, DIFF_FORMATS[format], outputs))
 
 

@@ -103,7 +103,6 @@ OnBadInput = Annotated[Literal["fail", "ignore"], option("What to do with unread
 Write = Annotated[
     list[str] | None, option("FORMAT=FILE: write another format as well; repeatable.")
 ]
-ReportUrl = Annotated[str, option("Where the report's folder is published.")]
 
 
 # --- how logs are read

@@ -19,7 +19,7 @@ from inspector.errors import EXIT, InspectorError, Status, Unknown
 from inspector.errors import worst as worst_code
 from inspector.library import Library
 from inspector.logs.read import Source, sources
-from inspector.reference.judging import Comparison, Kind, Scenario, compare, same_motion
+from inspector.reference.judging import Comparison, Kind, Scenario, compare
 from inspector.reference.levels import HOP, SIGNALS, Levels, levels
 from inspector.reference.store import Reference, of_runs, scenario_of
 from inspector.reference.verdicts import beside
@@ -36,7 +36,6 @@ class Outcome(StrEnum):
     """What became of a scenario, the worst first."""
 
     MISSING = "missing"
-    RENAMED = "renamed"
     FROZEN = "frozen"
     CUT = "cut"
     WORSE = "worse"
@@ -48,7 +47,7 @@ class Outcome(StrEnum):
 
 ORDER = list(Outcome)
 # What fails whatever the levels are.
-BROKEN = (Outcome.MISSING, Outcome.RENAMED, Outcome.FROZEN, Outcome.CUT)
+BROKEN = (Outcome.MISSING, Outcome.FROZEN, Outcome.CUT)
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,6 @@ class Difference:
     gate: Gate = field(default_factory=Gate)
     margin: float = 0.0  # the least one, in [dB]
     picture: Path | None = None  # of the worst scenario
-    picture_url: str = ""  # where that will be published
 
     @property
     def outcome(self) -> Outcome:
@@ -204,8 +202,7 @@ def difference(
     if all(sides) and len(result.alone) == len(rows):
         here, there = (", ".join(list(side)[:3]) for side in sides)
         raise InspectorError(
-            f"{before} and {after} have no run in common, neither by name nor by motion"
-            f" ({here} and {there})"
+            f"{before} and {after} have no scenario in common by name ({here} and {there})"
         )
     return result
 
@@ -238,22 +235,14 @@ def _rows(
 ) -> list[Row]:
     """A row for each scenario of either side."""
     rows, known = [], {name: _scenarios(runs) for name, runs in before.items()}
-    come = [name for name in after if name not in before]
     for name, runs in before.items():
         if name in after:
             rows.append(_row(name, runs, after[name], known[name], margin))
-            continue
-        last = runs[-1].levels
-        to = next((each for each in come if same_motion(after[each][-1].levels, last)), "")
-        if to:
-            come.remove(to)
-            row = _row(name, runs, after[to], known[name], margin)
-            rows.append(replace(row, outcome=Outcome.RENAMED, reason=f"is called {to} after"))
         else:
             reason = f"{len(runs)} before, none after"
             rows.append(Row(name, Outcome.MISSING, reason, _paths(runs)))
     every = [scenario for each in known.values() for scenario in each]
-    for name in come:
+    for name in [name for name in after if name not in before]:
         verdicts = [each.compare(name, every)[1] for each in after[name]]
         findings = tuple(_findings(verdicts, (), NEW))
         paths = _paths(after[name])

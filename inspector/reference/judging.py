@@ -446,11 +446,6 @@ def share_of_motion(run: Levels, other: Levels) -> float:
     return _aligned(run, [other], run.joints)[0].share
 
 
-def same_motion(run: Levels, other: Levels) -> bool:
-    """Whether two runs are one scenario, whatever they are called."""
-    return run.robot == other.robot and share_of_motion(run, other) > SAME_MOTION
-
-
 # --- exceedances
 
 

@@ -33,7 +33,6 @@ from inspector.reference.judging import (
     leave_one_moment_out,
     leave_one_out,
     margin_of,
-    same_motion,
     share_of_motion,
 )
 from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encoded, levels, octaves
@@ -228,13 +227,11 @@ def accept_into(
     wanted: Mapping[str, Sequence[Expected]],
     reason: str,
     by: str,
-    renames: bool = True,
 ) -> tuple[Reference, list[tuple[str, str]]]:
     """Accept runs into a store: their scenarios are added or replaced, all others stay.
 
     Runs of an accepted scenario that are as it is join its repetitions, of which the newest ten
-    stay; runs that differ replace them. A scenario whose logs are gone and whose motion has another
-    name is renamed, if ``renames``.
+    stay; runs that differ replace them.
 
     Returns:
         The store as it is now, and by the names of scenarios what changed.
@@ -244,17 +241,11 @@ def accept_into(
         there = os.path.lexists(folder / NAME)
         kept = {each.name: each for each in (Reference.load(folder).scenarios if there else ())}
         found = of_runs([replace(each, run=_within(each.run, home)) for each in runs])
-        names, changes = {each.name for each in found}, []
+        changes = []
         for new in found:
             facts: dict[str, Any] = {"accepted": date.today(), "by": by, "reason": reason}
             facts["wanted"] = tuple(wanted.get(new.name, ()))
             old = kept.get(new.name)
-            if old is None and renames:
-                others = [each for each in kept.values() if each.name not in names]
-                old = next((each for each in others if _renamed(each, new, home)), None)
-                if old is not None:
-                    del kept[old.name]
-                    changes.append((new.name, f"renamed from {old.name}"))
             if old is None:
                 words = f"new, {counted(len(new.repetitions), 'repetition')}"
                 kept[new.name] = replace(new, **facts)
@@ -288,25 +279,19 @@ def _within(run: str, home: Path) -> str:
     return path.relative_to(home).as_posix() if path.is_relative_to(home) else run
 
 
-def _renamed(old: Scenario, new: Scenario, home: Path) -> bool:
-    """Whether a scenario has got another name: its logs are gone, its motion is the new one's."""
-    gone = not any((home / each.run).exists() for each in old.repetitions)
-    return gone and same_motion(new.repetitions[-1], old.repetitions[-1])
-
-
 def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Scenario, str]:
     """An accepted scenario with new runs, which join its repetitions or replace them, in words."""
     known = {each.sha256 for each in old.repetitions if each.sha256}
     fresh = [each for each in new.repetitions if each.sha256 not in known]
     if not fresh:
-        return replace(old, name=new.name), "unchanged, these runs are accepted already"
-    over = [compare(replace(each, name=old.name), (old,)) for each in fresh]
+        return old, "unchanged, these runs are accepted already"
+    over = [compare(each, (old,)) for each in fresh]
     same = all(
         not each.exceedances and each.scenarios and each.quieter <= _margin(old) for each in over
     )
     repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
     own = {**facts, "wanted": old.wanted if same else facts["wanted"]}
-    changed = calibrated(replace(old, name=new.name, repetitions=repetitions, **own))
+    changed = calibrated(replace(old, repetitions=repetitions, **own))
     worst = max((each.worst for each in over if isfinite(each.worst)), default=float("nan"))
     words = f"{counted(len(fresh), 'repetition')} {'added' if same else 'replace the accepted'}"
     told = f", {worst:+.1f} dB over the reference at most" if isfinite(worst) else ""
@@ -374,7 +359,7 @@ def save(reference: Reference, folder: Path) -> None:
         lines += ["", *_lines(scenario, name, sha256)]
     with replacing(folder / NAME, overwrite=True) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    for path in folder.glob("*.npz"):  # of scenarios that were renamed
+    for path in folder.glob("*.npz"):  # of scenarios that people removed
         if path.name not in names and _holds_levels(path):
             path.unlink(missing_ok=True)
 

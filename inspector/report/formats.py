@@ -92,7 +92,6 @@ class Case:
     seconds: float = 0.0  # that it took
     quiet: bool = False  # whether tables leave it out
     picture: Path | None = None
-    picture_url: str = ""  # where it will be published
     rules: tuple[tuple[str, dict[str, float]], ...] = ()  # of each sentence, and when, in [s]
 
     @property
@@ -282,7 +281,7 @@ def _described(rule: str) -> str:
 
 
 def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
-    """Write a job for its summary or a comment: a table, the worst first, and a linked picture.
+    """Write a job for its summary or a comment: a table, the worst first, and a picture.
 
     Args:
         notes: Title of what does not fail its case.
@@ -294,9 +293,7 @@ def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
         tail += [f"{_cell(remark[:1].upper() + remark[1:])}.", ""]
     worst = next((case for case in ranked if case.picture is not None), None)
     if worst is not None and shown:
-        named = f"Picture of {_code(worst.name)}: {_code(worst.picture)}."
-        drawn = f"![{_cell(worst.name)} over time]({worst.picture_url})"
-        tail += [drawn if worst.picture_url else named]
+        tail += [f"Picture of {_code(worst.name)}: {_code(worst.picture)}."]
     rows = [f"| {_code(case.name)} | {case.words} | {_cell(case.told)} |" for case in shown]
     left = [f"- {_code(case.name)}: {_cell(note)}" for case in ranked for note in case.notes]
     if rows:
@@ -327,18 +324,6 @@ def _cut(head: list[str], lines: list[str], room: int) -> list[str]:
     kept = [line for line, end in zip(lines, ends, strict=True) if end <= room]
     left = len(lines) - len(kept)
     return [*head, *kept, *(["", f"{left} more are left out here."] if left else [])]
-
-
-def published(picture: Path | None, folder: Path | None, address: str) -> str:
-    """Address of a picture; empty if it will not be published, or there is none.
-
-    Args:
-        folder: The folder of the report that it lies in, however deep.
-        address: Where that folder is published; empty if it is not.
-    """
-    if picture is None or folder is None or not address:
-        return ""
-    return f"{address.rstrip('/')}/{quote(picture.relative_to(folder).as_posix())}"
 
 
 # --- verdicts
@@ -477,7 +462,6 @@ def _case(verdict: Verdict) -> Case:
         seconds=verdict.seconds,
         quiet=verdict.status is Status.OK,
         picture=verdict.picture,
-        picture_url=verdict.picture_url,
     )
 
 
@@ -487,15 +471,13 @@ def _span(event: Finding) -> dict[str, float]:
 
 def _of_group(group: Group) -> Case:
     """All runs of a scenario as one case."""
-    drawn = next((each for each in group.verdicts if each.picture), group.worst)
     return replace(
         _case(group.worst),
         name=group.name,
         words=group.words,
         sentences=(*(told(*each) for each in group.found(fails=True)), *group.missing),
         notes=tuple(told(*each) for each in group.found(fails=False)),
-        picture=drawn.picture,
-        picture_url=drawn.picture_url,
+        picture=next((each.picture for each in group.verdicts if each.picture), None),
     )
 
 
@@ -717,7 +699,6 @@ def _of_row(found: Difference, of: diff.Row, place: int) -> Case:
         notes=(*others, *_folded(of, RESOLVED), *of.remarks),
         quiet=of.outcome is diff.Outcome.SAME,
         picture=found.picture if not place else None,
-        picture_url=found.picture_url,
     )
 
 
