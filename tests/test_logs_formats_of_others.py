@@ -177,19 +177,10 @@ FORMATS = (
          "time starts at 0; the first stamp, 42 s, is in meta"),
     ),
     Format(
-        "symbols, numbered from 1", "time_s,q1,dq1,dq_d1",
-        table(f"time_s,{QDQ},{names('dq_d#')}", (P, V, VD)), (P, V, VD),
-    ),
-    Format(
         "symbols, the desired position as qd", "t,q1,dq1,qd1",
         table(f"t,{QDQ},{names('qd#')}", (P, V, PD)), (P, V, PD),
         said=("qd is the desired position, since dq is the velocity (else --map)",
               f"velocity_desired: {METHOD}"),
-    ),
-    Format(
-        "words, numbered", "timestamp,joint_velocity_1,target_velocity_1",
-        table(f"timestamp,{names('joint_velocity_#')},{names('target_velocity_#')}", (V, VD)),
-        (V, VD),
     ),
     Format(
         "a joint's name, then words; a comma ends each line", "time,arm_1_joint_velocity,",
@@ -204,12 +195,6 @@ FORMATS = (
         (UNREAD.format("2 columns", "joint1_target, joint2_target"),),
     ),
     Format(
-        "capitals", "Timestamp,actualJointPosition1,actualJointVelocity1,desiredJointVelocity1",
-        table("Timestamp," + each_of("actualJointPosition#", "actualJointVelocity#",
-                                     "desiredJointVelocity#", first=1), (P, V, VD)),
-        (P, V, VD),
-    ),
-    Format(
         "two arms", "time,left_q_1,left_dq_1,right_q_1,right_dq_1",
         stamped("left_q_1,right_q_1,left_dq_1,right_dq_1", P, V), (P, V), ("left_1", "right_1"),
     ),
@@ -217,12 +202,6 @@ FORMATS = (
         "a legged robot's joints", "t,LF_HAA_q,LF_HAA_dq,LF_HAA_tau",
         table("t,LF_HAA_q,LF_HFE_q,LF_HAA_dq,LF_HFE_dq,LF_HAA_tau,LF_HFE_tau", (P, V, E)),
         (P, V, E), ("LF_HAA", "LF_HFE"),
-    ),
-    Format(
-        "semicolons, units in brackets", "Time [sec]; Joint1 Velocity [rad/s]",
-        table("Time [sec]; Joint1 Position [rad]; Joint2 Position [rad]; Joint1 Velocity [rad/s];"
-              " Joint2 Velocity [rad/s]", (P, V), mark="; "),
-        (P, V), ("Joint1", "Joint2"),
     ),
     Format(
         "decimal commas, degrees in the header", "Time (ms);Joint 1 speed (deg/s)",
@@ -237,6 +216,24 @@ FORMATS = (
         table("Time\tJ1\tJ2\n[s]\t[deg]\t[deg]", (P,), mark="\t", scale={P: DEG}),
         (P,), ("J1", "J2"),
         ("J1 [deg], J2 [deg]: converted from deg, as their names say", f"velocity: {METHOD}"),
+    ),
+    Format(
+        "milliradians, as exponents", "time q1[mrad] dq1[mrad/s] q_d1[mrad] dq_d1[mrad/s]",
+        table("time " + each_of("q#[mrad]", "dq#[mrad/s]", "q_d#[mrad]", "dq_d#[mrad/s]", first=1,
+                                mark=" "), (P, V, PD, VD), mark=" ",
+              scale=dict.fromkeys((P, V, PD, VD), 1e3), number=lambda value: f"{value:20.12E}"),
+        (P, V, PD, VD), said=(
+            "q1[mrad], q2[mrad], q_d1[mrad], q_d2[mrad]: converted from mrad, as their names say",
+            "dq1[mrad/s], dq2[mrad/s], dq_d1[mrad/s], dq_d2[mrad/s]: converted from mrad/s, as"
+            " their names say"),
+    ),
+    Format(
+        "dates with a zone, desired first", "dq_d1,dq1,Time",
+        "dq_d1,dq_d2,dq1,dq2,Time\n" + "".join(
+            f"{row.partition(',')[2]},{row.partition(',')[0]}\n" for row in table(
+                "", (VD, V), stamp=lambda time: f"2023-11-14 23:13:20.{round(100 * time):02}+01:00"
+            ).splitlines()),
+        (V, VD), said=("time starts at 0; the first stamp, 1700000000 s, is in meta",),
     ),
     Format(
         "turns per minute", "time,motor1_speed_rpm",
@@ -264,12 +261,6 @@ FORMATS = (
         for unit, size in (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
         for since, when in ((0, "the start"), (EPOCH, "1970"))
     ),
-    Format(
-        "dates", "time,q1,dq1",
-        stamped(QDQ, P, V,
-                stamp=lambda time: np.datetime64(EPOCH * 1000 + round(1000 * time), "ms")),
-        (P, V), said=(START,),
-    ),
     Format("a separator at the end of each row alone", "time,q1,dq1",
            stamped(QDQ, P, V, end=","), (P, V)),
     Format("NumPy, savetxt with a header", "# time q1 dq1",
@@ -289,14 +280,6 @@ FORMATS = (
            table(f",time,{QDQ}", (P, V), stamp=lambda time: f"{round(100 * time)},{time!r}"),
            (P, V)),
     Format(
-        "no header", "0.0,0.0,0.42,25.1,6.79", table("", (P, V)), (P, V),
-        typed="--columns time,q1,q2,dq1,dq2",
-        options={"columns": ("time", "q1", "q2", "dq1", "dq2")},
-    ),
-    Format("no stamps", "q1,q2,dq1,dq2", table(QDQ, (P, V), stamp=None), (P, V),
-           said=("there are no stamps: 100 Hz, as --rate says",),
-           typed="--rate 100", options={"rate": 100.0}),
-    Format(
         "cells that are nan or empty", "time,q1,dq1", damaged(stamped(QDQ, P, V)), (P, V),
         said=("2 samples without a number, marked as not valid: dq2, the first at 0.05 s",),
         gaps=(5, 10),
@@ -306,8 +289,6 @@ FORMATS = (
         stamped(f"{QDQ},{names('dq_d#')}", P, V, VD, scale=dict.fromkeys((P, V, VD), DEG)),
         (P, V, VD), said=(f"positions and velocities {FOUND}",),
     ),
-    Format("degrees beside radians per second", "time,q1,dq1",
-           stamped(QDQ, P, V, scale={P: DEG}), (P, V), said=(f"positions {FOUND}",)),
     Format("desired positions alone", "time,q1,dq1,q_d1",
            stamped(f"{QDQ},{names('q_d#')}", P, V, PD), (P, V, PD),
            said=(f"velocity_desired: {METHOD}",)),

@@ -6,7 +6,7 @@ from csvlogs import TIME, jittered, log, swing, write
 
 from inspector import read_log
 from inspector.errors import LogError
-from noisemodel import Robot, UnknownJointError, UnknownRobotError
+from noisemodel import UnknownJointError, UnknownRobotError
 
 PANDA = Path(__file__).parents[2] / "shared" / "data" / "panda"
 
@@ -100,30 +100,6 @@ def test_desired_motion_alone_is_refused(tmp_path, others):
     path = write(tmp_path / "log.csv", {"time": TIME, "target_qd_0": TIME} | others)
     with pytest.raises(LogError, match="holds no measured motion, only desired"):
         read_log(path)
-
-
-@pytest.mark.skipif(not PANDA.is_dir(), reason="data/panda is not beside this checkout")
-def test_the_panda_log_is_imported_in_one_call():
-    imported = read_log(PANDA / "measured.csv", desired=PANDA / "desired.csv", robot="panda")
-    run = imported.run
-    assert run.rate == 1000.0
-    assert run.joint_names == tuple(f"panda_joint{number}" for number in range(1, 8))
-    assert run.desired_joint_names == run.joint_names
-    assert run.velocity_desired.shape == run.velocity.shape == run.position.shape
-    assert run.effort.shape == run.velocity.shape
-    assert run.duration == pytest.approx(21.0, abs=2e-3)
-    edges = np.flatnonzero(np.diff(run.mask.astype(int)))
-    assert len(edges) == 8  # four gaps
-    assert np.all(np.diff(edges)[::2] <= 9)  # of 8 ms
-    assert [remark.split(":")[0] for remark in imported.remarks] == [
-        "measured.csv",
-        "measured.csv",
-        "desired.csv",
-        "desired.csv",
-    ]
-    assert "measured.csv: 4 gaps, 0.0343 s in all, the first at 4.9651 s" in imported.remarks[1]
-    configuration, velocity = Robot.load("panda").configuration(run)
-    assert configuration.shape == velocity.shape == (len(run.time), 9)
 
 
 @pytest.mark.skipif(not PANDA.is_dir(), reason="data/panda is not beside this checkout")

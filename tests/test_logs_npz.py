@@ -86,6 +86,17 @@ def test_isaacs_arrays_are_recognised_and_its_root_is_mapped(tmp_path):
         read_log(path, mapping=wrong, rate=200)
 
 
+@pytest.mark.parametrize(
+    "names",
+    [("q", "dq", "q_d", "dq_d"), ("positions", "velocities", "desired_positions", "target_qd")],
+)
+def test_arrays_are_known_by_symbols_and_words(tmp_path, names):
+    signals = [numbers(seed=seed) for seed in range(4)]
+    run = read_log(save(tmp_path, t=TIME, **dict(zip(names, signals, strict=True)))).run
+    found = (run.position, run.velocity, run.position_desired, run.velocity_desired)
+    assert all(map(np.array_equal, found, signals))
+
+
 def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
     path = save(tmp_path, t=TIME, dof_vel=numbers(9))
     run = read_log(path, robot="panda").run

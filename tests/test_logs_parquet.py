@@ -31,6 +31,13 @@ def test_columns_are_read_bit_for_bit(tmp_path, stamps):
     assert "log.parquet: 1 column not read: note" in imported.remarks
 
 
+def test_units_in_the_names_of_columns_are_converted(tmp_path):
+    columns = {"q1 [mrad]": 1e3 * POSITION[:, 0], "dq1_deg_s": np.rad2deg(VELOCITY[:, 0])}
+    run = read_log(wide(tmp_path, time=TIMES, **columns)).run
+    assert np.allclose(run.position[:, 0], POSITION[:, 0], rtol=1e-12)
+    assert np.allclose(run.velocity[:, 0], VELOCITY[:, 0], rtol=1e-12)
+
+
 def test_columns_of_lists_are_arrays_of_joints(tmp_path):
     path = wide(tmp_path, time=TIMES, joint_pos=list(POSITION), qd_logged=list(VELOCITY))
     run = read_log(path, mapping=["velocity=qd_logged"], joints=JOINTS).run

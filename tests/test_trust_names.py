@@ -1,8 +1,6 @@
 """Names that would write to a terminal, a CI's log or a spreadsheet."""
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -16,7 +14,6 @@ from inspector.library import demo_run
 from inspector.text import cell, uncell
 from noisemodel import Block, Run
 
-ROOT = Path(__file__).parents[1]
 HOSTILE = "a\n::error::b\x1b[31m\r"
 SHOWN = r"a\n::error::b\x1b[31m\r"
 
@@ -102,16 +99,3 @@ def test_a_table_has_no_cell_that_a_spreadsheet_would_compute(tmp_path, monkeypa
 def test_a_cell_is_no_formula_and_gives_its_text_back(given_text):
     assert not cell(given_text).startswith(("=", "+", "-", "@"))
     assert uncell(cell(given_text)) == given_text
-
-
-def test_standard_error_of_a_real_process_has_no_control_characters(tmp_path):
-    shutil.copy(demo_run(), tmp_path / f"{HOSTILE}.npz")
-    done = subprocess.run(
-        [sys.executable, "-m", "inspector", "audit", tmp_path],
-        cwd=ROOT,
-        capture_output=True,
-        check=False,
-        text=True,
-    )
-    assert SHOWN in done.stdout + done.stderr
-    assert not set(done.stdout + done.stderr) & set("\x1b\r")
