@@ -420,7 +420,7 @@ def _lag(measured: Real, desired: Real) -> int | None:
 
 TURNS = 4 * np.pi  # largest plausible position of a joint that is not continuous, in [rad]
 FAST = 100.0  # largest plausible velocity of a joint, in [rad/s]
-ROUND_ENDS = (1.0, 100.0)  # ends of the ranges that positions are normalised to
+NORMALISED = 100.0  # largest position that may be a share of a joint's range as well
 
 
 def unit_warnings(run: Run) -> Iterator[str]:
@@ -428,33 +428,22 @@ def unit_warnings(run: Run) -> Iterator[str]:
     if not run.joint_names:
         return
     yield from contradictions(run)
-    if run.position is not None:
-        yield from _angles(run, reach(valid(run, run.position)))
     speeds = reach(valid(run, run.velocity))
+    if run.position is not None:
+        farthest = reach(valid(run, run.position))
+        moving = np.ptp(valid(run, run.velocity), axis=0) > 0
+        far = (farthest > TURNS / 2) & moving
+        enough = np.sum(far) > 1 or (farthest[far] > TURNS).any()
+        if enough and 2 * np.sum(far) >= max(1, np.sum(moving)):
+            joint, largest = run.joint_names[int(np.argmax(farthest))], float(farthest.max())
+            other = " or normalised" if largest <= NORMALISED else ""
+            yield f"positions look like degrees{other} ({joint} reaches {largest:.4g})"
     fast = int(np.argmax(speeds))
     if speeds[fast] > FAST:
         yield (
             f"velocities look like degrees or turns per minute"
             f" ({run.joint_names[fast]} reaches {speeds[fast]:.4g})"
         )
-
-
-def _angles(run: Run, farthest: Real) -> Iterator[str]:
-    """Warnings about positions that reach too far, or stop at round numbers."""
-    largest = float(farthest.max())
-    assert run.position is not None
-    if largest in ROUND_ENDS:
-        there = np.abs(run.position) == largest
-        if np.sum((there[1:] & there[:-1]).any(axis=0)) >= 2:  # for two samples in a row
-            yield f"positions look normalised: several joints stop at {largest:g}"
-            return
-    moving = np.ptp(valid(run, run.velocity), axis=0) > 0
-    far = (farthest > TURNS / 2) & moving
-    enough = np.sum(far) > 1 or (farthest[far] > TURNS).any()
-    if enough and 2 * np.sum(far) >= max(1, np.sum(moving)):
-        other = " or normalised" if largest <= max(ROUND_ENDS) else ""
-        joint = run.joint_names[int(np.argmax(farthest))]
-        yield f"positions look like degrees{other} ({joint} reaches {largest:.4g})"
 
 
 # Speed from which a joint moves, in [rad/s] or [m/s]: pushes on a standing arm peak below.

@@ -48,9 +48,7 @@ def import_(
     for result in import_logs(
         logs,
         output,
-        reading.options,
-        desired=reading.desired,
-        episodes=reading.episodes,
+        reading,
         overwrite=overwrite,
         progress=lambda items, total: progress(items, "import", total=total),
     ):

@@ -189,14 +189,10 @@ def _datasets(group: Any, mapped: Collection[str]) -> dict[str, Any]:
 
 def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...]:
     rows = [f"{counted(len(episodes), 'episode')}: {listed(episodes)}"] if episodes[0] else []
-
-    def add(name: str, each: Any) -> None:
-        if isinstance(each, h5py.Dataset):
-            rows.append(f"{name}  {each.dtype} {each.shape}")
-
     try:
         with h5py.File(path) as file:
-            (file[f"{home}/{episodes[0]}"] if home else file).visititems(add)
+            found = _datasets(file[f"{home}/{episodes[0]}"] if home else file, ())
+            rows += (f"{name}  {each.dtype} {each.shape}" for name, each in found.items())
     except DAMAGE as error:
         raise LogError(path, f"{episodes[0] or 'it'} is damaged ({one_line(error)})") from error
     return tuple(rows)

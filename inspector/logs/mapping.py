@@ -559,13 +559,7 @@ def _meaning(
         return signal, ""
     signal, joint = known
     number, first = number_of(joint), naming.first
-    if number is not None and joints and joint not in joints:
-        if not first <= number < first + len(joints):
-            raise LogError(
-                log.path,
-                f"column {field.name!r} has number {number}, the robot's joints are {first} to"
-                f" {len(joints) - 1 + first} ({', '.join(joints)}); map it with --map",
-            )
+    if number is not None and joint not in joints and first <= number < first + len(joints):
         return signal, joints[number - first]
     if isinstance(joint, int):
         return signal, numbered.get(joint, f"joint_{joint}")

@@ -149,8 +149,6 @@ FACTORS: Mapping[float, str] = {
     180 / np.pi: "velocities look like degrees per second beside positions in radians",
     np.pi / 180: "positions look like degrees beside velocities in radians per second",
     30 / np.pi: "velocities look like turns per minute beside positions in radians",
-    1 / 6: "velocities look like turns per minute beside positions in degrees",
-    1 / (2 * np.pi): "velocities look like turns per second beside positions in radians",
 }
 # Largest relative deviation from a factor, less than half the distance of two of them.
 NEAR_FACTOR = 0.02

@@ -111,6 +111,16 @@ def _module_of(path: Path) -> str:
 # Runs of logs
 
 
+@dataclass(frozen=True)
+class Reading:
+    """How logs are opened."""
+
+    options: ReadOptions = field(default_factory=ReadOptions)  # their robot is for run files too
+    desired: Path | None = None  # another log with the desired motion, for a single log
+    episodes: tuple[str, ...] = ()  # to be taken of a data set, all unless given
+    without_robot: bool = False  # a run is taken without the robot that it names
+
+
 def read_log(
     path: str | Path,
     *,
@@ -144,12 +154,9 @@ def read_log(
         1000.0
     """
     path = Path(path)
-    readers = readers_of(
-        path,
-        read_options(mapping, **options),
-        desired=Path(desired) if desired else None,
-        episodes=None if episode is None else [episode],
-    )
+    wanted = () if episode is None else (episode,)
+    reading = Reading(read_options(mapping, **options), Path(desired) if desired else None, wanted)
+    readers = readers_of(path, reading)
     if len(readers) > 1:
         raise LogError(
             path,
@@ -167,40 +174,28 @@ def read_logs(
     episodes: Sequence[str] | None = None,
 ) -> Iterator[Imported]:
     """Runs of a log, an episode each, read one by one; arguments and errors of `read_log`."""
-    readers = readers_of(
-        Path(path),
-        options or ReadOptions(),
-        desired=Path(desired) if desired else None,
-        episodes=episodes,
-    )
-    for read in readers.values():
+    other = Path(desired) if desired else None
+    reading = Reading(options or ReadOptions(), other, tuple(episodes or ()))
+    for read in readers_of(Path(path), reading).values():
         yield read()
 
 
-def readers_of(
-    path: Path,
-    options: ReadOptions,
-    *,
-    desired: Path | None = None,
-    episodes: Sequence[str] | None = None,
-) -> dict[str, Callable[[], Imported]]:
-    """What reads each run of a log, by its episode; arguments and errors as for `read_logs`.
-
-    The name of a log without episodes is empty.
-    """
+def readers_of(path: Path, reading: Reading) -> dict[str, Callable[[], Imported]]:
+    """What reads each run of a log, by its episode, whose name is empty in a log without."""
+    options = reading.options
     robot = Robot.load(options.robot) if options.robot else None
     opened = open_log(path, options)
-    other = open_log(desired, options) if desired else None
+    other = open_log(reading.desired, options) if reading.desired else None
     for episode in opened.episodes:
         if (shown := printable(episode)) != episode:
             raise LogError(path, f"an episode is called {shown}, which has control characters")
-    for episode in episodes or ():
+    for episode in reading.episodes:
         if episode not in opened.episodes:
             known = listed(opened.episodes) or "no episodes"
             raise LogError(path, f"there is no episode {episode!r}; it has {known}")
     return {
         episode: partial(_read_episode, path, opened, other, episode, options, robot)
-        for episode in episodes or opened.episodes
+        for episode in reading.episodes or opened.episodes
     }
 
 
@@ -238,16 +233,6 @@ def _read_episode(
 
 
 # Run files and logs alike
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How logs are opened."""
-
-    options: ReadOptions = field(default_factory=ReadOptions)  # their robot is for run files too
-    desired: Path | None = None  # another log with the desired motion, for a single log
-    episodes: tuple[str, ...] = ()  # to be taken of a data set, all unless given
-    without_robot: bool = False  # a run is taken without the robot that it names
 
 
 @dataclass(frozen=True)
@@ -298,12 +283,9 @@ def open_source(source: Source, reading: Reading | None = None) -> Opened:
         raise LogError(source.shown, "its name has control characters; rename it")
     run = _run_file(source.path, reading)
     if run is None:
-        (imported,) = read_logs(
-            source.path,
-            reading.options,
-            desired=reading.desired,
-            episodes=[source.episode] if source.episode else None,
-        )
+        episodes = (source.episode,) if source.episode else ()
+        (read,) = readers_of(source.path, replace(reading, episodes=episodes)).values()
+        imported = read()
         return Opened(imported.run, assumed(imported, source.path), source)
     robot = reading.options.robot
     if robot:
@@ -410,7 +392,7 @@ def _episodes(path: Path, reading: Reading) -> tuple[str, ...]:
     if not _is_folder(path) and _is_npz(path):
         return ("",)
     try:
-        return tuple(readers_of(path, reading.options, episodes=reading.episodes or None))
+        return tuple(readers_of(path, reading))
     except (InspectorError, NoiseModelError):
         return reading.episodes or ("",)
 
@@ -463,10 +445,8 @@ class Written:
 def import_logs(
     logs: Sequence[Path],
     output: Path,
-    options: ReadOptions,
+    reading: Reading,
     *,
-    desired: Path | None = None,
-    episodes: Sequence[str] = (),
     overwrite: bool = False,
     progress: Callable[[Iterable[Any], int], Iterable[Any]],
 ) -> Iterator[Written]:
@@ -474,12 +454,12 @@ def import_logs(
     logs = [log for path in logs for log in logs_in(path)[0]]
     also_reading(logs)
     several = len(logs) > 1
-    if desired and several:
-        raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
+    if reading.desired and several:
+        raise InspectorError(f"{reading.desired}: belongs to one log, {len(logs)} are given")
     jobs: list[tuple[str, Callable[[], Imported]]] = []
     for log in logs:
         try:
-            found = readers_of(log, options, desired=desired, episodes=episodes or None)
+            found = readers_of(log, reading)
             jobs += ((_name(log, episode), read) for episode, read in found.items())
         except (InspectorError, NoiseModelError) as error:
             if not several:
