@@ -113,18 +113,22 @@ def test_a_session_shows_everything(panda):
 def test_findings_are_listed_as_they_come_and_are_those_of_the_summary(tmp_path, library):
     path, _, summary = shown(tmp_path, motion(4.0), library=library)
     assert summary.findings
-    time, texts = read(path, "/report", "TextDocument:text")
-    assert texts[0] == ["### ok so far\n\n"]
-    assert any(" since " in text[0] for text in texts[1:-1])  # while it lasts
-    for event in summary.findings:
-        line = f"- **{spoken(event.label)}**, {event.start:.2f} s to {event.stop:.2f} s"
-        assert line in texts[-1][0]
-        later = [at for at, text in zip(time, texts, strict=True) if spoken(event.label) in text[0]]
-        assert event.start < later[0] < event.stop + 1.0
+    time, words = read(path, "/verdict/words", "Points2D:labels")
+    assert words[0] == ["PASS so far"]
+    (label,) = {spoken(event.label) for event in summary.findings}
+    assert words[-1] == [f"FAIL   {len(summary.findings)} {label}"]
+    assert summary.findings[0].start < time[1] < summary.findings[0].stop + 1.0
     listed, lines = read(path, "/events", "TextLog:text")
-    found = [line[0] for line in lines if line[0].startswith("found: ")]
-    assert found == [f"found: {spoken(e.label)} from {e.start:.2f} s" for e in summary.findings]
-    np.testing.assert_allclose(listed[-len(found) :], [e.start for e in summary.findings])
+    for kind in ("start", "stop"):
+        begins = "found: " if kind == "start" else "over: "
+        own = [(at, line) for at, (line,) in zip(listed, lines, strict=True) if begins in line]
+        expected = [getattr(event, kind) for event in summary.findings]
+        np.testing.assert_allclose([at for at, _ in own], expected)
+        for event, (_, line) in zip(summary.findings, own, strict=True):
+            span = f", {event.start:.2f} s to {event.stop:.2f} s, score {event.score:.2f}"
+            assert line == begins + label + {
+                "start": f" from {event.start:.2f} s", "stop": span,
+            }[kind]  # fmt: skip
 
 
 def window(path):
@@ -149,7 +153,7 @@ def test_plots_show_the_last_ten_seconds_and_nothing_lies_before_the_start(
     assert ranges
     assert all((each["start"], each["end"]) == (-10_000_000_000, 0) for each in ranges)
     for entity in entities(path):
-        for component in ("Scalars:scalars", "Measurements:values", "TextDocument:text"):
+        for component in ("Scalars:scalars", "Measurements:values", "TextLog:text"):
             time, _ = read(path, entity, component)
             assert time is None or time.min() >= start
 

@@ -7,14 +7,11 @@ from inspector.compare.pair import (
     Align,
     align,
     alike,
-    by_link,
     changes,
     compare,
     largest_change,
-    link_steps,
     part,
     report,
-    shared_links,
     spectra,
     steps,
     summary,
@@ -78,8 +75,7 @@ def test_a_run_and_itself_differ_by_nothing(itself):
     for joint in ("", "panda_joint2"):
         before, after = spectra(itself, joint)
         assert (before.amplitude == after.amplitude).all()
-    assert (link_steps(itself, shared_links(itself))[1] == 0).all()
-    every = [*by_link(itself), *(c.level for c in changes(itself)), whole(itself)]
+    every = [*(c.level for c in changes(itself)), whole(itself)]
     assert {level.change for level in every} == {0.0}
     found = changes(itself)
     assert len(found) == len(itself.before.findings) > 0
@@ -105,11 +101,11 @@ def test_a_run_that_starts_later_is_found_to_and_differs_by_nothing(tmp_path, li
 def test_a_run_twice_as_loud_is_6_db_louder_everywhere(tmp_path):
     pair = compared(tmp_path, panda(), panda(2.0))
     assert whole(pair).change == pytest.approx(LOUDER)
-    moved = [link.change for link in by_link(pair)]
-    assert moved == pytest.approx([LOUDER] * len(moved))
-    time, change = link_steps(pair, [by_link(pair)[0].name])
-    rattling = (time >= 0.5) & (time < 0.95)
-    np.testing.assert_allclose(change[rattling], LOUDER)
+    time, level = steps(pair)
+    rattling = (time >= 0.55) & (time < 0.95)
+    np.testing.assert_allclose(np.diff(level[rattling], axis=1), LOUDER)
+    before, after = (noise.vibration for noise in pair.links)
+    np.testing.assert_allclose(after, 4.0 * before, rtol=1e-9)
 
 
 def test_events_of_one_class_that_overlap_are_unchanged_and_the_others_new_or_resolved(itself):
@@ -284,12 +280,10 @@ def test_only_the_stretch_that_both_cover_is_compared_and_blocks_move_with_their
         ({"robot": "panda_collision"}, "panda and panda_collision are two robots"),
     ],
 )
-def test_links_of_what_is_not_one_robot_are_not_compared(tmp_path, changed, why):
+def test_what_is_not_one_robot_is_not_shown(tmp_path, changed, why):
     pair = compared(tmp_path, panda(), panda(**changed))
     assert pair.links is None
-    assert by_link(pair) == ()
-    assert f"- Links are not compared: {why}." in report(pair)
-    assert "#### Links" not in report(pair)
+    assert f"- The robots are not shown: {why}." in report(pair)
 
 
 def test_what_only_one_run_has_is_left_out_and_silence_in_both_is_no_change(tmp_path):

@@ -154,10 +154,8 @@ def _picture(run: Path, output: Path, request: Request) -> None:
             recording = Path(folder) / "run.rrd"
             seconds = sonification.worst_time(found) if at is None else at
             write(found, recording, beside=beside)
-        complaints = viewer.shoot(recording, output, seconds, overwrite=request.overwrite)
+        viewer.shoot(recording, output, seconds, overwrite=request.overwrite)
     typer.echo(f"{output}: {run} at {seconds:.2f} s")
-    for complaint in complaints:
-        typer.echo(f"  the viewer reports: {complaint}", err=True)
 
 
 def _page(run: Path, output: Path, request: Request) -> None:
@@ -229,7 +227,7 @@ def _two(runs: list[Opened], target: Path, request: Request) -> None:
 
     before, after = runs
     how = Align(request.align or "auto")
-    pair = compare(before, after, request.library, how=how, kind=request.kind)
+    pair = compare(before, after, request.library, how=how)
     write(pair, target, overwrite=request.overwrite)
     typer.echo(f"{before.source.shown} → {after.source.shown}: {summary(pair)}")
     typer.echo(f"  aligned {pair.alignment}")

@@ -17,7 +17,7 @@ import numpy as np
 
 from inspector.analysis import Analysis, analyse, robot_known, with_links, worst_signal
 from inspector.errors import InspectorError
-from inspector.levels import FLOOR_DB, STEP, Spectrogram, link_levels, spectrogram
+from inspector.levels import FLOOR_DB, STEP, Spectrogram, spectrogram
 from inspector.library import Library
 from inspector.logs.read import Opened, open_run
 from inspector.report.findings import spoken
@@ -25,7 +25,7 @@ from noiseclassifier import Event
 from noiseclassifier.matching import spans_of, union
 from noisemodel import Block, Run, decimated
 from noisemodel import robot as robots
-from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
+from noisemodel.noise import LinkNoise, decibel, vibrating
 from noisemodel.run import part
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
@@ -272,7 +272,6 @@ def compare(
     *,
     how: Align = Align.AUTO,
     robot: bool = True,
-    kind: str = "normal",
 ) -> Pair:
     """Two runs, aligned and analysed."""
     opened = [run if isinstance(run, Opened) else open_run(run) for run in (before, after)]
@@ -280,11 +279,10 @@ def compare(
     alignment = align(one, other, how)
     one, other, left_out = together(one, other, alignment)
     missing = _no_links(one, other) if robot else ""
-    shown_kind = kind if robot and not missing else ""
     sides = []
     for each, run in zip(opened, (one, other), strict=True):
         found = analyse(run, library, name=each.source.shown.stem, sha256=each.sha256)
-        found = with_links(found, shown_kind)
+        found = with_links(found, "normal" if robot and not missing else "")
         sides.append(replace(found, missing=(), assumed=each.assumed))
     told: dict[str, str] = {}
     for name, side in zip(("Before", "After"), sides, strict=True):
@@ -305,26 +303,21 @@ def compare(
 
 
 def _no_links(before: Run, after: Run) -> str:
-    """Why the links of two runs cannot be compared; empty if they can."""
+    """Why the robots of two runs are not shown; empty if they are."""
     for which, run in zip(SIDES, (before, after), strict=True):
         if not robot_known(run) or run.position is None:
             lacking = "positions" if robot_known(run) else "robot that is known"
-            return f"Links are not compared: the run {which} has no {lacking}."
+            return f"The robots are not shown: the run {which} has no {lacking}."
     files = [robots.locate(run.robot).read_bytes() for run in (before, after) if run.robot]
     if before.robot != after.robot and files[0] != files[1]:
-        return f"Links are not compared: {before.robot} and {after.robot} are two robots."
+        return f"The robots are not shown: {before.robot} and {after.robot} are two robots."
     return ""
-
-
-# Links that are quieter than the loudest peak by more than this have no difference.
-LINK_RANGE_DB = 40.0
 
 
 @dataclass(frozen=True)
 class Level:
-    """How loud something is before and after, in [dB]."""
+    """How loud both runs are, in [dB]."""
 
-    name: str
     before: float
     after: float
 
@@ -357,53 +350,18 @@ def steps(pair: Pair) -> tuple[Array, Array]:
     return pair.time[firsts] + (lengths - 1) / 2 / pair.rate, level
 
 
-def within(pair: Pair, start: float, stop: float, name: str = "") -> Level:
+def within(pair: Pair, start: float, stop: float) -> Level:
     """The level of both noises, above 10 Hz, in a stretch of time, in [dB re 1 rad/s]."""
     first, last = (max(0, round((each - pair.time[0]) * pair.rate)) for each in (start, stop))
     count = max(int(pair.valid[first:last].sum()), 1)
     power = [np.sum(fast[first:last] ** 2) / count for fast in pair.vibration]
     before, after = np.maximum(decibel(np.array(power)), FLOOR_DB).tolist()
-    return Level(name, before, after)
+    return Level(before, after)
 
 
 def whole(pair: Pair) -> Level:
     """The level of both noises, above 10 Hz, in all of the time that they share."""
-    return within(pair, float(pair.time[0]), float(pair.time[-1]) + 1 / pair.rate, "whole")
-
-
-def by_link(pair: Pair) -> tuple[Level, ...]:
-    """The power of each link's vibration in [dB re 1 pW], the largest change first."""
-    if pair.links is None:
-        return ()
-    names = shared_links(pair)
-    before, after = (
-        noise.vibration.mean(axis=0)[[noise.links.index(name) for name in names]]
-        for noise in pair.links
-    )
-    order = np.argsort(-np.abs(after - before), kind="stable")
-    levels = (decibel(power / REFERENCE_POWER) for power in (before, after))
-    rows = np.stack(tuple(levels), axis=1)[order].tolist()
-    return tuple(Level(names[i], *row) for i, row in zip(order.tolist(), rows, strict=True))
-
-
-def link_steps(pair: Pair, names: Sequence[str]) -> tuple[Array, Array]:
-    """Starts of steps of 50 ms in [s], and changes of links' levels, shape (steps, links)."""
-    assert pair.links is not None
-    found = [link_levels(noise) for noise in pair.links]
-    both = [
-        level[:, [noise.links.index(name) for name in names]]
-        for noise, (_, level) in zip(pair.links, found, strict=True)
-    ]
-    loudest = max(float(level.max(initial=-np.inf)) for level in both)
-    floor = loudest - LINK_RANGE_DB if np.isfinite(loudest) else 0.0
-    before, after = (np.maximum(level, floor) for level in both)
-    return found[0][0], after - before
-
-
-def shared_links(pair: Pair) -> tuple[str, ...]:
-    """The links that both have."""
-    assert pair.links is not None
-    return tuple(name for name in pair.links[0].links if name in pair.links[1].links)
+    return within(pair, float(pair.time[0]), float(pair.time[-1]) + 1 / pair.rate)
 
 
 # In the order in which they matter.
@@ -459,21 +417,15 @@ def changes(pair: Pair) -> tuple[Change, ...]:
 def largest_change(pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
     """Start and stop of what is to be shown first, in [s].
 
-    The failure in which the level changed most, new before louder before resolved before quieter
-    ones; of runs without such, the largest change of level.
+    The failure whose level changed most, new before louder before resolved before quieter ones; of
+    runs without such, the largest change of level.
     """
-    time, level = steps(pair)
-    change = np.abs(level[:, 1] - level[:, 0])
-
-    def most(each: Change) -> float:
-        inside = (time > each.start - STEP) & (time < each.stop + STEP)
-        return float(change[inside].max(initial=0.0))
-
     changed = [each for each in found if each.kind != UNCHANGED]
     if changed:
-        worst = min(changed, key=lambda each: (KINDS.index(each.kind), -most(each)))
+        worst = min(changed, key=lambda each: (KINDS.index(each.kind), -abs(each.level.change)))
         return max(worst.start, float(pair.time[0])), min(worst.stop, float(pair.time[-1]))
-    place = float(time[change.argmax()])
+    time, level = steps(pair)
+    place = float(time[np.abs(level[:, 1] - level[:, 0]).argmax()])
     return place - STEP, place + STEP
 
 
@@ -487,9 +439,6 @@ def failures(pair: Pair, side: Analysis) -> Sequence[Event | Block]:
 def labelled(pair: Pair) -> bool:
     """Whether both runs could be labelled, so that findings are what is matched."""
     return pair.before.labels is not None and pair.after.labels is not None
-
-
-SHOWN_LINKS = 10
 
 
 def verdict(pair: Pair) -> tuple[str, str]:
@@ -527,10 +476,6 @@ def report(pair: Pair) -> str:
         title = "finding" if labelled(pair) else "annotated"
         parts += [_table(("", title, "time [s]", "before [dB]", "after [dB]", "change"), events)]
     parts += [_largest(pair), f"Aligned {pair.alignment}. Levels above 10 Hz in dB re 1 rad/s."]
-    if links := by_link(pair)[:SHOWN_LINKS]:
-        rows = [(link.name, *_numbers(link)) for link in links]
-        parts += ["#### Links", _table(("link", "before", "after", "change"), rows)]
-        parts += ["Sound power above 10 Hz, in dB re 1 pW; the largest changes first."]
     if pair.remarks:
         parts += ["#### Remarks", "\n".join(f"- {remark}" for remark in pair.remarks)]
     return "\n\n".join(parts) + "\n"

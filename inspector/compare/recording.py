@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,10 +19,8 @@ from inspector.compare.pair import (
     UNCHANGED,
     Change,
     Pair,
-    by_link,
     changes,
     largest_change,
-    link_steps,
     report,
     spectra,
     steps,
@@ -33,7 +30,7 @@ from inspector.compare.pair import (
 from inspector.levels import LINKS, SPECTRUM, link_levels
 from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.axes import Label, Panel, Timed
-from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Drawn, Signal, found_stretches
+from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Drawn, found_stretches
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.findings import classes_of, spoken
@@ -158,65 +155,24 @@ def _occurs(side: Analysis, name: str) -> bool:
     )
 
 
-JOINT_POINTS = 2000  # points of a line: there are three for each signal of a joint
+JOINT_POINTS = 2000  # points of a line: there are two for each signal of a joint
 
 
 def log_joints(
     recording: rr.RecordingStream, pair: Pair, limbs: Mapping[str, tuple[str, ...]]
 ) -> list[Part]:
-    """Log the joints' signals of both runs, paler before, and after less before: tabs of limbs."""
-    before, after = (
-        {f"{'desired ' * each.desired}{each.kind}": each for each in panels.signals(side.run)}
-        for _, side in pair.sides
-    )
+    """Log the joints' signals of both runs, paler before: tabs of limbs."""
     plots: dict[str, list[Drawn]] = {}
-    for name in dict.fromkeys([*after, *before]):
-        was, now = before.get(name), after.get(name)
-        for what, signal, mask in (
-            ("before", was, pair.before.run.mask),
-            ("after", now, pair.after.run.mask),
-            ("change", _difference(was, now), pair.valid),
-        ):
-            if signal is not None and mask.any():
-                change, path = what == "change", f"/joints/{name.replace(' ', '_')}/{what}"
-                drawn = (path, signal, mask, "" if change else f" {what}", what == "before")
-                title = f"{'change of ' * change}{name} [{signal.unit}]"
-                plots.setdefault(title, []).append(drawn)
+    for side, each in pair.sides:
+        for signal in panels.signals(each.run):
+            name = f"{'desired ' * signal.desired}{signal.kind}"
+            path = f"/joints/{name.replace(' ', '_')}/{side}"
+            drawn = (path, signal, each.run.mask, f" {side}", side == "before")
+            plots.setdefault(f"{name} [{signal.unit}]", []).append(drawn)
     return panels.log_plots(recording, pair.time, plots, limbs, JOINT_POINTS)
 
 
-def _difference(before: Signal | None, after: Signal | None) -> Signal | None:
-    """A signal after less before, of the joints that are in both."""
-    if before is None or after is None:
-        return None
-    joints = tuple(name for name in after.joints if name in before.joints)
-    was, now = (
-        np.asarray(each.values[:, [each.joints.index(name) for name in joints]], dtype=np.float64)
-        for each in (before, after)
-    )
-    return replace(after, values=now - was, joints=joints)
-
-
-SHOWN_LINKS = 8  # links that have a row, those that changed most
 KEY = Panel("key", 260.0)  # the scale beside the robots
-
-
-def log_links(recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair: Pair) -> Part:
-    """Colour both robots by their links' noise; the changes of those that changed most."""
-    assert pair.links is not None
-    scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
-    for tree, noise in zip(trees.values(), pair.links, strict=True):
-        panels.log_robot_levels(recording, tree, noise, scale)
-    axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
-    own = [level.name for level in by_link(pair)[:SHOWN_LINKS]]
-    time, change = link_steps(pair, own)
-    edges = np.append(time, max(float(pair.time[-1]) + 1.0 / pair.rate, float(time[-1])))
-    title, unit, every = "Links, change", ", change [dB]", range(len(own))
-    return panels.log_strip(
-        recording, "links", title, edges, change, own, every, CHANGE, unit, DETAILS
-    )[0]
-
-
 ABOVE = 240.0  # least height of the report and the robots
 TITLES = 28.0  # height of a row of tabs
 
@@ -246,7 +202,7 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
 def _log_robots(
     recording: rr.RecordingStream, pair: Pair, folder: Path
 ) -> tuple[dict[str, UrdfTree], list[Timed]]:
-    """Log the robot before and after, as two robots, and the scale of their colours."""
+    """Log the robot before and after, as two robots, coloured by the levels of their links."""
     if pair.links is None:
         return {}, []
     runs = {side: each.run for side, each in pair.sides}
@@ -256,13 +212,16 @@ def _log_robots(
         for side, (_, camera) in robots.items()
     ]
     trees = {side: tree for side, (tree, _) in robots.items()}
+    scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
+    for tree, noise in zip(trees.values(), pair.links, strict=True):
+        panels.log_robot_levels(recording, tree, noise, scale)
+    axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
     return trees, [*views, (unstable.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 
 def _log_details(recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree]) -> Part:
-    """Log what lies behind each other: links, spectra, noise, signals of joints."""
-    parts = [log_links(recording, trees, pair)] if trees else []
-    parts += [*log_spectra(recording, pair, _joint(pair)), log_noise(recording, pair)]
+    """Log what lies behind each other: spectra, noise, signals of joints."""
+    parts = [*log_spectra(recording, pair, _joint(pair)), log_noise(recording, pair)]
     names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
     limbs = panels.limbs(tuple(names), trees.get("after"))
     parts += log_joints(recording, pair, limbs)

@@ -350,7 +350,6 @@ SHOWN = 10.0  # time that plots reach back, in [s]
 NOISE, BANDS_PATH, SCORES = "/noise/simplified", "/spectrogram/bands", "/score"
 NOISE_PANEL = Panel("noise", 130.0)
 SPECTROGRAM_PANEL, SIGNALS_PANEL = Panel("spectrogram", 150.0), Panel("signals", 390.0)
-NEWEST = 8  # findings that are shown in words; the others are counted
 
 
 class Drawing:
@@ -379,7 +378,7 @@ class Drawing:
             Panel("class", panels.ROW * len(self._rows) + axes.AXIS) if classes else None
         )
         self._lane_end = -np.inf  # until when the class of the latest frame is drawn, in [ns]
-        self._told = ""  # findings that are drawn
+        self._told: str | None = None  # findings of the verdict that is drawn
         self._begun = False
         self._camera: Camera | None = None
         self._plots: dict[str, dict[str, slice]] = {}  # columns of each entity, by signal
@@ -491,33 +490,22 @@ class Drawing:
         times = np.array(points, dtype=np.int64)
         self._messages.add("/class/found", times, np.array(shown), _found, urgent=True)
 
-    def findings(self, time: float, found: Sequence[Event], latest: float = np.inf) -> None:
-        """Show the findings so far in a document; those that reach the latest time last."""
-        if self._classes is None:
-            return
-        lines = []
-        for event in reversed(found):
-            lasts = event.stop >= latest
-            when = f"since {event.start:.2f} s" if lasts else interval(event.start, event.stop)
-            name = spoken(event.label)
-            lines.append(f"- **{name}**, {when}, score {event.score:.2f}{event.novelty}")
+    def findings(self, time: float, found: Sequence[Event]) -> None:
+        """Show the verdict on the stream so far, where it changes."""
         count = Counter(spoken(event.label) for event in found)
         title = ", ".join(f"{number} {label}" for label, number in count.items())
-        head = f"### findings: {title}" if title else "### ok so far"
-        rest = [f"- {len(lines) - NEWEST} more before"] if len(lines) > NEWEST else []
-        text = "\n".join([head, "", *lines[:NEWEST], *rest]) + "\n"
-        if text != self._told:
-            self._told = text
-            document = rr.TextDocument.columns(text=[text], media_type=["text/markdown"])
-            index = [axes.at(np.array([time]))]
-            self._recording.send_columns("/report", indexes=index, columns=document)
+        if self._classes is not None and title != self._told:
+            self._told = title
             verdict = ("findings", f"FAIL   {title}") if title else ("ok", "PASS so far")
             axes.log_verdict(self._recording, *verdict, time)
 
-    def found(self, event: Event) -> None:
-        """Add a finding to the list of events."""
-        line = f"found: {spoken(event.label)} from {event.start:.2f} s"
-        self.event(event.start, line, self._colours[event.label])
+    def found(self, event: Event, over: bool) -> None:
+        """Add a finding that begins or is over to the list of events."""
+        time, line = event.start, f"found: {spoken(event.label)} from {event.start:.2f} s"
+        if over:
+            span = interval(event.start, event.stop)
+            time, line = event.stop, f"over: {spoken(event.label)}, {span}, score {event.score:.2f}"
+        self.event(time, line, self._colours[event.label])
 
     def event(self, time: float, text: str, colour: colors.Color = colors.CLASSES[UNKNOWN]) -> None:
         """Add a line to the list of events."""
@@ -535,10 +523,7 @@ class Drawing:
             axes.timed(NOISE_PANEL, title="Noise", paths=BELOW, between=None, last=SHOWN),
             axes.timed(SPECTROGRAM_PANEL, title="Spectrum", paths=BELOW, last=SHOWN),
         ]
-        left = [
-            (unstable.text("Findings", "/report", titled=False), 2.0),
-            (unstable.events("Events", "/events"), 1.4),
-        ]
+        left = [(unstable.events("Events", "/events"), 2.4)]
         signals = {title: ("/joints", paths) for title, paths in self._titles.items()}
         if self._classes is not None:  # otherwise there is no verdict
             classes = axes.timed(self._classes, title="Classes", paths=BELOW, last=SHOWN)
@@ -547,7 +532,7 @@ class Drawing:
             signals["Scores"] = (SCORES, list(BELOW))
         if self._camera is not None:
             robot = unstable.robot("Robot", "/robot", self._camera)
-            left.insert(len(left) - 1, (robot, 3.4))
+            left.insert(len(left) - 1, (robot, 4.4))
         plots = [
             axes.timed(
                 SIGNALS_PANEL, origin, title=title, name=title, between=None, paths=paths,

@@ -315,8 +315,7 @@ class LiveSession:
         return merged(*events, *lasting)
 
     def _tell(self, event: Event, over: bool) -> None:
-        if not over:
-            self._drawing.found(event)
+        self._drawing.found(event, over)
         if self._on_finding is not None:
             self._on_finding(event, over)
 
@@ -375,7 +374,7 @@ class LiveSession:
         self._counts.update(labels.raw.tolist())
         self._drawing.labels(labels)
         if self._sink.open:
-            self._drawing.findings(end, self._found, end - 2 * self._labeller.hop)
+            self._drawing.findings(end, self._found)
 
     def _check_viewer(self, samples: int) -> None:
         """Count samples until the viewer is known to be there; warn if it is gone."""

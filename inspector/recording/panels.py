@@ -530,13 +530,12 @@ def log_strip(
     which: Sequence[int],
     scale: Scale,
     unit: str = "",
-    height: float = 0.0,
 ) -> Timed:
     """Log levels, shape (columns, rows), of some rows; the panel is as high as these need."""
     own = [names[index] for index in which]
     return axes.log_levels(
         recording,
-        Panel(name, height or STRIP_ROW * len(own) + axes.AXIS),
+        Panel(name, STRIP_ROW * len(own) + axes.AXIS),
         edges,
         level[:, which].T,
         scale,

@@ -22,7 +22,7 @@ from http.server import BaseHTTPRequestHandler
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Thread
-from typing import IO, TYPE_CHECKING, Any, TypeVar
+from typing import IO, TYPE_CHECKING, TypeVar
 from urllib.parse import quote
 
 import noisemodel as nm
@@ -327,8 +327,6 @@ DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 WINDOW = (1440, 900)  # of the picture, in points; beyond, a software driver takes minutes
 MAGIC = b"RRF2"  # what rerun's recordings begin with
 TIMEOUT = 120.0  # how long the viewer may take to draw everything, in [s]
-# Time after which a view's report is not due to data that is still arriving, in [s].
-REPORTS_TIMEOUT = 20.0
 
 
 def has_driver() -> bool:
@@ -352,17 +350,15 @@ def shoot(
     *,
     size: tuple[int, int] = WINDOW,
     overwrite: bool = False,
-) -> tuple[str, ...]:
+) -> None:
     """Take a picture of a recording at a time, in [s]."""
     require_driver()
     check_recording(recording)
     refuse_existing(output, overwrite=overwrite)
     with headless_viewer(size) as client:
         png = picture(client, recording, seconds)
-        state = final_state(client)
     with replacing(output, overwrite=overwrite) as temporary:
         temporary.write_bytes(png)
-    return tuple(str(report) for view in state.views for report in view.reports)
 
 
 def check_recording(path: Path) -> None:
@@ -425,12 +421,6 @@ def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
     if not frames:
         raise ViewerError(f"the viewer draws nothing within {TIMEOUT:g} s")
     return frames[-1]
-
-
-def final_state(client: "ViewerClient") -> Any:
-    """The viewer's state once its views report nothing, or after 20 s what they report then."""
-    until(lambda: not any(view.reports for view in client.get_state().views), REPORTS_TIMEOUT, 0.5)
-    return client.get_state()
 
 
 def _environment(folder: str) -> dict[str, str]:
