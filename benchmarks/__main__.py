@@ -12,7 +12,7 @@ from pathlib import Path
 from benchmarks.table import HEAD
 
 # Modules with a function `rows`, which takes an older checkout, or None, and yields rows.
-SPEED = ("extended", "stream", "live", "logs", "commands")
+SPEED = ("extended", "stream", "live", "commands")
 
 
 def main() -> None:

@@ -2,7 +2,8 @@
 
 The runs: 10 s at 10 kHz of TALOS, 32 joints; 150 s at 1 kHz of 60 joints; both float32, with
 positions, velocities measured and desired. The log: 10 s of noise in two columns. The batch: 28
-runs of 7 s. With an older checkout, each has its own caches, and they take turns after a warm-up.
+runs of 7 s. The MCAP: 20 s at 1 kHz of 60 joints, by `export`. With an older checkout, each has its
+own caches, and they take turns after a warm-up.
 """
 
 import sys
@@ -26,13 +27,16 @@ def cases(folder: Path) -> dict[str, tuple[list[str], float, float | None]]:
     """Arguments of each command, the motion that it takes and the most CPU time, in [s]."""
     save = ["--overwrite", "-o", str(folder / "out.rrd")]
     page = ["--overwrite", "-o", str(folder / "out.html")]
-    short, long, batch = (str(folder / name) for name in ("short.npz", "long.npz", "batch"))
+    run = ["--overwrite", "-o", str(folder / "out.npz")]
+    names = ("short.npz", "long.npz", "batch", "run.mcap")
+    short, long, batch, mcap = (str(folder / name) for name in names)
     return {
         "`inspector --help`": (["--help"], 0.0, 0.5),
         "classify 10 s, 10 kHz, 32 joints": (["classify", short], 10.0, None),
         "classify 150 s, 1 kHz, 60 joints": (["classify", long], 150.0, None),
         "classify 28 runs of 7 s, 1 kHz, 18 joints": (["classify", batch], BATCH * 7.0, None),
         "classify 10 s of noise, 10 kHz": (["classify", str(folder / "noise.log")], 10.0, 1.5),
+        "import of an MCAP of 20 s, 1 kHz, 60 joints": (["import", mcap, *run], 20.0, 4.0),
         "view of 10 s, 10 kHz, 32 joints": (["view", short, *save], 10.0, 3.0),
         "view of 150 s, 1 kHz, 60 joints": (["view", long, *save], 150.0, 5.0),
         "report of 10 s, 10 kHz, 32 joints": (["view", short, *page], 10.0, None),
@@ -91,6 +95,10 @@ def write(folder: Path) -> None:
     moving(1000, 7.0, many[:18], None).save(folder / "batch" / "0.npz")
     for number in range(1, BATCH):
         (folder / "batch" / f"{number}.npz").symlink_to("0.npz")
+    moving(1000, 20.0, many, None).save(folder / "run.npz")
+    of_process(
+        [sys.executable, "-m", "inspector", "export", folder / "run.npz", "-o", folder / "run.mcap"]
+    )
     noise = simplified(run.motion, run.velocity_desired)
     np.savetxt(folder / "noise.log", np.column_stack((run.time, noise)), fmt="%.12f %.15e")
 

@@ -1,10 +1,9 @@
 """A live session beside real time: CPU time per second of motion, without its start.
 
 Velocities, desired velocities and positions of TALOS's 32 joints at 10 kHz go through `LiveSession`
-in chunks of 20 ms and one by one, and as CSV through `inspector live`: from a file, and from a pipe
-into which 20 ms are written at a time, in real time; into a recording, and to a server that
-receives as a viewer does. Of a file, the start is left out by the difference to half of the motion,
-which has an error of a few percent on a busy machine; of a pipe, by waiting.
+in chunks of 20 ms and one by one, and as CSV through `inspector live`; into a recording, and to a
+server that receives as a viewer does. Of a CSV, the start is left out by the difference to half of
+the motion, which has an error of a few percent on a busy machine.
 """
 
 import os
@@ -16,9 +15,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import islice
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
@@ -47,9 +44,8 @@ def rows(_: object) -> Iterator[Row]:
                 yield Row(f"`LiveSession`, {how}, to {where}", spent, "real time", 1.0, wanted)
             flags = [item for key, value in sink.items() for item in (f"--{key}", value)]
             flags += ["--overwrite"] if where == "a file" else []
-            for source, spent in through_csv(signals, names, folder, *flags):
-                title = f"`inspector live`, CSV from a {source}, to {where}"
-                yield Row(title, spent, "real time", 1.0, WANTED["CSV"])
+            spent = through_csv(signals, names, folder, *flags)
+            yield Row(f"`inspector live`, CSV, to {where}", spent, "real time", 1.0, WANTED["CSV"])
 
 
 def motion(seconds: float, rate: float, joints: int) -> dict[str, np.ndarray]:
@@ -84,8 +80,8 @@ def through_session(
 
 def through_csv(
     signals: dict[str, np.ndarray], names: tuple[str, ...], folder: Path, *sink: str
-) -> Iterator[tuple[str, float]]:
-    """CPU time per second of motion from a file and from a pipe, in [s]."""
+) -> float:
+    """CPU time per second of motion, in [s]."""
     kinds = [kind for kind in signals if kind != "time"]
     head = ",".join(["time", *(f"{name}.{kind}" for kind in kinds for name in names)])
     command = [sys.executable, "-m", "inspector", "live", "--rate", str(RATE)]
@@ -95,43 +91,7 @@ def through_csv(
         table = np.hstack([signals["time"][:rows, None], *(signals[kind][:rows] for kind in kinds)])
         np.savetxt(path, table, fmt="%.7g", delimiter=",", header=head, comments="")
         spent.append(of_process(command, stdin=path))
-    yield "file", (spent[1] - spent[0]) / (samples / RATE / 2)
-    with path.open("rb") as stream:
-        yield "pipe", feed(command, stream, CHUNK) / (samples / RATE)
-
-
-def feed(command: list[str], stream: BinaryIO, rows: int) -> float:
-    """Write rows into a command's standard input, 20 ms at a time, in real time.
-
-    Returns:
-        CPU time after the start-up of the command, in [s].
-    """
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, **quiet)
-    assert process.stdin is not None
-    process.stdin.write(b"".join(islice(stream, rows)))
-    process.stdin.flush()
-    start = when_idle(process.pid)
-    due = time.monotonic()
-    while lines := b"".join(islice(stream, rows)):
-        process.stdin.write(lines)
-        process.stdin.flush()
-        due += 0.02
-        time.sleep(max(0.0, due - time.monotonic()))
-    spent = when_idle(process.pid) - start
-    process.stdin.close()
-    assert process.wait() == 0
-    return spent
-
-
-def when_idle(process: int) -> float:
-    """CPU time of a process once it is idle, in [s]."""
-    spent = [-1, 0]
-    while spent[-1] != spent[-2] or spent[-1] == 0:
-        time.sleep(1.0)
-        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-        spent.append(int(fields[11]) + int(fields[12]))
-    return spent[-1] / os.sysconf("SC_CLK_TCK")
+    return (spent[1] - spent[0]) / (samples / RATE / 2)
 
 
 @contextmanager

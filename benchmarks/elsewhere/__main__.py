@@ -7,13 +7,11 @@ For measuring only: nothing is trained on these runs, and nothing of ours is tun
 Writes run files `OUT/<domain>/<robot>/<scenario>-<90000 + seed>.npz`: for each seed and domain a
 good run and two with faults, of one kind each, at 1 kHz; for every other seed also a good run at
 the simulator's own rate, and for the first one a run with faults. Files that exist are kept. A run
-in which the robot falls or the simulation diverges is named, and leaves
-`<scenario>-<seed>.dropped.json` instead.
+in which the robot falls or the simulation diverges is named, and leaves its reason in
+`<scenario>-<seed>.dropped.txt` instead.
 """
 
 import argparse
-import json
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -23,7 +21,6 @@ from benchmarks.elsewhere import domains
 from benchmarks.elsewhere.domains import DOMAINS, Domain
 from benchmarks.elsewhere.faults import KINDS
 from benchmarks.elsewhere.recorded import DroppedError
-from noisemodel import Run
 
 # Added to seeds in names: no run is taken for one of the same robot and seed that is ours.
 FIRST = 90_000
@@ -61,7 +58,7 @@ def tasks(names: list[str], seeds: int) -> Iterator[Task]:
 
 
 def main() -> None:
-    """Make the runs that are missing, and print the table."""
+    """Make the runs that are missing."""
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     arguments.add_argument("output", type=Path)
     arguments.add_argument("--seeds", type=int, default=5)
@@ -80,10 +77,8 @@ def main() -> None:
             f"{' and '.join(sorted(missing))} not installed;"
             " run `pip install 'noise-inspector[elsewhere]'`"
         )
-    every = list(tasks(names, options.seeds))
-    for task in every:
+    for task in tasks(names, options.seeds):
         make(task, options.output, options.duration)
-    report(every, options.output)
 
 
 def installed() -> set[str]:
@@ -94,7 +89,7 @@ def installed() -> set[str]:
 
 def make(task: Task, output: Path, duration: float) -> None:
     """Simulate and write a run, unless that is done."""
-    path, dropped = (output / f"{task.name}{suffix}" for suffix in (".npz", ".dropped.json"))
+    path, dropped = (output / f"{task.name}{suffix}" for suffix in (".npz", ".dropped.txt"))
     if path.exists() or dropped.exists():
         return
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -102,42 +97,9 @@ def make(task: Task, output: Path, duration: float) -> None:
         run = domains.make(task.domain, task.kind, task.seed, rate=task.rate, duration=duration)
     except DroppedError as error:
         print(f"dropped {task.name}: {error}", flush=True)
-        dropped.write_text(json.dumps({"problem": str(error)}))
+        dropped.write_text(f"{error}\n")
     else:
         run.save(path)
-
-
-def report(every: list[Task], output: Path) -> None:
-    """Print what there is, what was dropped, and how many faults the robots felt."""
-    print(
-        f"{'domain':18}{'good':>6}{'faulty':>8}{'dropped':>9}{'faults':>8}{'felt':>6}{'masked':>8}"
-    )
-    kinds: Counter[str] = Counter()
-    felt: Counter[str] = Counter()
-    dropped: list[str] = []
-    for domain in dict.fromkeys(task.domain for task in every):
-        own = [task for task in every if task.domain == domain]
-        runs = {
-            task: Run.load(path) for task in own if (path := output / f"{task.name}.npz").exists()
-        }
-        dropped += [f"{task.name} ({problem(task, output)})" for task in own if task not in runs]
-        events = [(task.kind, event) for task, run in runs.items() for event in run.meta["events"]]
-        kinds.update(kind for kind, _ in events)
-        felt.update(kind for kind, event in events if event["labelled"] > 0)
-        good = sum(task.kind == "good" for task in runs)
-        print(
-            f"{domain.name:18}{good:6}{len(runs) - good:8}{len(own) - len(runs):9}{len(events):8}"
-            f"{sum(event['labelled'] > 0 for _, event in events):6}"
-            f"{sum(event['masked'] for _, event in events):8}"
-        )
-    print("\nfelt by kind: " + ", ".join(f"{kind} {felt[kind]} of {kinds[kind]}" for kind in kinds))
-    if dropped:
-        print("dropped: " + ", ".join(dropped))
-
-
-def problem(task: Task, output: Path) -> str:
-    """Why a run was dropped."""
-    return str(json.loads((output / f"{task.name}.dropped.json").read_text())["problem"])
 
 
 if __name__ == "__main__":

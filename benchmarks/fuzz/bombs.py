@@ -241,17 +241,6 @@ def _tables(data: bytes) -> Iterator[Bomb]:
 
 def _toml(data: bytes) -> Iterator[Bomb]:
     text = data.decode()
-    for value in (
-        "[" * DEEP,
-        "{a=" * 5000,
-        "9" * 400,
-        "9" * 5000,
-        "1e400",
-        "nan",
-        "'" * 7,
-        '"\\ud800"',
-    ):
-        yield Bomb(f"a value {value[:12]!r} before it", f"x = {value}\n{text}")
     yield Bomb("a key of many parts", "a." * DEEP + "b = 1\n" + text)
     yield Bomb("a table of many parts", f"{text}\n[{'a.' * 20_000}b]\n")
     yield Bomb("100,000 tables", text + "".join(f"[t{n}]\n" for n in range(100_000)))
@@ -259,49 +248,7 @@ def _toml(data: bytes) -> Iterator[Bomb]:
     yield Bomb("latin-1", text.encode() + "x = 'ä'\n".encode("latin-1"))
 
 
-def _json_lines(data: bytes) -> Iterator[Bomb]:
-    first, _, rest = data.partition(b"\n")
-    for value in (
-        b"[" * DEEP,
-        b"9" * 400,
-        b"9" * 5000,
-        b"null",
-        b"[]",
-        b"{}",
-        b'"\\ud800"',
-        b"NaN",
-    ):
-        name = repr(value[:12])
-        yield Bomb(f"{name} for its first line", value + b"\n" + rest)
-        yield Bomb(f"{name} for its last line", first + b"\n" + value + b"\n")
-        entry = b'{"x": ' + value + b", " + first[1:]
-        yield Bomb(f"{name} in its first line", entry + b"\n" + rest)
-
-
 def _live(data: bytes) -> Iterator[Bomb]:
-    good = [f'{{"time": {n / 100}, "velocity": [0.1, 0.2]}}' for n in range(200)]
-    bad = ('{"velocity":[]}', '{"time":[],"velocity":[1,2]}', '{"time":[1,2],"velocity":[1,2]}')
-    more = ("[" * DEEP, '{"velocity":' + "[" * DEEP, '{"velocity":[' + "9" * 5000 + ",1]}", "{}")
-    for row in (
-        *bad,
-        *more,
-        '{"velocity":[1e308,1e308]}',
-        '{"velocity":"a"}',
-        '{"velocity":[true,[1]]}',
-    ):
-        yield Bomb(f"{row[:24]} among rows", "\n".join([*good, row, *good]))
-        yield Bomb(f"{row[:24]} alone", row + "\n")
-    head = "time,a.velocity,b.velocity"
-    cells = [f"{n / 100},0.1,0.2" for n in range(200)]
-    for row in (
-        "1e308,1e308,1e308",
-        "nan,nan,nan",
-        "5e-324,1,1",
-        "9" * 5000 + ",1,1",
-        ",,",
-        "1,1e308,1",
-    ):
-        yield Bomb(f"{row[:24]} among rows", "\n".join([head, *cells, row, *cells]) + "\n")
     yield Bomb(
         "100,000 joints", "time," + ",".join(f"j{n}.velocity" for n in range(DEEP)) + "\n1\n"
     )
@@ -779,10 +726,6 @@ BY_NAME: dict[str, Callable[[bytes], Iterator[Bomb]]] = {
     "reference": _toml,
     "NoisyTest labels": _toml,
     "simulated": _toml,
-    "resume": _json_lines,
-    "tune": _json_lines,
-    "LeRobot info": _json_lines,
-    "dataset": _json_lines,
     "live": _live,
     "Parquet": _columns,
     "HDF5": _hdf5,

@@ -1,7 +1,7 @@
 """Fuzz the readers with atheris, which needs the extra `fuzz`.
 
     python -m benchmarks.fuzz.run "live rows, JSON" "reference.toml" --seconds 15
-    python -m benchmarks.fuzz.run --group labels --seconds 600 --found found/
+    python -m benchmarks.fuzz.run "labels, CSV" --seconds 600 --found found/
     python -m benchmarks.fuzz.run --executions 2000  # all readers
 
 The corpus begins with a whole file of each reader and with damaged ones. An error that is not
@@ -29,20 +29,6 @@ with atheris.instrument_imports(include=["inspector", "noiseclassifier", "noisem
     from benchmarks.fuzz.damage import damaged
     from benchmarks.fuzz.readers import EXPECTED, READERS, compile_in_fork
 
-# Readers that are fuzzed together; each input goes to one of them.
-GROUPS = {
-    "labels": tuple(name for name in READERS if name.startswith(("labels", "NoisyTest", "simul"))),
-    "settings": ("mapping", "reference.toml", "resume state", "tune state", "dataset.json"),
-    "rows": ("live rows, CSV", "live rows, JSON", "live rows, jumping clock"),
-    "tables": ("CSV", "CSV, semicolons", "Parquet", "HDF5", "LeRobot info", "LeRobot data"),
-    "arrays": ("run", "run, in pieces", "npz of arrays", "MuJoCo's npz", "npy"),
-    "models": ("model, small",),
-    "bags": tuple(
-        name for name in READERS if name.startswith(("MCAP", "ROS ")) and READERS[name].command
-    ),
-    "parts": ("timestamps", "names", "ROS definition"),
-    "robots": ("URDF", "MJCF", "MJCF, attributes", "STL", "STL, text", "OBJ", "DAE"),
-}
 SEEDS = 30  # damaged files of each reader to begin with
 
 # Bytes that a long text is cut to, and that an input has at most: short ones are read faster.
@@ -53,7 +39,6 @@ def main() -> None:
     """Fuzz, print executions and places found by reader."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("readers", nargs="*", metavar="READER", help=", ".join(READERS))
-    parser.add_argument("--group", choices=GROUPS)
     end = parser.add_mutually_exclusive_group()
     end.add_argument("--seconds", type=int, default=15)
     end.add_argument("--executions", type=int, help="end after so many, however long they take")
@@ -62,9 +47,9 @@ def main() -> None:
         "--found", type=Path, help="folder for inputs that raise what is not expected"
     )
     options = parser.parse_args()
-    names = tuple(options.readers) + GROUPS.get(options.group, ()) or tuple(READERS)
+    names = tuple(options.readers or READERS)
     if set(names) - set(READERS):
-        parser.error(f"name some of {', '.join(READERS)}, or a --group")
+        parser.error(f"name some of {', '.join(READERS)}")
     with tempfile.TemporaryDirectory(
         dir="/dev/shm" if Path("/dev/shm").is_dir() else None
     ) as folder:
