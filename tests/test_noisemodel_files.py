@@ -175,8 +175,9 @@ def test_a_file_that_is_damaged_or_of_another_key_is_made_anew(home):
     make = Maker()
     cached("a-1", make)
     whole = (home / "a-1.npz").read_bytes()
-    changed = [bytearray(whole) for _ in whole]
-    for position, each in enumerate(changed):
+    places = range(0, len(whole), 13)
+    changed = [bytearray(whole) for _ in places]
+    for position, each in zip(places, changed, strict=True):
         each[position] ^= 0x55
     cut_off = [b"", whole[:10], whole[:-1]]
     for content in [*cut_off, *changed]:

@@ -289,14 +289,6 @@ def test_meshes_are_read_wherever_they_stand_among_other_geoms(tmp_path):
         assert areas[2:] == pytest.approx([both, both, 2 * both])
 
 
-def test_a_geom_keeps_its_own_colour_where_a_material_has_another(tmp_path):
-    head = '<asset><material name="m" rgba="0 0 1 1"/></asset>'
-    for own, shown in (('rgba="1 1 0 1"', (1.0, 1.0, 0.0, 1.0)), ("", (0.0, 0.0, 1.0, 1.0))):
-        geom = f'<geom type="box" size="1 1 1" material="m" {own}/>'
-        robot = Robot.load(written(tmp_path, one_body(geom, head=head)))
-        assert robot.mjcf.visual[0].colour == shown
-
-
 def test_a_mesh_that_the_file_itself_holds_is_read(tmp_path):
     head = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
     path = written(tmp_path, one_body('<geom type="mesh" mesh="m"/>', head=head))
@@ -322,50 +314,6 @@ def test_a_mesh_is_where_the_compiler_says(tmp_path, compiler, file, place):
     assert len(triangles(Robot.load(path))[0]) == len(STL)
 
 
-def depths(shape, points):
-    """How far a primitive's surface lies beneath points, by its size as MuJoCo has it."""
-    kind, (x, y, z) = shape
-    radius = np.linalg.norm(points[:, :2], axis=1)
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return (np.abs(points) / (x, y, z)).max(axis=1) - 1.0
-    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        return np.maximum(radius / x, np.abs(points[:, 2]) / y) - 1.0
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return np.hypot(radius, np.maximum(np.abs(points[:, 2]) - y, 0.0)) / x - 1.0
-    size = (x, x, x) if kind == mujoco.mjtGeom.mjGEOM_SPHERE else (x, y, z)
-    return np.linalg.norm(points / size, axis=1) - 1.0
-
-
-def test_the_corners_of_primitives_lie_on_them_where_mujoco_puts_them(tmp_path):
-    sizes = {
-        "box": "0.3 0.5 0.7",
-        "cylinder": "0.3 0.45",
-        "capsule": "0.3 0.35",
-        "sphere": "0.4",
-        "ellipsoid": "0.3 0.5 0.8",
-    }
-    geoms = "".join(
-        f'<geom type="{kind}" size="{size}" pos="0.1 0.2 {place}" quat="0.8 0.3 {place} 0.2"/>'
-        for place, (kind, size) in enumerate(sizes.items())
-    )
-    path = written(tmp_path, ARM.replace('name="wrist" axis="1 0 0"/>', f'name="wrist"/>{geoms}'))
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    shapes = [each for each in Robot.load(path).mjcf.collision if each.link == "tip"][:5]
-    tip = model.body("tip").id
-    first = int(model.body_geomadr[tip])
-    for geom, shape in enumerate(shapes, start=first):
-        corners = shape.body.reshape(-1, 3) @ shape.matrix.T + shape.translation
-        world = corners @ data.xmat[tip].reshape(3, 3).T + data.xpos[tip]
-        own = (world - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
-        kind = (model.geom_type[geom], model.geom_size[geom])
-        on = np.abs(depths(kind, own)) < 1e-9
-        middle = np.linalg.norm(own[:, :2], axis=1) < 1e-9  # of a cylinder's end, in its cap
-        assert (on | middle).all()
-        assert np.linalg.matrix_rank(own[on] - own[on].mean(axis=0)) == 3
-
-
 URDF = """<robot name="r"><link name="base"/>
   <link name="a">
     <visual><origin xyz="0.1 0.2 0.3" rpy="0.3 -0.2 0.5"/>
@@ -374,7 +322,9 @@ URDF = """<robot name="r"><link name="base"/>
       </geometry></visual></link>
   <link name="b">
     <visual><geometry><cylinder radius="0.05" length="0.6"/></geometry></visual>
-    <visual><origin xyz="0.2 0 0"/><geometry><sphere radius="0.1"/></geometry></visual></link>
+    <visual><origin xyz="0.2 0 0"/><geometry><sphere radius="0.1"/></geometry></visual>
+    <visual><origin xyz="0 0.3 0" rpy="0.7 0 0"/>
+      <geometry><capsule radius="0.1" length="0.3"/></geometry></visual></link>
   <joint name="one" type="revolute"><parent link="base"/><child link="a"/>
     <origin xyz="0 0 1"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="9"/>
   </joint>
@@ -389,7 +339,8 @@ MJCF = """<mujoco><compiler angle="radian" eulerseq="XYZ"/>
     <geom type="mesh" mesh="part" pos="0 0 0.4"/>
     <body name="b" pos="0.3 0 0.2">
       <joint name="two" type="slide" axis="0.6 0.8 0" range="-2 2"/>
-      <geom type="cylinder" size="0.05 0.3"/><geom size="0.1" pos="0.2 0 0"/></body>
+      <geom type="cylinder" size="0.05 0.3"/><geom size="0.1" pos="0.2 0 0"/>
+      <geom type="capsule" size="0.1 0.15" pos="0 0.3 0" euler="0.7 0 0"/></body>
   </body></worldbody></mujoco>"""
 
 
@@ -405,6 +356,12 @@ def test_the_same_robot_as_urdf_and_as_mjcf_is_equally_loud(tmp_path):
         noise.append(nm.extended(robot, nm.Surface.of(robot), q, v, "paper").power)
     np.testing.assert_allclose(*twists, atol=1e-9)
     np.testing.assert_allclose(*noise, rtol=1e-9)
+
+
+def test_an_ellipsoid_is_a_sphere_whose_axes_are_stretched(tmp_path):
+    geom = '<geom type="ellipsoid" size="0.3 0.5 0.8"/>'
+    drawn = triangles(Robot.load(written(tmp_path, one_body(geom))))[0]
+    np.testing.assert_allclose(np.linalg.norm(drawn / (0.3, 0.5, 0.8), axis=2), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -433,14 +390,6 @@ def test_visual_geoms_are_those_that_are_drawn(tmp_path, geoms, visual, collisio
     count = {"box": 12, "capsule": len(capsule(1.0, 2.0))}
     for shapes, expected in ((mjcf.visual, visual), (mjcf.collision, collision)):
         assert [len(shape.body) for shape in shapes] == [count[kind] for kind in expected]
-
-
-def test_a_black_geom_and_one_that_is_half_transparent_are_drawn(tmp_path):
-    geoms = "".join(
-        f'<geom size="1" rgba="{rgba}"/>' for rgba in ("0 0 0 1", "1 1 1 0", "0 0 1 .5")
-    )
-    drawn = Robot.load(written(tmp_path, one_body(geoms))).mjcf.visual
-    assert [shape.colour for shape in drawn] == [(0, 0, 0, 1), (0, 0, 1, 0.5)]
 
 
 @pytest.mark.parametrize(
@@ -566,13 +515,23 @@ def test_no_file_is_opened_outside_of_the_robots_folders(tmp_path, text):
         Robot.load(path)
 
 
-def test_textures_and_skins_are_not_opened(tmp_path):
+@pytest.mark.parametrize(
+    ("own", "shown"),
+    [
+        ('material="m"', [(1, 0, 0, 1)]),
+        ('material="m" rgba="1 1 0 1"', [(1, 1, 0, 1)]),
+        ('rgba="0 0 0 1"', [(0, 0, 0, 1)]),
+        ('rgba="0 0 1 .5"', [(0, 0, 1, 0.5)]),
+        ('rgba="1 1 1 0"', []),
+    ],
+)
+def test_geoms_that_can_be_seen_are_drawn_textures_and_skins_are_not_opened(tmp_path, own, shown):
     head = (
         '<asset><skin file="gone.skn"/><texture name="t" type="2d" file="gone.png"/>'
         '<material name="m" texture="t" rgba="1 0 0 1"/></asset>'
     )
-    robot = Robot.load(written(tmp_path, one_body('<geom size="1" material="m"/>', head=head)))
-    assert robot.mjcf.visual[0].colour == (1.0, 0.0, 0.0, 1.0)
+    robot = Robot.load(written(tmp_path, one_body(f'<geom size="1" {own}/>', head=head)))
+    assert [shape.colour for shape in robot.mjcf.visual] == shown
 
 
 def test_a_run_names_an_mjcf_relative_to_its_own_folder(tmp_path):
@@ -586,14 +545,11 @@ def test_a_run_names_an_mjcf_relative_to_its_own_folder(tmp_path):
     assert noise.power.max() > 0
 
 
-def test_without_mujoco_the_error_says_what_to_install(tmp_path, monkeypatch):
+def test_without_a_package_the_error_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
     with pytest.raises(RobotError, match=r"needs MuJoCo; `pip install 'noise-inspector\[sim\]'`"):
         Robot.load(written(tmp_path, ARM))
-
-
-def test_without_its_package_the_menagerie_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
     with pytest.raises(RobotError, match=r"pip install 'noise-inspector\[menagerie\]'"):
         Robot.load("menagerie/unitree_go2")
 

@@ -120,19 +120,6 @@ def test_too_few_samples_are_no_run(tmp_path, samples):
     assert not (tmp_path / "run.npz").exists()
 
 
-def test_a_turning_base_is_interpolated_on_the_sphere():
-    recorder, random = nm.Recorder(None, 100), np.random.default_rng(1)
-    for step in range(300):
-        time = step / 100 + random.uniform(-0.002, 0.002)
-        sign = random.choice([-1, 1])  # q and -q are one rotation
-        turn = sign * np.array([0, 0, np.sin(time), np.cos(time)])
-        recorder.push(velocity=[0.0], base_pose=[0, 0, 1, *turn], time=time)
-    run = recorder.run()
-    angle = run.time + float(run.meta["start"])
-    assert np.allclose(np.abs(run.base_pose[:, 5]), np.abs(np.sin(angle)), atol=1e-4)
-    assert np.allclose(run.base_velocity[5:-5, 5], 2.0, atol=0.05)
-
-
 def failing(path, samples):
     with nm.Recorder(None, 100, path=path) as recorder:
         pushed(recorder, samples)

@@ -260,16 +260,6 @@ def test_a_run_is_the_same_in_one_piece_in_many_and_in_single_precision(monkeypa
     assert link_twists(robot, np.empty((0, 9)), np.empty((0, 9))).shape == (0, 10, 6)
 
 
-@pytest.mark.parametrize("name", ["talos", "kinova", "pr2", "tiago", "romeo", "hyq", "iris"])
-def test_twists_are_those_of_pinocchio(name):
-    """kinova and tiago have continuous joints, tiago and pr2 prismatic ones."""
-    robot = Robot.load(name)
-    q, v = states(robot.model)
-    assert np.allclose(
-        link_twists(robot, q, v), by_pinocchio(robot.model, q, v), rtol=0, atol=1e-12
-    )
-
-
 @pytest.mark.parametrize("axis", ["0 1 0", "1 -1 0", "-1 0 0", "1 2 3"])
 @pytest.mark.parametrize("floating_base", [False, True])
 def test_joints_of_every_kind_are_those_of_pinocchio(tmp_path, floating_base, axis):

@@ -22,7 +22,6 @@ from noisemodel.run import (
     check_time,
     joint_velocity,
     pieces_of,
-    with_velocities,
 )
 from noisemodel.runfile import OnDemand
 
@@ -84,12 +83,6 @@ def test_signals_that_do_not_fit_are_refused(changes, message):
     with pytest.raises(RunError, match=message) as caught:
         run(**changes)
     assert "\n" not in str(caught.value)
-
-
-def test_quaternions_in_gaps_are_not_checked():
-    pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (100, 1))
-    pose[50] = 0.0
-    assert run(base_pose=pose, valid=np.arange(100) != 50).base_pose is not None
 
 
 def filled():
@@ -478,12 +471,6 @@ def tumble(time):
     return np.array(poses), np.tile(twist, (len(time), 1))
 
 
-def test_a_swinging_joint_is_differentiated_to_a_thousandth():
-    position, velocity = swing(LONG)
-    error = np.abs(joint_velocity(LONG, position) - velocity).max()
-    assert error < 1e-3 * np.abs(velocity).max()
-
-
 def test_angles_that_wrap_give_no_spike():
     angle = np.outer(LONG, [20.0])
     wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
@@ -493,16 +480,18 @@ def test_angles_that_wrap_give_no_spike():
 def test_nothing_is_differentiated_across_a_gap():
     position, velocity = swing(LONG)
     valid = (LONG < 0.5) | (LONG > 0.7)
+    valid[[1990, 1992]] = False
+    velocity[1991] = 0.0  # a sample alone
     position[~valid] = 0.0
     found = joint_velocity(LONG, position, valid)
     assert np.array_equal(found[~valid], np.zeros((int((~valid).sum()), 1)))
     assert np.abs(found - velocity)[valid].max() < 1e-3 * np.abs(velocity).max()
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_tumbling_base_has_its_body_velocity_though_quaternions_flip_their_sign(sign):
+@pytest.mark.parametrize("factor", [1, -1, 1.005])
+def test_a_tumbling_base_has_its_body_velocity_though_quaternions_flip_or_are_longer(factor):
     pose, twist = tumble(LONG)
-    pose[700:1300, 3:] *= sign
+    pose[700:1300, 3:] *= factor
     assert np.allclose(base_velocity(LONG, pose), twist, rtol=0, atol=1e-6)
 
 
@@ -525,11 +514,13 @@ def test_a_run_of_positions_alone_has_velocities_and_states_their_source(tmp_pat
     for found in (run.velocity, run.velocity_desired):
         assert np.abs(found - velocity).max() < 1e-3 * np.abs(velocity).max()
     assert np.allclose(run.base_velocity, twist, rtol=0, atol=1e-6)
-    assert run.meta["differentiated"] == {
-        "velocity": METHOD,
-        "velocity_desired": METHOD,
-        "base_velocity": METHOD,
-    }
+    assert METHOD == "Savitzky-Golay, window 7, order 3"
+    filled = ("velocity", "velocity_desired", "base_velocity")
+    assert run.meta["differentiated"] == dict.fromkeys(filled, METHOD)
+    np.savez(tmp_path / "own.npz", time=LONG, position=position, velocity=2 * velocity)
+    own = Run.load(tmp_path / "own.npz")
+    np.testing.assert_array_equal(own.velocity, 2 * velocity)
+    assert "differentiated" not in own.meta
 
 
 @pytest.mark.parametrize(
@@ -582,15 +573,6 @@ def test_rows_that_are_differentiated_on_demand_are_those_of_the_whole(derivativ
     np.testing.assert_allclose(without[10:20], derivative(time, pose)[10:20], atol=1e-9)
 
 
-def test_a_base_on_a_straight_and_level_way_has_the_velocity_along_its_own_axes():
-    """A quarter turn about z: what is x in the world is -y of the base."""
-    pose = np.tile([0, 0, 0, 0, 0, np.sqrt(0.5), np.sqrt(0.5)], (20, 1))
-    pose[:, :3] = np.outer(LONG[:20], [2.0, 3.0, 5.0])
-    expected = np.tile([3.0, -2.0, 5.0, 0, 0, 0], (20, 1))
-    np.testing.assert_allclose(base_velocity(LONG[:20], pose), expected, atol=1e-9)
-    np.testing.assert_allclose(base_velocity(LONG[:20], 1.005 * pose), 1.005 * expected, atol=1e-9)
-
-
 @pytest.mark.parametrize("samples", [2, 3, 6, 7, 8])
 def test_a_parabola_is_differentiated_exactly_by_seven_samples_and_inside_by_fewer(samples):
     time = np.arange(samples) / 4
@@ -598,16 +580,3 @@ def test_a_parabola_is_differentiated_exactly_by_seven_samples_and_inside_by_few
     exact = slice(None) if samples >= 7 else slice(1, -1)
     np.testing.assert_allclose(found[exact], 0.2 * time[exact], atol=1e-12)
     assert (abs(found[0]) > 0.02) == (samples < 7)
-
-
-def test_what_is_missing_is_filled_in_and_its_method_told():
-    time, position = LONG[:20], np.outer(LONG[:20], [3.0])
-    signals = {"time": time, "velocity": position, "position_desired": 2 * position}
-    filled, how = with_velocities(signals)
-    assert set(filled) == {*signals, "velocity_desired"}
-    np.testing.assert_allclose(filled["velocity_desired"], 6.0)
-    assert how == {"velocity_desired": "Savitzky-Golay, window 7, order 3"}
-    assert filled["velocity"] is position
-    filled, how = with_velocities({"time": time, "position": position, "valid": time != time[2]})
-    assert filled["velocity"][:4, 0].round(9).tolist() == [3.0, 3.0, 0.0, 3.0]
-    assert set(how) == {"velocity"}
