@@ -58,7 +58,7 @@ def test_shares_are_of_the_whole_excess():
 def test_the_beginning_of_a_blow_counts_and_all_of_a_vibration():
     links = noise(foot=(1.0, 1.05, 0.5), other_foot=(1.1, 1.4, 0.5))
     assert [link for link, _ in fault_links(links, BLOW, [BLOW], known=blow())] == ["foot"]
-    lasting = Localisation("commanded", "measured", 0.001, lasting=True)
+    lasting = Localisation("commanded", "measured", 0.001)
     assert fault_links(links, BLOW, [BLOW], known=lasting)[0][0] == "other_foot"
 
 

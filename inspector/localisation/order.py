@@ -104,10 +104,17 @@ def best_lines(
     parts = _parts(run, failure)
     if not parts:
         return None, 0.0, 0.0
-    waves = [_vibration(run, part) for part in parts]
+    half = max(1, round(SMOOTH * run.rate / 2))  # samples beside the middle of a moving mean
+    waves = []
+    for part in parts:
+        wave = _around(run, part, 4 * half, run.velocity)
+        if run.velocity_desired is not None:
+            measured, desired = in_both(run)
+            wave[:, measured] -= _around(run, part, 4 * half, run.velocity_desired)[:, desired]
+        waves.append(_fast(wave, half))
     weight = _hann(len(waves[0]))
     joint = int(np.argmax(np.sum([weight @ np.square(wave) for wave in waves], axis=0)))
-    motions = [_motion(run, part, joint) for part in parts]
+    motions = [_motion(run, part, joint, half) for part in parts]
     fastest = max(float(np.abs(speed).max()) for _, speed in motions)
     pieces = [
         piece
@@ -172,24 +179,8 @@ def _fast(signal: Array, half: int) -> Array:
     return fast
 
 
-def _half(run: Run) -> int:
-    """Samples on each side of the middle of a moving mean."""
-    return max(1, round(SMOOTH * run.rate / 2))
-
-
-def _vibration(run: Run, part: slice) -> Array:
-    """Tracking error above 10 Hz, else the motion, shape (samples, joints), in [rad/s]."""
-    half = _half(run)
-    wave = _around(run, part, 4 * half, run.velocity)
-    if run.velocity_desired is not None:
-        measured, desired = in_both(run)
-        wave[:, measured] -= _around(run, part, 4 * half, run.velocity_desired)[:, desired]
-    return _fast(wave, half)
-
-
-def _motion(run: Run, part: slice, joint: int) -> tuple[Array, Array]:
+def _motion(run: Run, part: slice, joint: int, half: int) -> tuple[Array, Array]:
     """Angle, in [rad], and speed, in [rad/s], of a joint without its vibration."""
-    half = _half(run)
     inner = slice(4 * half, -4 * half)
     if run.position is None:
         velocity = _around(run, part, 4 * half, run.velocity, joint)
@@ -216,16 +207,10 @@ def _pieces(wave: Array, angle: Array, speed: Array, slowest: float) -> Iterator
 def _explained(
     pieces: list[Piece], fastest: float, rate: float, *, fewest: float = 0.0, periods: float = 0.0
 ) -> tuple[float, float]:
-    """The order that explains most, in periods per turn, and the share that it explains."""
-    best = _strongest(pieces, fastest, rate, fewest=fewest, periods=periods)
-    rest = _energy([_without(piece, best, fewest=fewest) for piece in pieces])
-    return best, 1.0 - rest / _energy(pieces)
+    """The order that explains most, in periods per turn, and the share that it explains.
 
-
-def _strongest(
-    pieces: list[Piece], fastest: float, rate: float, *, fewest: float, periods: float
-) -> float:
-    """The order that explains most, in periods per turn; 0 if none has periods enough."""
+    It is 0 if none has periods enough.
+    """
     step = fastest / rate / FINER
     longest = max(piece.angle[-1] for piece in pieces)
     size = 1 << math.ceil(math.log2(PADDED * longest / step + 1.0))
@@ -246,7 +231,15 @@ def _strongest(
         counted += enough * orders * (weight @ speed) / (2.0 * np.pi * rate)
     frequency = orders * fastest / (2.0 * np.pi)
     known = (frequency >= LOWEST) & (frequency <= HIGHEST * rate) & (counted >= periods)
-    return _peak(orders, energy * known)
+    lines = energy * known
+    top = int(np.argmax(lines))
+    best = float(orders[top])
+    if 0 < top < len(lines) - 1:  # the top of the parabola through it and its neighbours
+        before, highest, after = lines[top - 1 : top + 2].tolist()
+        offset = (before - after) / (before - 2.0 * highest + after) / 2.0
+        best = float(best + offset * (orders[1] - orders[0]))
+    rest = _energy([_without(piece, best, fewest=fewest) for piece in pieces])
+    return best, 1.0 - rest / _energy(pieces)
 
 
 def _without(piece: Piece, order: float, *, fewest: float) -> Piece:
@@ -266,13 +259,3 @@ def _energy(pieces: list[Piece]) -> float:
 def _hann(samples: int) -> Array:
     """Hann weights, of which none is 0."""
     return np.hanning(samples + 2)[1:-1]
-
-
-def _peak(orders: Real, lines: Array) -> float:
-    """Top of the parabola through the highest value and its neighbours."""
-    best = int(np.argmax(lines))
-    if not 0 < best < len(lines) - 1:
-        return float(orders[best])
-    before, top, after = lines[best - 1 : best + 2].tolist()
-    offset = (before - after) / (before - 2.0 * top + after) / 2.0
-    return float(orders[best] + offset * (orders[1] - orders[0]))

@@ -134,18 +134,11 @@ class QuietStatistics:
 
     # Of the linear prediction of each stage but the first, shape (stages - 1, joints, lags).
     weights: Array
+    lags: Indices  # of the prediction, in samples
     # 90th percentile over the stretches of the innovation's mean square, shape (stages,), in
     # [rad²/s⁴].
     power: Array
     peak: Array  # 90th percentile of its peak, shape (stages,), in [rad/s²]
-
-    def innovation(self, stages: Flow) -> Innovation:
-        """Compute the innovation of a stretch of the run."""
-        change = sudden(stages.velocity, stages.valid, stages.rate)
-        residual = _residual(change, self.weights, _lags(stages.rate))
-        residual[:, ~stages.valid] = 0.0
-        total, rest = np.linalg.norm(change, axis=2), np.linalg.norm(residual, axis=2)
-        return Innovation(change, residual, total, np.minimum(total, rest))
 
 
 def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatistics:
@@ -154,10 +147,10 @@ def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatis
     stretches = [flow(run, part) for part in parts]
     first = stretches[0] if stretches else flow(run, slice(0, 1))
     stages, _, joints = first.velocity.shape
-    lags = _lags(run.rate)
+    lags = np.unique(np.round(np.array(LAGS) * run.rate).astype(np.int64))
     zeros = np.zeros(stages)
     if not stretches:
-        return QuietStatistics(np.zeros((stages - 1, joints, len(lags))), zeros, zeros)
+        return QuietStatistics(np.zeros((stages - 1, joints, len(lags))), lags, zeros, zeros)
     velocity = np.stack([each.velocity for each in stretches])
     size = velocity.shape[2]
     warm = min(first.samples(WARM), size - 1)
@@ -178,6 +171,7 @@ def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatis
     level = np.minimum(total, rest)[..., warm:]  # stretches, stages, samples
     return QuietStatistics(
         weights,
+        lags,
         power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
         peak=np.percentile(level.max(axis=2), 90.0, axis=0),
     )
@@ -218,10 +212,6 @@ def sudden(velocity: Array, valid: Mask, rate: float) -> Array:
     return change
 
 
-def _lags(rate: float) -> Indices:
-    return np.unique(np.round(np.array(LAGS) * rate).astype(np.int64))
-
-
 EARLY = 0.015  # how long before its start a failure may have set in, in [s]
 BEFORE, AFTER = 0.1 + WARM, 0.05  # time before and after a failure that is used, in [s]
 LONGEST = 1.0  # time of a failure that is used, in [s]
@@ -255,7 +245,6 @@ class Localisation:
     stage: str = ""
     following: str = ""  # next stage in which it shows; empty if it is in no other
     lag: float = 0.0  # time from the first of these stages to the next, in [s]
-    lasting: bool = False  # whether the failure is a vibration that lasts, and not a blow or jump
     # Up to three joints and their shares of the innovation's power in that stage, the largest
     # first.
     joints: tuple[tuple[str, float], ...] = ()
@@ -285,8 +274,12 @@ def first_stage(
     start, end = (int(index) for index in np.searchsorted(stages.time, (failure.start, stop)))
     if end <= start or not stages.valid[start:end].any():
         return Localisation()
-    innovation, during = quiet.innovation(stages), slice(start, end)
-    found = None
+    change = sudden(stages.velocity, stages.valid, stages.rate)
+    residual = _residual(change, quiet.weights, quiet.lags)
+    residual[:, ~stages.valid] = 0.0
+    total, rest = np.linalg.norm(change, axis=2), np.linalg.norm(residual, axis=2)
+    innovation = Innovation(change, residual, total, np.minimum(total, rest))
+    found, during = None, slice(start, end)
     level, size = innovation.level[-1, during], stages.samples(BIN)
     power = np.add.reduceat(np.square(level), np.arange(0, len(level), size)) / size
     loud = power > max(LOUD * power.max(), MORE * float(quiet.power[-1]))
@@ -306,9 +299,10 @@ def _earliest(
     scale = quiet.peak + PASSED_ON * (float(quiet.peak.max()) or 1.0)
     relative = (innovation.level / scale[:, None]).max(axis=0)
     moment = rise(relative, first, last, rate=rate)
-    around = _around(moment, samples, rate=rate)
+    early, late = (max(1, round(time * rate)) for time in AROUND)
+    around = slice(max(0, moment - early), min(samples, moment + late))
     onsets = [
-        (onset(level, moment, rate=rate, least=PASSED_ON * float(peak)), place)
+        (onset(level, moment, around, rate=rate, least=PASSED_ON * float(peak)), place)
         for place, (level, peak) in enumerate(
             zip(innovation.level, innovation.total[:, around].max(axis=1), strict=True)
         )
@@ -346,14 +340,14 @@ def _adding(
     place = int(np.argmax(excess >= ADDS * excess.max()))
     joints = _joints(stages, innovation.residual[place, during])
     if place == len(excess) - 1:
-        return Localisation(stages.names[place], lasting=True, joints=joints)
+        return Localisation(stages.names[place], joints=joints)
     cause, effect = innovation.change[place, during], innovation.change[-1, during]
     # The lag, up to the slowest, at which one follows the other best, all joints together.
     most = stages.samples(SLOWEST)
     waves = [np.fft.rfft(signal, len(cause) + most, axis=0) for signal in (effect, cause)]
     together = np.fft.irfft((waves[0] * waves[1].conj()).sum(axis=1), len(cause) + most)
     lag = int(np.argmax(together[: most + 1])) / stages.rate
-    return Localisation(stages.names[place], stages.names[-1], lag, lasting=True, joints=joints)
+    return Localisation(stages.names[place], stages.names[-1], lag, joints=joints)
 
 
 def _joints(stages: Flow, residual: Array) -> tuple[tuple[str, float], ...]:
@@ -385,10 +379,13 @@ def rise(level: Array, first: int, last: int, *, rate: float) -> int:
     return int(at[begin + np.argmax(steep[begin : begin + length])])
 
 
-def onset(level: Array, moment: int, *, rate: float, least: float = 0.0) -> int | None:
+def onset(
+    level: Array, moment: int, around: slice, *, rate: float, least: float = 0.0
+) -> int | None:
     """Find the onset of a blow or jump.
 
     Args:
+        moment: Sample of the steepest rise, and the samples around it in which the onset lies.
         rate: Samples per second, in [Hz].
         least: Peak that has to be exceeded in any case, in the same unit.
 
@@ -397,16 +394,8 @@ def onset(level: Array, moment: int, *, rate: float, least: float = 0.0) -> int 
     """
     back, ahead = (round(time * rate) for time in (BACK, AHEAD))
     before = level[max(0, moment - back - ahead) : max(1, moment - ahead)]
-    around = _around(moment, len(level), rate=rate)
     reference = max(float(np.sqrt(np.mean(np.square(before)))), float(np.median(level)))
     peak = float(level[around].max(initial=0.0))
     if not peak > max(PEAK * reference, least):
         return None
-    first = int(around.start)
-    return first + int(np.argmax(level[around] > max(SHARE * peak, CLEAR * reference)))
-
-
-def _around(moment: int, samples: int, *, rate: float) -> slice:
-    """Samples around the steepest rise in which the onsets of stages lie."""
-    early, late = (max(1, round(time * rate)) for time in AROUND)
-    return slice(max(0, moment - early), min(samples, moment + late))
+    return int(around.start + np.argmax(level[around] > max(SHARE * peak, CLEAR * reference)))
