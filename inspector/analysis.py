@@ -23,7 +23,6 @@ from inspector.library import (
     CannotTellError,
     Labelled,
     Library,
-    label_noise,
     label_run,
     load_library,
 )
@@ -48,11 +47,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Analysis:
-    """A run, or a scalar noise, with what was found in it; texts are empty where there is none."""
+    """A run with what was found in it; texts are empty where there is none."""
 
     name: str  #: of the run
     status: Status  #: `ok`, `findings` or `cannot-tell`
-    run: nm.Run  #: as it was analysed; a scalar noise is a run of one joint
+    run: nm.Run  #: as it was analysed
+    audit: Audit  #: what the run can show
     reason: str = ""  #: why there is no verdict, in a sentence or two
     labels: nc.Labels | None = None  #: one per frame; None where no model fits
     model: str = ""  #: name of the model that labelled
@@ -60,7 +60,6 @@ class Analysis:
     #: The events of the labels, from the start of the first frame of each to the end of its last.
     spans: tuple[Event, ...] = ()
     findings: tuple[Event, ...] = ()  #: the same events, from their estimated onset to their end
-    audit: Audit | None = None  #: what the run can show; None of a scalar noise
     notes: tuple[str, ...] = ()  #: what was done to the run before it was labelled, sentences
     unknown: Unknown = Unknown.FINDING  #: what becomes of `unknown` frames
     sha256: str = ""  #: of the file that the run came from
@@ -100,11 +99,9 @@ class Analysis:
 
     @cached_property
     def orders(self) -> "dict[Event, Order]":
-        """Findings whose vibration goes with the speed of a joint; none of a scalar noise."""
+        """Findings whose vibration goes with the speed of a joint."""
         from inspector.localisation.order import order
 
-        if self.audit is None:
-            return {}
         found = ((event, order(self.run, event)) for event in self.findings)
         return {event: known for event, known in found if known is not None}
 
@@ -153,20 +150,17 @@ class Analysis:
         notes = [*ignored, *self.notes]
         if self.status is Status.CANNOT_TELL:
             return " ".join([f"{self.reason.rstrip('.')}.", *notes]) if notes else self.reason
-        if self.status is Status.OK and self.audit is None:
-            notes.insert(0, "Nothing stands out within the log.")
-        elif self.status is Status.OK:
+        if self.status is Status.OK:
             desired = self.run.velocity_desired is not None
             without = "" if desired else " No desired velocity: tracking errors were not judged."
             notes.insert(0, f"Nothing stands out, within the run or for any robot.{without}")
-        return " ".join([*notes, *(() if self.audit is None else shortcomings(self.audit))])
+        return " ".join([*notes, *shortcomings(self.audit)])
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What is missing or uncertain and why, a sentence each."""
         reason = (f"No labels: {self.reason}.",) if self.labels is None else ()
-        told = bool(reason) and self.audit is not None and not self.audit.observable
-        seen = () if self.audit is None else summary(self.audit, classes=not told)
+        seen = summary(self.audit, classes=not reason or bool(self.audit.observable))
         links = () if self.links is None else self.links.remarks
         read = (f"{self.assumed[0].upper()}{self.assumed[1:]}.",) if self.assumed else ()
         return (*read, *self.missing, *self.notes, *reason, *seen, *links)
@@ -243,24 +237,6 @@ def analyse(
     if seen.observable or found.findings:
         return found
     return replace(found, status=Status.CANNOT_TELL, reason=" ".join(summary(seen)))
-
-
-def analyse_noise(
-    time: Array,
-    noise: Array,
-    library: Library,
-    *,
-    name: str = "noise",
-    unknown: Unknown = Unknown.FINDING,
-) -> Analysis:
-    """Label a scalar noise in [rad/s] at uniform times in [s], as NoisyTest's logs hold it."""
-    uniform = float(time[0]) + np.arange(len(time)) / nc.nominal_rate(time)
-    run = nm.Run(time=uniform, velocity=noise[:, None], joint_names=("noise",))
-    empty = Analysis(name=name, status=Status.CANNOT_TELL, run=run, unknown=unknown)
-    try:
-        return _labelled(empty, label_noise(time, noise, library), library)
-    except (CannotTellError, nc.SignalError) as error:
-        return replace(empty, reason=str(error))
 
 
 def analyse_file(

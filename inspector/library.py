@@ -14,7 +14,7 @@ from noiseclassifier.profile import NOMINAL
 from noisemodel.files import also_reading
 from noisemodel.noise import in_both
 from noisemodel.run import pieces_of
-from noisemodel.types import Array, Mask, Real
+from noisemodel.types import Mask, Real
 
 Library = Mapping[str, nc.Model]  # models by name
 Events = tuple[nc.Event, ...]
@@ -94,13 +94,17 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
     rate, remark = classifier.rate, ""
     if slower is not run and rate <= slower.rate * (1 + NOMINAL):
         run, remark = slower, f"Labelled at {slower.rate:g} Hz, the rate of its values."
-    if not _close(run.rate, rate):
+    if abs(run.rate / rate - 1) >= NOMINAL:
         run = nm.decimated(run, rate)
         left = f"nothing above {rate / 2:g} Hz is left"
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}: {left}."
-    lasting, bursts = _line_detectors(run)
+    start = float(run.time[0])
+    lasting, bursts = (
+        nc.Lasting(run.rate, start=start),
+        nc.Bursts(run.rate, start=start, whole=True),
+    )
     pieces = _watched(run, lasting, bursts)
-    labels = classifier.classify_pieces(pieces, run.rate, start=float(run.time[0]), whole=True)
+    labels = classifier.classify_pieces(pieces, run.rate, start=start, whole=True)
     if not (lasting.examined or len(labels.events())) and nc.lasting.MEASURED in signal_names(run):
         raise CannotTellError(
             f"no stretch of {nc.lasting.SHORTEST:g} s without a gap, as it takes to tell what lasts"
@@ -110,21 +114,24 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
             " requires"
         )
-    found = {"lasting": lasting.events, "bursts": bursts.events}
-    return _labelled(classifier, name, labels, remark, **found)
+    novel = 0 if labels.novel is None else int(labels.novel.sum())
+    if novel:
+        line = f"{novel} of {len(labels)} frames are out of distribution for model {name}."
+        remark = f"{remark} {line}".lstrip()
+    alarm = None if labels.above_threshold is None else classifier.profile.alarm
+    return Labelled(labels, name, remark, alarm, lasting.events, bursts.events)
 
 
 def lines(run: nm.Run) -> tuple[Events, Events]:
     """What lasts in a run, and its bursts."""
-    lasting, bursts = _line_detectors(run)
+    start = float(run.time[0])
+    lasting, bursts = (
+        nc.Lasting(run.rate, start=start),
+        nc.Bursts(run.rate, start=start, whole=True),
+    )
     for _ in _watched(run, lasting, bursts):
         pass
     return lasting.events, bursts.events
-
-
-def _line_detectors(run: nm.Run) -> tuple[nc.Lasting, nc.Bursts]:
-    start = float(run.time[0])
-    return nc.Lasting(run.rate, start=start), nc.Bursts(run.rate, start=start, whole=True)
 
 
 def _watched(
@@ -167,51 +174,14 @@ def signals_of(run: nm.Run) -> dict[str, Real]:
 
 def signal_names(run: nm.Run) -> tuple[str, ...]:
     """Names of the signals of a run, as `signals_of` has them."""
+    errors = False  # whether the desired motion is not the measured one
+    for piece in pieces_of(run):
+        if (desired := piece.velocity_desired) is not None and not errors:
+            measured, wanted = in_both(piece)
+            errors = bool(np.any(desired[:, wanted] != piece.velocity[:, measured]))
     one = next(pieces_of(run, samples=1))
-    errors = any(_differs(piece) for piece in pieces_of(run))
     return tuple(name for name in _signals(one) if errors or not name.startswith("error"))
 
 
 def _signals(run: nm.Run) -> dict[str, Real]:
     return {**nm.norms(run), **nm.by_joint(run)}
-
-
-def _differs(run: nm.Run) -> bool:
-    """Whether the desired motion is not the measured one."""
-    desired = run.velocity_desired
-    if desired is None:
-        return False
-    measured, wanted = in_both(run)
-    return bool(np.any(desired[:, wanted] != run.velocity[:, measured]))
-
-
-def _labelled(
-    classifier: nc.Classifier, name: str, labels: nc.Labels, remark: str = "", **lines: Events
-) -> Labelled:
-    """Add the alarm threshold, and a remark on how many frames are out of distribution."""
-    novel = 0 if labels.novel is None else int(labels.novel.sum())
-    if novel:
-        line = f"{novel} of {len(labels)} frames are out of distribution for model {name}."
-        remark = f"{remark} {line}".lstrip()
-    alarm = None if labels.above_threshold is None else classifier.profile.alarm
-    return Labelled(labels, name, remark, alarm, **lines)
-
-
-def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
-    """Label a scalar noise in [rad/s] at uniform times in [s], as NoisyTest's logs hold it."""
-    rate = nc.nominal_rate(time)
-    try:
-        name, classifier = nc.nearest(library, rate, (nc.NOISE,))
-    except nc.ModelsError as error:
-        raise CannotTellError(str(error)) from error
-    if not _close(rate, classifier.rate):
-        raise CannotTellError(
-            f"without joint velocities, {rate:g} Hz cannot be decimated to the"
-            f" {classifier.rate:g} Hz of model {name}"
-        )
-    labels = classifier.classify(noise, rate, start=float(time[0]))
-    return _labelled(classifier, name, labels)
-
-
-def _close(rate: float, other: float) -> bool:
-    return abs(rate / other - 1) < NOMINAL

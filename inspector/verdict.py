@@ -11,7 +11,6 @@ import fcntl
 import hashlib
 import json
 import os
-import re
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -25,7 +24,7 @@ from typing import IO, Any
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector.analysis import Analysis, analyse, analyse_noise
+from inspector.analysis import Analysis, analyse
 from inspector.errors import EXIT, FileError, InspectorError, Status, Unknown, without_path, worst
 from inspector.library import Library
 from inspector.localisation.order import Order
@@ -45,7 +44,6 @@ FORMAT = "noise-classify-state/2"
 # Most bytes of a file that is resumed: enough for some hundred thousand runs.
 MAX_BYTES = 256 * 2**20
 DRAWING = 0.4  # about how long a picture takes, in [s]
-LONGEST_LINE = 2**16  # characters of a line that are looked at
 
 # Draws a picture of an analysis with its verdict and comparison, which is None without a reference,
 # and gives its path.
@@ -399,18 +397,14 @@ def classify_file(
     """Classify one file; errors become part of the verdict.
 
     Args:
-        path: A run file, any log that `inspector import` reads, or one of NoisyTest's two-column
-            logs (``*.log``).
+        path: A run file, or any log that `inspector import` reads.
     """
     source = path if isinstance(path, Source) else Source(path)
     begun = perf_counter()
     try:
-        if source.path.suffix == ".log" and not _has_header(source.path):
-            analysis = analyse_noise(*nc.read_log(source.path), library, unknown=unknown)
-        else:
-            opened = open_source(source, reading)
-            analysis = analyse(opened.run, library, unknown=unknown)
-            analysis = replace(analysis, assumed=opened.assumed)
+        opened = open_source(source, reading)
+        analysis = analyse(opened.run, library, unknown=unknown)
+        analysis = replace(analysis, assumed=opened.assumed)
         verdict, comparison = Verdict.of(source.shown, analysis), None
         if reference is not None:
             verdict, comparison = reference(analysis, verdict)
@@ -513,18 +507,6 @@ def work_of(paths: Sequence[Path | Source], each: float = 0.0) -> float:
     """
     files = (each.path if isinstance(each, Source) else each for each in paths)
     return sum(file.stat().st_size for file in files if file.is_file()) / 50e6 + each * len(paths)
-
-
-def _has_header(path: Path) -> bool:
-    """Whether a text begins with a line of names: NoisyTest's logs have two numbers a line."""
-    if not path.is_file():  # a device or a pipe may have no end
-        return True
-    with suppress(OSError), path.open(encoding="utf-8", errors="replace") as stream:
-        while line := stream.readline(LONGEST_LINE):
-            content = line.partition("#")[0].strip()
-            if content:
-                return len(re.split(r"[,;\s]+", content)) > 2 or content[0].isalpha()
-    return False
 
 
 def exit_status(verdicts: Sequence[Verdict]) -> int:

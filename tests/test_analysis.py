@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +18,6 @@ from inspector.analysis import (
     Estimate,
     analyse,
     analyse_file,
-    analyse_noise,
     default_kinds,
     estimate,
     extents,
@@ -34,7 +32,7 @@ from inspector.library import demo_run, load_library, model_files
 from inspector.report import findings, html
 from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
-from inspector.verdict import Verdict, _has_header, classify_file, exit_status, work_of
+from inspector.verdict import Verdict, classify_file, exit_status, work_of
 from noiseclassifier import Event, Labels
 from noisemodel import NoiseModelError, Robot, Run
 from noisemodel.run import METHOD, joint_velocity
@@ -70,7 +68,8 @@ def analysed(text, **changes):
     spans = labels.events()
     status = Status.FINDINGS if spans else Status.OK
     fields = {"labels": labels, "spans": spans, "findings": spans, "status": status}
-    return Analysis(**({"name": "run", "run": moving()} | fields | changes))
+    run = changes.get("run", moving())
+    return Analysis(**({"name": "run", "run": run, "audit": audit(run, {})} | fields | changes))
 
 
 def test_the_status_is_the_same_in_every_output(tmp_path):
@@ -170,14 +169,12 @@ def test_a_lane_covers_all_frames_once_and_shows_each_finding(text):
 
 def test_unknown_frames_that_are_ignored_raise_nothing_and_are_a_remark():
     generator = np.random.default_rng(3)
-    loud = 1e4 * generator.normal(size=(5000, 1))
-    noise = np.abs(loud[:, 0])
-    time = np.arange(5000) / RATE
-    library = {"fixed": fixed()}
-    found = analyse_noise(time, noise, library)
+    time, loud = np.arange(5000) / RATE, 1e4 * generator.normal(size=(5000, 1))
+    run, library = Run(time=time, velocity=loud, joint_names=("a",)), {"fixed": fixed()}
+    found = analyse(run, library)
     assert found.status is Status.FINDINGS
     assert all(event.novel for event in found.findings)
-    ignoring = analyse_noise(time, noise, library, unknown=Unknown.IGNORE)
+    ignoring = analyse(run, library, unknown=Unknown.IGNORE)
     assert "unknown" not in {event.label for event in ignoring.findings}
     assert "unknown frames are ignored" in ignoring.headline
     assert "Unknown frames are ignored." in ignoring.message
@@ -315,29 +312,6 @@ def test_a_run_file_is_analysed_by_its_path_and_a_shipped_model_by_its_name(tmp_
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
     assert (found.name, found.model, found.model_sha256) == ("shaken", "general", sha256)
     assert found.findings == analyse(run, library).findings
-
-
-@pytest.mark.parametrize(
-    ("content", "names"),
-    [
-        ("0.0 1.5\n", False),
-        ("# time noise\n\n 0.0, 1.5\n", False),
-        ("-1;2\n", False),
-        ("time,noise\n", True),
-        ("0.0 1.5 2.5\n", True),
-        ("# nothing but a remark\n", False),
-    ],
-)
-def test_a_log_of_two_numbers_a_line_is_told_from_one_with_names(tmp_path, content, names):
-    path = tmp_path / "noise.log"
-    path.write_text(content)
-    assert _has_header(path) == names
-
-
-def test_what_is_no_regular_file_is_not_read_for_a_header(tmp_path):
-    os.mkfifo(tmp_path / "pipe.log")  # has no end, and is never opened
-    assert _has_header(tmp_path / "pipe.log")
-    assert _has_header(tmp_path)
 
 
 def test_a_verdict_has_localisations_where_they_are_asked_for():

@@ -1,6 +1,7 @@
 import numpy as np
 
 from inspector.analysis import SHOWN, Analysis, Status, chosen
+from inspector.audit.audit import audit
 from inspector.levels import STEP
 from noiseclassifier import Event
 from noisemodel import Run
@@ -10,7 +11,7 @@ TIME = np.arange(100) * 0.05
 
 def analysed(*findings):
     run = Run(time=np.arange(10) / 100, velocity=np.zeros((10, 1)), joint_names=("a",))
-    return Analysis(name="a", status=Status.OK, run=run, findings=findings)
+    return Analysis(name="a", status=Status.OK, run=run, audit=audit(run, {}), findings=findings)
 
 
 def test_rows_are_the_loudest_during_findings_in_the_order_of_the_robot():

@@ -133,16 +133,6 @@ def test_a_run_between_two_rates_is_decimated_never_upsampled(tmp_path):
     assert "Labelled at 1000 Hz" in out
 
 
-def test_noisytests_logs_are_classified(tmp_path):
-    time = np.arange(10_000) / 10_000
-    np.savetxt(tmp_path / "quiet.log", np.column_stack((time, 1 + 0.1 * np.cos(time))))
-    status, out, _ = inspector("classify", tmp_path / "quiet.log", "--format", "json")
-    (verdict,) = json.loads(out)["runs"]
-    assert status in (0, 1)
-    assert verdict["status"] in ("ok", "findings")
-    assert verdict["model"] == "general"
-
-
 def test_one_bad_file_never_stops_the_rest(tmp_path):
     (tmp_path / "text.npz").write_text("not an archive")
     good = run_without_robot(tmp_path / "good.npz")

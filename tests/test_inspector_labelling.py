@@ -8,7 +8,6 @@ from generalmodel import fixed
 
 from inspector.library import (
     CannotTellError,
-    label_noise,
     label_run,
     load_library,
     model_files,
@@ -64,14 +63,6 @@ def test_a_faster_run_is_decimated_and_a_slower_one_is_not_classified():
     )
     with pytest.raises(CannotTellError, match="79 Hz"):
         label_run(run_of(np.zeros((2000, 1)), 79.0), LIBRARY)
-
-
-def test_a_scalar_noise_cannot_be_decimated():
-    time = np.arange(20_000) / 5000.0
-    with pytest.raises(CannotTellError, match="5000 Hz cannot be decimated to the 1000 Hz of"):
-        label_noise(time, np.ones(20_000), of_panda())
-    with pytest.raises(CannotTellError, match="20000 Hz cannot be decimated to the 10000 Hz of"):
-        label_noise(time / 4.0, np.ones(20_000), LIBRARY)
 
 
 def test_the_model_with_most_of_the_signals_of_a_run_is_taken():

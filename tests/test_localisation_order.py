@@ -202,6 +202,5 @@ def test_the_picture_has_a_line_for_each_order(vibration, monkeypatch):
     assert titles[0] == "\n".join(["filled: found", *wanted])
 
 
-def test_a_scalar_noise_and_a_run_without_findings_have_no_orders():
-    assert analysed(ripple(0.05), audit=None).orders == {}
+def test_a_run_without_findings_has_no_orders():
     assert analysed(ripple(0.05), spans=(), findings=()).orders == {}

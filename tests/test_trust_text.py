@@ -8,7 +8,7 @@ import pytest
 
 import noiseclassifier as nc
 from inspector import verdict
-from inspector.errors import InspectorError, Status
+from inspector.errors import InspectorError
 from inspector.export.labels import read_labels
 from inspector.live import LiveError, LiveSession
 from inspector.live.pipe import reader_of
@@ -18,7 +18,6 @@ from inspector.logs.read import read_log
 from inspector.reference import store
 from inspector.text import counted, natural, plain, toml_shown
 from inspector.training import tune
-from inspector.verdict import classify_file
 from noiseclassifier import jsontext, noisytest
 from noiseclassifier.scenarios import DatasetError
 from noiseclassifier.scenarios.dataset import Folder
@@ -177,11 +176,6 @@ def test_a_live_row_of_more_joints_than_a_run_may_have_is_refused(tmp_path):
         LiveSession(100.0, save=tmp_path / "a.rrd", library={}) as session,
     ):
         session.push(velocity=np.ones(100_000))
-
-
-def test_a_pipe_is_no_log_of_two_columns(tmp_path):
-    os.mkfifo(tmp_path / "a.log")
-    assert classify_file(tmp_path / "a.log", {}).status is Status.BAD_INPUT
 
 
 def test_numbers_are_counted_rounded_and_sorted_as_people_write_them():

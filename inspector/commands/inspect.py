@@ -162,7 +162,6 @@ def _page(run: Path, output: Path, request: Request) -> None:
     """Write one HTML page about a run: findings, picture, sound."""
     require("a report")
     found, verdict, beside = _analysed(opened(run, request.reading), request)
-    assert found.audit is not None
     html.write(
         found,
         output,

@@ -58,9 +58,8 @@ def collect(run: nm.Run, library: Library, *, kind: str = "normal") -> Content:
     if kind not in nm.KINDS:
         raise nm.UnknownKindError(kind, tuple(nm.KINDS))
     analysis = analyse(run, library)
-    run, missing, extended = analysis.run, list(analysis.notes), None
-    if analysis.audit is not None:
-        missing += summary(analysis.audit, classes=False)
+    run, extended = analysis.run, None
+    missing = [*analysis.notes, *summary(analysis.audit, classes=False)]
     if analysis.labels is None:
         missing.append(f"No labels: {analysis.reason}.")
     if not robot_known(run) or run.position is None:
@@ -184,8 +183,6 @@ def write_mcap(content: Content, path: Path) -> None:
 def _joint_signals(content: Content) -> dict[str, tuple[tuple[str, ...], dict[str, Array]]]:
     """What the JointStates hold: by topic the joints, and by field an array (samples, joints)."""
     run = content.analysis.run
-    if content.analysis.audit is None:  # a scalar noise has no joints
-        return {}
     measured = {"position": run.position, "velocity": run.velocity, "effort": run.effort}
     desired = {"position": run.position_desired, "velocity": run.velocity_desired}
     signals = {MEASURED: (run.joint_names, measured), DESIRED: (run.desired_joint_names, desired)}

@@ -65,7 +65,7 @@ class References:
     def __call__(self, analysis: Analysis, verdict: Verdict) -> tuple[Verdict, Comparison | None]:
         """Add the evidence of the reference to the verdict on a run, and compare them."""
         path = self.of.get(verdict.path)
-        if path is None or analysis.audit is None:
+        if path is None:
             return verdict, None
         reference = self.loaded[path]
         name = scenario_of(analysis.run, verdict.path)
