@@ -7,6 +7,9 @@ import numpy as np
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
+from noiseclassifier import Labels
+
+CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 LINE = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
 LINE |= {"SeriesLines:aggregation_policy"}
 ROW = LINE
@@ -102,3 +105,12 @@ def check_columns(path: Path, columns: dict[str, set[str]]) -> None:
         seen.add(patterns[0])
     assert seen == set(columns)
     assert {column.name for column in schema.index_columns()} == {"time"}
+
+
+def some_labels(failing):
+    """Labels of frames of 0.4 s, of which a slice is impacts."""
+    start = np.arange(0, 2.6, 0.1)
+    label = np.array(["ok"] * len(start), dtype="U20")
+    label[failing] = "impact"
+    scores = np.tile([0.7, 0.1, 0.1, 0.1], (len(start), 1))
+    return Labels(start=start, stop=start + 0.4, label=label, scores=scores, classes=CLASSES)

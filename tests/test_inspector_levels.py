@@ -2,9 +2,22 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from inspector import colors
-from inspector.levels import FLOOR_DB, JOINTS, LINKS, STEP, link_levels, velocity_levels
+from inspector.levels import (
+    COLUMNS,
+    FLOOR_DB,
+    JOINTS,
+    LINKS,
+    STEP,
+    extremes,
+    in_bands,
+    link_levels,
+    spectrogram,
+    velocity_levels,
+)
 from noisemodel.noise import LinkNoise
 
 RATE = 1000.0
@@ -89,3 +102,83 @@ def test_ticks_span_a_scale():
 def test_a_scale_follows_a_run_but_a_quiet_run_looks_quiet(loudest, high):
     scale = JOINTS.following(np.array([-np.inf, np.nan, loudest, loudest - 30.0]))
     assert (scale.low, scale.high, scale.unit) == (high - 60.0, high, JOINTS.unit)
+
+
+# Spectrograms.
+
+
+def wave(hertz, rate, seconds):
+    time = np.arange(round(rate * seconds)) / rate
+    return np.sin(2 * np.pi * hertz * time)
+
+
+@pytest.mark.parametrize(("hertz", "rate"), [(300.0, 10_000.0), (120.0, 1000.0), (20.0, 250.0)])
+def test_a_tone_is_loudest_at_its_frequency(hertz, rate):
+    signal = wave(hertz, rate, 2.0)
+    shown = spectrogram(signal, rate, start=0.0, valid=everywhere(signal))
+    loudest = shown.frequency[shown.amplitude.argmax(axis=0)]
+    assert np.abs(loudest - hertz).max() <= shown.frequency[1] - shown.frequency[0]
+
+
+def test_the_constant_part_of_a_noise_is_not_shown():
+    signal = 1000.0 + wave(200.0, 10_000.0, 1.0)
+    shown = spectrogram(signal, 10_000.0, start=0.0, valid=everywhere(signal))
+    assert shown.frequency[shown.amplitude.mean(axis=1).argmax()] == pytest.approx(200.0, abs=10.0)
+
+
+def test_windows_that_touch_a_gap_are_silent():
+    signal = wave(100.0, 1000.0, 4.0)
+    valid = everywhere(signal)
+    valid[2000:2010] = False
+    shown = spectrogram(signal, 1000.0, start=0.0, valid=valid)
+    silent = (shown.amplitude == 0.0).all(axis=0)
+    assert silent[np.abs(shown.time - 2.0) < 0.04].all()
+    assert not silent[np.abs(shown.time - 2.0) > 0.07].any()
+
+
+def test_times_are_those_of_the_run():
+    signal = np.zeros(10_000)
+    signal[5000:5010] = 1.0
+    shown = spectrogram(signal, 10_000.0, start=7.0, valid=everywhere(signal))
+    assert shown.time[shown.amplitude.max(axis=0).argmax()] == pytest.approx(7.5, abs=0.03)
+
+
+def test_columns_are_few_however_long_the_run():
+    signal = wave(50.0, 1000.0, 300.0)
+    shown = spectrogram(signal, 1000.0, start=0.0, valid=everywhere(signal))
+    assert shown.amplitude.shape[1] <= COLUMNS
+    assert shown.time[-1] > 299.0
+
+
+def test_a_band_has_the_largest_amplitude_within_it():
+    frequency, amplitude = np.arange(1.0, 11.0), np.arange(20.0).reshape(10, 2)
+    found = in_bands(frequency, amplitude, np.array([1.0, 4.0, 11.0]))
+    np.testing.assert_allclose(found, [[4.0, 5.0], [18.0, 19.0]])
+
+
+def test_a_band_narrower_than_the_bins_has_that_of_the_nearest():
+    frequency, amplitude = np.array([10.0, 20.0, 30.0]), np.array([[1.0], [5.0], [2.0]])
+    found = in_bands(frequency, amplitude, np.array([11.0, 12.0, 18.5, 19.0]))
+    np.testing.assert_allclose(found[[0, 2], 0], [1.0, 5.0])
+
+
+# Lines of few points.
+
+
+@given(st.integers(1, 5000), st.integers(2, 300), st.integers(0, 2**32 - 1))
+def test_no_peak_is_lost_and_points_are_few(samples, points, seed):
+    values = np.random.default_rng(seed).normal(size=(samples, 3))
+    time = np.arange(samples) / 100
+    kept_time, kept = extremes(time, values, points=points)
+    assert len(kept) <= max(points, 2)
+    assert len(kept_time) == len(kept)
+    np.testing.assert_array_equal(kept.max(axis=0), values.max(axis=0))
+    np.testing.assert_array_equal(kept.min(axis=0), values.min(axis=0))
+    assert (np.diff(kept_time) >= 0).all()
+
+
+def test_short_signals_are_kept_as_they_are():
+    values = np.arange(10.0)[:, None]
+    time, kept = extremes(np.arange(10.0), values, points=10)
+    np.testing.assert_array_equal(kept, values)
+    np.testing.assert_array_equal(time, np.arange(10.0))

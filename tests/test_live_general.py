@@ -36,17 +36,3 @@ def test_live_motion_of_any_rate_is_labelled_as_it_comes(rate):
         np.testing.assert_allclose(
             each, getattr(whole, name)[:count]
         ) if name != "label" else np.testing.assert_array_equal(each, whole.label[:count])
-
-
-@pytest.mark.parametrize(
-    ("rate", "reason"),
-    [
-        (50.0, "logged at 50 Hz, the model needs 80 Hz or more"),
-        (
-            12_000.0,
-            "samples come at 12000 Hz, the nearest model takes 10000 Hz; only files are decimated",
-        ),
-    ],
-)
-def test_live_motion_below_80_hz_or_above_10_khz_has_no_labels(rate, reason):
-    assert Labeller(library(), rate, {"velocity": 3}).remark == f"No labels: {reason}."

@@ -202,17 +202,6 @@ def test_lines_are_drawn_every_tenth_of_a_second_for_a_viewer_and_none_is_left_o
     assert sum(not chunk.is_static for chunk in chunks) == messages
 
 
-def test_a_file_without_a_viewer_has_few_messages(tmp_path, library):
-    """For each, rerun keeps some hundred bytes until the file is closed."""
-    signals = motion(20.0, 7)
-    path, _, _ = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)
-    chunks = RrdReader(path).store().stream().to_chunks()
-    moving = [chunk for chunk in chunks if not chunk.is_static]
-    entities = {chunk.entity_path for chunk in moving}
-    assert {"/robot/motion", "/score", "/spectrogram/bands"} < entities
-    assert len(moving) <= 12 * len(entities)
-
-
 def test_the_robot_has_the_pose_of_its_joints(panda):
     (path, _, _), signals = panda, motion(3.0, 7)
     time, turns = read(path, "/robot/motion", "Transform3D:quaternion")
@@ -295,26 +284,6 @@ def test_live_finds_what_classify_finds_on_the_same_samples(tmp_path, library, k
         assert live.score == pytest.approx(span.score, abs=1e-6)
         assert 0.0 <= finding.start - live.start <= 0.41  # a frame
         assert -0.11 <= live.stop - finding.stop <= 0.41
-
-
-@pytest.mark.parametrize(
-    ("stamps", "seconds"),
-    [
-        (lambda time: np.where(np.arange(len(time)) == 700, time + 100.0, time), 4.0),
-        (lambda time: np.where(time < 2.0, time, time - 1.0), 4.0),
-        (lambda time: np.where(time < 2.0, time, time + 3000.0), 3004.0),
-        (lambda time: 1e9 * (time + 1.7e9), 1.7e9 + 4.0),
-    ],
-    ids=["an outlier", "a second back", "a gap", "nanoseconds"],
-)
-def test_a_hum_after_the_clock_jumped_is_found_as_before(tmp_path, library, stamps, seconds):
-    signals = motion(4.0, hum=(2.6, 3.4))
-    signals["time"] = stamps(signals["time"])
-    _, _, summary = shown(tmp_path, signals, range(70, 4000, 70), library=library)
-    (event,) = summary.findings
-    assert (event.label, summary.status) == ("oscillations", "findings")
-    assert 0.5 < event.stop - event.start < 1.8  # by frames of 0.4 s and windows of 1 s
-    assert seconds - 0.95 < event.stop < seconds + 0.01
 
 
 def test_samples_that_are_left_out_leave_no_verdict_of_ok(tmp_path, library):

@@ -17,7 +17,6 @@ from inspector.compare.pair import (
     summary,
     whole,
 )
-from inspector.compare.recording import write
 from inspector.errors import InspectorError
 from inspector.library import demo_run, load_library, model_files
 from noiseclassifier import Event
@@ -295,28 +294,3 @@ def test_what_only_one_run_has_is_left_out_and_silence_in_both_is_no_change(tmp_
     assert whole(pair).change == 0.0
     assert "vibration +0.0 dB" in report(pair)
     assert "nothing found in either" in summary(pair)
-
-
-@pytest.mark.slow
-def test_a_limit_cycle_is_new(tmp_path, library):
-    pytest.importorskip("mujoco")
-    scenarios = pytest.importorskip("noiseclassifier.scenarios")
-    runs = [scenarios.simulate("panda", scenario, 3) for scenario in ("straight", "limit-cycle")]
-    pair = compared(tmp_path, *runs, library)
-    assert abs(pair.alignment.seconds) < 0.01
-    new = [change for change in changes(pair) if change.kind == "new"]
-    blocks = [block for block in runs[1].blocks if block.label == "oscillations"]
-    for block in blocks:
-        assert any(c.start < block.stop and block.start < c.stop for c in new)
-    assert whole(pair).change > 1.0
-
-
-def test_runs_without_a_common_joint_are_shown_beside_each_other(tmp_path):
-    time = np.arange(4000) / 1000
-    one, other = (
-        Run(time=time, velocity=np.cos(time)[:, None], velocity_desired=np.cos(time)[:, None],
-            joint_names=(name,))
-        for name in ("elbow", "knee")
-    )  # fmt: skip
-    write(compared(tmp_path, one, other), tmp_path / "pair.rrd")
-    assert (tmp_path / "pair.rrd").exists()

@@ -19,6 +19,7 @@ from recordings import (
     properties,
     read,
     settings,
+    some_labels,
     stretches,
 )
 from rerun.chunk import RrdReader
@@ -28,10 +29,8 @@ from inspector.compare.recording import write
 from inspector.levels import LINKS as LINK_SCALE
 from inspector.levels import link_levels
 from inspector.recording import panels
-from noiseclassifier import Event, Labels
+from noiseclassifier import Event
 from noisemodel import Block, Run
-
-CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 
 
 @pytest.fixture(autouse=True)
@@ -56,14 +55,6 @@ def panda(scale=1.0, rattle=0.1, **changes):
         "blocks": (Block(0.2, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
     }
     return Run(**(fields | changes))
-
-
-def some_labels(failing):
-    start = np.arange(0, 2.6, 0.1)
-    label = np.array(["ok"] * len(start), dtype="U20")
-    label[failing] = "impact"
-    scores = np.tile([0.7, 0.1, 0.1, 0.1], (len(start), 1))
-    return Labels(start=start, stop=start + 0.4, label=label, scores=scores, classes=CLASSES)
 
 
 def compared(folder, before, after, **options):
@@ -314,18 +305,6 @@ def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(tmp_path):
     assert "/class/after/annotated/oscillations" in entities(tmp_path / "ab.rrd")
     status, out, _ = inspector("view", *runs, *save, "--align", "start", "--overwrite")
     assert (status, "aligned from the start, as requested" in out) == (0, True)
-
-
-def test_runs_that_share_no_time_end_with_one_line(tmp_path):
-    run = panda(robot=None, blocks=())
-    run.save(tmp_path / "a.npz")
-    panda(robot=None, blocks=(), time=run.time + 9).save(tmp_path / "b.npz")
-    runs = (tmp_path / "a.npz", tmp_path / "b.npz")
-    status, _, err = inspector("view", *runs, "--align", "none", "-o", tmp_path / "ab.rrd")
-    assert status == 3
-    assert err.count("\n") == 1
-    assert "they share no time; `--align start`" in err
-    assert not (tmp_path / "ab.rrd").exists()
 
 
 @pytest.mark.slow

@@ -104,19 +104,3 @@ def test_the_picture_of_the_page_shades_the_same_stretches_in_the_same_colours(
     assert ([(event.start, event.stop - event.start)], painted) in bars
     _, (rgba,) = read(recording, f"/noise/finding/{event.label}", "Measurements:colors")
     assert rgba[0] >> 8 == int.from_bytes(bytes(shade), "big")
-
-
-def test_rows_of_classes_joints_and_links_are_the_same(recording, page):
-    names = [values[1] for values, _ in page[1]["set_yticks"] if len(values) == 2]
-    for panel, shown in zip(("class", "joints", "links"), names, strict=True):
-        _, (labels,) = read(recording, f"/axis/{panel}/left", "Points2D:labels")
-        assert labels == shown
-
-
-def test_classes_are_written_as_words_in_both(recording, page):
-    shown = re.sub(r"base64,[^\"]*", "", page[0])
-    assert "high accelerations" in shown  # in a remark
-    assert "highaccelerations" not in shown
-    assert "highaccelerations" not in text(recording)
-    _, (labels,) = read(recording, "/axis/class/left", "Points2D:labels")
-    assert "high accelerations" in labels

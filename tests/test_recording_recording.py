@@ -19,6 +19,7 @@ from recordings import (
     properties,
     read,
     settings,
+    some_labels,
     stretches,
 )
 from rerun.chunk import RrdReader
@@ -33,11 +34,10 @@ from inspector.recording.panels import HEIGHT, NOISE_POINTS, scaled
 from inspector.recording.run import height, write
 from inspector.reference.judging import Scenario, compare
 from inspector.reference.levels import levels as levels_of
-from noiseclassifier import Event, Labels
-from noisemodel import Block, Run, UnknownJointError
+from noiseclassifier import Event
+from noisemodel import Block, Run
 
 SOUND = b"RIFF....WAVE, as far as a recording is concerned"
-CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 
 
 @pytest.fixture(autouse=True)
@@ -80,12 +80,7 @@ def inspected(run, tmp_path, labels=None, **options) -> Analysis:
     )
 
 
-def some_labels():
-    start = np.arange(0, 2.6, 0.1)
-    label = np.array(["ok"] * len(start), dtype="U20")
-    label[5:8] = "impact"
-    scores = np.tile([0.7, 0.1, 0.1, 0.1], (len(start), 1))
-    return Labels(start=start, stop=start + 0.4, label=label, scores=scores, classes=CLASSES)
+LABELLED = some_labels(slice(5, 8))
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +88,7 @@ def whole(tmp_path_factory):
     rr.set_strict_mode(True)
     folder = tmp_path_factory.mktemp("whole")
     run = panda_run()
-    found = inspected(run, folder, some_labels(), kind="paper")
+    found = inspected(run, folder, LABELLED, kind="paper")
     write(found, folder / "out.rrd", sound=SOUND)
     return folder / "out.rrd", run
 
@@ -165,15 +160,6 @@ def test_findings_are_shaded_from_onset_to_end_over_the_whole_panel(whole, panel
     assert (values[0][0] - half, values[0][0] + half) == (pytest.approx(low), pytest.approx(high))
 
 
-def test_no_two_classes_share_a_row_or_a_marker(whole):
-    path, _ = whole
-    _, values = read(path, "/class/found/ok", "Measurements:values")
-    _, others = read(path, "/class/found/impact", "Measurements:values")
-    assert abs(values[0][0] - others[0][0]) > 1.0
-    _, (names,) = read(path, "/axis/class/left", "Points2D:labels")
-    assert names == ["impact", "high accelerations", "oscillations", "ok"]
-
-
 def over_time(path):
     """Settings of the plots whose time axes are linked, by their origin."""
     views = {}
@@ -226,13 +212,13 @@ def test_the_noise_of_a_fast_robot_is_scaled_to_one_digit():
 def test_the_probability_of_a_failure_stands_beside_the_alarm_threshold(whole):
     path, run = whole
     time, values = read(path, "/probability/failure", "Scalars:scalars")
-    np.testing.assert_allclose(time, some_labels().start + 0.2, atol=1e-9)
+    np.testing.assert_allclose(time, LABELLED.start + 0.2, atol=1e-9)
     np.testing.assert_allclose(values, 0.3)
     time, values = read(path, "/probability/alarm", "Scalars:scalars")
     np.testing.assert_allclose(time, run.time[[0, -1]], atol=1e-9)
     np.testing.assert_allclose(values, 0.25)
     time, score = read(path, "/score/ok", "Scalars:scalars")
-    np.testing.assert_allclose(time, some_labels().start + 0.2, atol=1e-9)
+    np.testing.assert_allclose(time, LABELLED.start + 0.2, atol=1e-9)
     assert {value[0] for value in score} == {0.7}
     _, (labels,) = read(path, "/axis/probability/right", "Points2D:labels")
     assert labels == ["alarm 0.25"]
@@ -256,21 +242,6 @@ def shades(path, entity):
 def brightest(path, entity):
     """Greatest lightness of a row."""
     return (shades(path, entity)[1] @ [0.2126, 0.7152, 0.0722]).max()
-
-
-def test_a_louder_fault_never_has_a_darker_cell(tmp_path):
-    bright = []
-    for factor in (1.0, 8.0, 100.0):
-        run = panda_run(robot=None, blocks=())
-        velocity = run.velocity.copy()
-        during = (run.time >= 1.0) & (run.time < 1.5)
-        velocity[during, 2] += 0.01 * factor * np.sin(2 * np.pi * 90.0 * run.time[during])
-        path = tmp_path / "out.rrd"
-        run = dataclasses.replace(run, velocity=velocity)
-        write(inspected(run, tmp_path), path, overwrite=True)
-        bright.append(brightest(path, "/strips/joints/02") - brightest(path, "/strips/joints/05"))
-    assert bright == sorted(bright)
-    assert bright[-1] > bright[0] + 50
 
 
 def test_the_colours_of_a_row_change_where_the_joint_begins_to_vibrate(tmp_path):
@@ -366,7 +337,7 @@ def test_gaps_are_hatched_and_named_in_every_panel(tmp_path):
     valid = np.ones(len(run.time), dtype=bool)
     valid[12_000:14_000] = False
     path = tmp_path / "out.rrd"
-    write(inspected(dataclasses.replace(run, valid=valid), tmp_path, some_labels()), path)
+    write(inspected(dataclasses.replace(run, valid=valid), tmp_path, LABELLED), path)
     time, _ = read(path, "/noise/simplified", "Scalars:scalars")
     assert not ((time > 1.2) & (time < 1.3999)).any()
     for panel in ("class", "noise", "level", "probability", "spectrogram"):
@@ -550,12 +521,6 @@ def test_the_same_input_makes_the_same_recording_id(whole, tmp_path):
     assert len(ids) == 1
 
 
-def test_a_joint_that_the_robot_lacks_is_named(tmp_path):
-    names = ("elbow", *(f"panda_joint{i}" for i in range(2, 8)))
-    with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'; it has panda_"):
-        inspected(panda_run(joint_names=names), tmp_path)
-
-
 def test_an_unreadable_mesh_is_named_and_the_run_can_be_shown_without(tmp_path):
     leg = one_legged(tmp_path)
     leg.write_text(leg.read_text().replace("<box size=", '<mesh filename="gone.stl" scale='))
@@ -591,14 +556,6 @@ def test_the_scale_is_the_same_beside_the_robot_and_the_links(whole):
     _, (robot,) = read(path, "/axis/key/right/scale", "LineStrips2D:colors")
     _, (links,) = read(path, "/axis/links/right/scale", "LineStrips2D:colors")
     assert robot == links
-
-
-def test_the_base_of_an_arm_is_drawn_as_quiet_as_it_is(whole):
-    path, _ = whole
-    mesh = "/robot/panda/visual_geometries/panda_link0/visual_0"
-    time, (colour,) = read(path, mesh, "Asset3D:albedo_factor")
-    assert time is None
-    assert colour == [int.from_bytes([*colors.HEAT[0].astype(int).tolist(), 255], "big")]
 
 
 def test_a_recording_that_fails_halfway_leaves_nothing(tmp_path, monkeypatch):

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from inspector.errors import InspectorError
-from inspector.recording import robot as scene
 from inspector.recording.robot import FACET, drawable
 from noisemodel import meshes
 
@@ -33,16 +32,6 @@ def test_meshes_get_absolute_addresses_and_what_is_not_drawn_goes(tmp_path):
     assert tree.find(".//texture") is None
 
 
-def test_three_slashes_after_package_are_taken_as_two(tmp_path):
-    (tmp_path / "part.stl").write_bytes(TRIANGLE)
-    assert "part.stl" in drawable(robot(tmp_path, "package:///part.stl"), (tmp_path,), tmp_path)
-
-
-def test_a_path_is_relative_to_the_urdf(tmp_path):
-    (tmp_path / "part.stl").write_bytes(TRIANGLE)
-    assert "part.stl" in drawable(robot(tmp_path, "../part.stl"), (tmp_path,), tmp_path)
-
-
 @pytest.mark.parametrize(
     ("name", "content", "problem"),
     [
@@ -57,11 +46,6 @@ def test_a_mesh_that_cannot_be_read_is_named(tmp_path, name, content, problem):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InspectorError, match=f"mesh package://{name}: .*{problem}.*--robot none"):
         drawable(robot(tmp_path, f"package://{name}"), (tmp_path,), tmp_path)
-
-
-def test_a_missing_mesh_is_named_with_the_places_that_were_searched(tmp_path):
-    with pytest.raises(InspectorError, match=f"gone.stl: not found in {tmp_path}"):
-        drawable(robot(tmp_path, "package://gone.stl"), (tmp_path,), tmp_path)
 
 
 @pytest.mark.parametrize("address", ["package://../../secret.stl", "file:///{outside}/secret.stl"])
@@ -112,11 +96,3 @@ def test_collada_that_rerun_cannot_draw_is_drawn_by_our_own_triangles(
     if not kept:
         facets = np.frombuffer(drawn.read_bytes()[84:], FACET)
         np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [0, 0, 1]])
-
-
-def test_a_robot_of_such_meshes_is_in_its_recording(tmp_path):
-    tree = scene.load("romeo", tmp_path)
-    drawn = [shape for shapes in scene.shapes_by_link(tree).values() for shape in shapes]
-    assert {kind for _, kind in drawn} == {"Asset3D"}
-    links = {tree.root_link().name, *(joint.child_link for joint in tree.joints())}
-    assert len(drawn) == sum(len(tree.get_visual_geometry_paths(link)) for link in links)

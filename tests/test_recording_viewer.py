@@ -8,14 +8,13 @@ import sys
 import time
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 
 import browser
 import numpy as np
 import pytest
 
 from inspector.analysis import analyse_file
-from inspector.recording import unstable, viewer
+from inspector.recording import viewer
 from inspector.recording.run import write
 from inspector.recording.viewer import ViewerError
 from noisemodel import Run
@@ -50,40 +49,6 @@ def test_a_viewer_that_runs_already_takes_the_recording_over(monkeypatch, tmp_pa
     fake_viewer(monkeypatch, f"echo $2 >> {tmp_path}/ports")  # `--port 9876`, and it ends at once
     assert viewer.open_window(Path("run.rrd")) == ""
     assert (tmp_path / "ports").read_text().split() == [viewer.PORT]
-
-
-class Client:
-    """What a viewer tells of itself: at first it is not up, then a recording is loading."""
-
-    def __init__(self, states):
-        self.states, self.cursor = iter(states), None
-
-    def get_state(self):
-        state = next(self.states)
-        if isinstance(state, Exception):
-            raise state
-        recordings, loading = state
-        return SimpleNamespace(recordings=recordings, loading=loading)
-
-    def set_time(self, timeline, *, duration):
-        self.cursor = timeline, duration
-
-
-def test_the_time_cursor_is_put_where_it_shall_be_once_the_recording_is_there(monkeypatch):
-    client = Client([ConnectionError(), ([], []), (["a"], ["a"]), (["a"], [])])
-    monkeypatch.setattr(unstable, "client", lambda _: client)
-    fake_viewer(monkeypatch, "true")
-    assert viewer.open_window(Path("run.rrd"), 1.5) == ""
-    assert client.cursor == ("time", 1.5)
-
-
-def test_a_viewer_that_tells_nothing_keeps_its_time_cursor(monkeypatch):
-    monkeypatch.setattr(viewer, "SETTLE", 0.2)
-    client = Client([])
-    monkeypatch.setattr(unstable, "client", lambda _: client)
-    fake_viewer(monkeypatch, "true")
-    assert viewer.open_window(Path("run.rrd"), 1.5) == ""
-    assert client.cursor is None
 
 
 def test_where_another_program_listens_a_free_port_is_taken(monkeypatch, tmp_path):

@@ -110,8 +110,8 @@ def view(
         return
     found = _read(paths, request.reading)
     write_recording = _one if len(found) == 1 else _two if len(paths) == 2 else _several
-    seconds = write_recording(found, target, request)
-    _show(target, seconds, web=web, port=port, saved=output is not None)
+    write_recording(found, target, request)
+    _show(target, web=web, port=port, saved=output is not None)
     if len(found) < len(paths):
         raise typer.Exit(EXIT[Status.BAD_INPUT])
 
@@ -200,8 +200,8 @@ def _analysed(run: Opened, request: Request) -> tuple[Analysis, Verdict | None, 
     return seen(found, verdict), verdict, beside
 
 
-def _one(runs: list[Opened], target: Path, request: Request) -> float:
-    """Write the recording of a run; returns the time of its worst moment, in [s]."""
+def _one(runs: list[Opened], target: Path, request: Request) -> None:
+    """Write the recording of a run."""
     from inspector.recording.run import write
 
     (run,) = runs
@@ -216,7 +216,6 @@ def _one(runs: list[Opened], target: Path, request: Request) -> float:
         lines += [f"beside {verdict.beside.path}: {verdict.beside.words}"] if verdict.beside else []
     for line in (*lines, *found.remarks):
         typer.echo(f"  {line}")
-    return sonification.worst_time(found)
 
 
 def _two(runs: list[Opened], target: Path, request: Request) -> None:
@@ -245,7 +244,7 @@ def _several(runs: list[Opened], target: Path, request: Request) -> None:
         typer.echo(f"{name}: {side.headline}{mark}")
 
 
-def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: bool) -> None:
+def _show(target: Path, *, web: bool, port: int, saved: bool) -> None:
     """Open a recording, or say how it is opened."""
     from inspector.recording import viewer
 
@@ -254,7 +253,7 @@ def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: b
         return
     problem = ""
     if not saved and viewer.has_display():
-        problem = viewer.open_window(target, seconds)
+        problem = viewer.open_window(target)
         if not problem:
             return
     typer.echo(f"recording: {target} ({target.stat().st_size / 1e6:.1f} MB)")

@@ -165,24 +165,10 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
         yield Process(process, stderr)
 
 
-def open_window(recording: Path, seconds: float | None = None) -> str:
+def open_window(recording: Path) -> str:
     """Show a recording in the viewer that runs, or a new one; why no window opened, if none did."""
-    from inspector.recording import unstable
-
-    def cursor_put() -> bool:
-        with suppress(Exception):  # the client raises what it likes until the viewer is up
-            client = unstable.client(f"rerun+http://{HOST}:{PORT}/proxy")
-            state = client.get_state()
-            if state.recordings and not state.loading:
-                client.set_time("time", duration=seconds or 0.0)
-                return True
-        return False
-
-    if launch(PORT, str(recording)):
-        return launch("auto", str(recording))  # another program listens where viewers do
-    if seconds is not None:
-        until(cursor_put, SETTLE)
-    return ""
+    # If a program listens where viewers do that is none, another port is taken.
+    return launch(PORT, str(recording)) and launch("auto", str(recording))
 
 
 def launch(port: str, *arguments: str) -> str:
