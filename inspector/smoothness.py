@@ -11,8 +11,6 @@ Sources:
     smoothness", Journal of NeuroEngineering and Rehabilitation 12, 2015.
 """
 
-import csv
-import io
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,7 +22,7 @@ import numpy as np
 from inspector.errors import without_path
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.read import Reading, Source, open_source, sources
-from inspector.text import cell, counted, progress
+from inspector.text import counted, progress
 from inspector.verdict import EXPECTED
 from noisemodel import Run
 from noisemodel.run import stretches
@@ -341,18 +339,6 @@ def as_text(ranking: Ranking) -> str:
     meaning = SCORES[ranking.by].meaning
     head = f"{counted(len(episodes), 'episode')}, the smoothest first by {meaning}"
     return "\n".join([head, "", *lines, "", *_notes(ranking)])
-
-
-def as_csv(ranking: Ranking) -> str:
-    """Write a ranking as CSV; a score that is missing is an empty cell."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["rank", "log", "episode", "duration", "rate", *SCORES])
-    for rank, each in zip(ranking.ranks, ranking.episodes, strict=True):
-        values = [each.duration, each.rate, *each.scores.values()]
-        numbers = ["" if value is None else f"{value:.6g}" for value in values]
-        writer.writerow([rank, cell(each.log), cell(each.episode), *numbers])
-    return out.getvalue().removesuffix("\n")
 
 
 def as_json(ranking: Ranking) -> str:

@@ -100,14 +100,7 @@ def test_standstill_is_silent_and_reported_so():
 def test_the_chosen_gain_does_not_clip_and_uses_the_full_scale():
     sound = sonify(run_of(0.01 * tone(440)))
     gain = common_gain([sound])
-    assert "clipped" not in sound.description(gain)
     assert 0.85 < np.abs(read(sound.file(gain))[0]).max() < 0.9  # 1 dB of headroom
-
-
-def test_clipping_is_reported():
-    sound = sonify(run_of(0.01 * tone(440)))
-    assert np.abs(read(sound.file(46.0))[0]).max() == 1.0
-    assert sound.description(46.0).endswith("; clipped: it exceeds full scale by 6.1 dB")
 
 
 def test_gaps_are_silent_without_ringing():

@@ -82,15 +82,13 @@ def test_a_table_has_no_cell_that_a_spreadsheet_would_compute(tmp_path, monkeypa
     name = f"{start}HYPERLINK(1)"
     block = Block(0.5, 1.0, name)
     run = Run(time=time, velocity=np.sin(time)[:, None], joint_names=("a",), blocks=(block,))
-    run.save(f"{name}.npz")
     run.save("run.npz")
-    _, table, _ = call("smoothness", "--format", "csv", "--", f"{name}.npz")
     assert call("export", "run.npz", "-o", "run.csv")[0] == 0
     assert call("export", "run.npz", "--labels", "annotated", "-o", "labels.csv")[0] == 0
     assert call("export", "run.npz", "--annotate", "labels.csv", "-o", "back.npz")[0] == 0
-    for text in (table, Path("run.csv").read_text(), Path("labels.csv").read_text()):
+    for text in (Path("run.csv").read_text(), Path("labels.csv").read_text()):
         cells = {cell.strip('"') for line in text.splitlines() for cell in line.split(",")}
-        assert {each for each in cells if name in each} in ({f"'{name}"}, {f"'{name}.npz"})
+        assert {each for each in cells if name in each} == {f"'{name}"}
     assert Run.load("back.npz").blocks == (block,)
 
 

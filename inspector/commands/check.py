@@ -344,7 +344,7 @@ def smoothness(
         Scores | None,
         option("The score to order by; by default level, action_curvature for data sets."),
     ] = None,
-    format: Annotated[Literal["text", "csv", "json"], option("Output format.")] = "text",  # noqa: A002
+    format: shared.TextOrJson = "text",  # noqa: A002
 ) -> None:
     """Rank episodes of policies and demonstrations by smoothness.
 
@@ -353,8 +353,7 @@ def smoothness(
     from inspector import smoothness as ranking
 
     order = ranking.ranked(ranking.scored_episodes(logs, ctx.obj), by=by or "")
-    write = {"text": ranking.as_text, "csv": ranking.as_csv, "json": ranking.as_json}
-    typer.echo(write[format](order))
+    typer.echo(ranking.as_json(order) if format == "json" else ranking.as_text(order))
     for each in order.failed:
         typer.echo(f"inspector: {each.name}: {each.problem}", err=True)
     raise typer.Exit(3 if order.failed else 0)

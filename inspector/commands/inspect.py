@@ -348,10 +348,6 @@ def listen(
         Path, option("WAV file; several get .a, .b ... in its name.", "--output", "-o")
     ],
     joint: Annotated[str, option("The noise of this joint only.")] = "",
-    gain: Annotated[
-        float | None,
-        option("In dB; at 0, full scale is 1 rad/s. By default, the peak fits."),
-    ] = None,
     speed: Annotated[float, option("Playback speed; the pitch changes by the same factor.")] = 1.0,
     overwrite: shared.Overwrite = False,
 ) -> None:
@@ -362,7 +358,7 @@ def listen(
     for each in recorded:
         shared.say_warnings(each)
     sounds = [sonification.sonify(each, joint=joint, speed=speed) for each in recorded]
-    level = sonification.common_gain(sounds) if gain is None else gain
+    level = sonification.common_gain(sounds)
     sonification.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
     for run, path, sound in zip(runs, paths, sounds, strict=True):
         typer.echo(f"{run}: {sound}")

@@ -72,10 +72,6 @@ def tune(
         float, option("Rate of the model in [Hz]; faster runs are decimated.", min=1.0)
     ] = 10000.0,
     grid: Grid = None,
-    criterion: Annotated[
-        Literal["balanced-accuracy", "subset-accuracy"],
-        option("Ranks the points; the other one breaks ties."),
-    ] = "balanced-accuracy",
     train: Annotated[
         Path | None, option("Train the best point on all training runs, write the model.")
     ] = None,
@@ -98,9 +94,9 @@ def tune(
     )
     where = shared.jobs_or_dask(jobs, dask)
     tuned = tuning.tune(search, output, model=train, jobs=where, overwrite=overwrite)
-    typer.echo(dumps(tuned.as_dict(criterion), indent=2) if as_json else tuned.table(criterion))
+    typer.echo(dumps(tuned.as_dict(), indent=2) if as_json else tuned.table())
     if train:
-        tuned.train(train, criterion, overwrite=overwrite)
+        tuned.train(train, overwrite=overwrite)
         typer.echo(f"{train}: written, the best point trained on all training runs", err=as_json)
 
 

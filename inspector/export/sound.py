@@ -76,13 +76,10 @@ class Sound:
         return self.peak < SILENCE
 
     def description(self, gain: float) -> str:
-        """Duration and gain in [dB] of the sound, and whether it is silent or clipped."""
+        """Duration and gain in [dB] of the sound, and whether it is silent."""
         factor, seconds = _factor(gain), len(self.signal) / self.rate / self.speed
         scale = f"gain {gain:+.1f} dB: full scale is {1.0 / factor:.3g} rad/s"
-        over = 20.0 * np.log10(max(self.peak * factor, SILENCE))
-        state = f"; clipped: it exceeds full scale by {over:.1f} dB" if over > 0.0 else ""
-        if self.silent:
-            state = f"; silent: nothing reaches {SILENCE:g} rad/s"
+        state = f"; silent: nothing reaches {SILENCE:g} rad/s" if self.silent else ""
         return f"{seconds:.2f} s, {scale}{state}"
 
     def file(self, gain: float, *, lead: float = 0.0) -> bytes:

@@ -26,7 +26,6 @@ from noiseclassifier.modelfile import versions
 from noiseclassifier.recording import check_apart, folds, group_of
 from noiseclassifier.tuning import (
     ESTIMATOR_SETTINGS,
-    Criterion,
     Grid,
     Measures,
     Point,
@@ -34,7 +33,7 @@ from noiseclassifier.tuning import (
     Validation,
     Value,
     measure,
-    order,
+    rank,
     validate,
 )
 from noisemodel.files import refuse_existing
@@ -80,14 +79,15 @@ class Tuned:
     reference: Validation  # the predictions of the untuned profile
     trial: Trial
 
-    def ranked(self, criterion: Criterion) -> list[int]:
-        """Indices of the points, best first by a criterion; ties stay in the order of the grid."""
-        keys = list(map(order(criterion), self.measures))
+    @property
+    def ranked(self) -> list[int]:
+        """Indices of the points, best first; ties stay in the order of the grid."""
+        keys = list(map(rank, self.measures))
         return sorted(range(len(keys)), key=keys.__getitem__)
 
-    def train(self, output: Path, criterion: Criterion, *, overwrite: bool = False) -> None:
+    def train(self, output: Path, *, overwrite: bool = False) -> None:
         """Train the best point on the whole training set, and write the model."""
-        best = self.profiles[self.ranked(criterion)[0]]
+        best = self.profiles[self.ranked[0]]
         learn, check = list(self.trial.recordings), list[nc.Recording]()
         if self.search.validation:
             ((first, second),) = self.trial.splits
@@ -97,10 +97,10 @@ class Tuned:
         trained = nc.Classifier.train(examples, best, validation=validation)
         trained.save(output, overwrite=overwrite)
 
-    def table(self, criterion: Criterion) -> str:
+    def table(self) -> str:
         """The best points as a table, with remarks."""
         names = list(self.grid.axes)
-        ranked, points = self.ranked(criterion)[:ROWS], list(self.grid.points())
+        ranked, points = self.ranked[:ROWS], list(self.grid.points())
         untuned = {name: getattr(self.untuned, name) for name in names}
         cells = [
             ["", *("" for _ in names), *(upper for upper, _ in HEADS.values())],
@@ -110,14 +110,13 @@ class Tuned:
         ]
         widths = [7, *(max(WIDTH, len(name) + 2) for name in names), *(WIDTH for _ in HEADS)]
         lines = ["".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
-        return "\n".join([self._basis(), "", *lines, *self._ends(criterion)])
+        return "\n".join([self._basis(), "", *lines, *self._ends()])
 
-    def as_dict(self, criterion: Criterion) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """The best points as JSON can hold them."""
-        points, ranked = list(self.grid.points()), self.ranked(criterion)
+        points, ranked = list(self.grid.points()), self.ranked
         return {
             "points": len(points),
-            "criterion": criterion,
             "best": [{**points[i], **self.measures[i].as_dict()} for i in ranked[:ROWS]],
             "profile": self.profiles[ranked[0]].as_dict(),
             "untuned": self.reference.measures()[0].as_dict(),
@@ -135,9 +134,9 @@ class Tuned:
             f" {len(self.reference.truth)} frames of {others}"
         )
 
-    def _ends(self, criterion: Criterion) -> Iterator[str]:
+    def _ends(self) -> Iterator[str]:
         """Settings of the best point that lie at an end of the grid."""
-        best = self.profiles[self.ranked(criterion)[0]]
+        best = self.profiles[self.ranked[0]]
         for name, values in self.grid.axes.items():
             numbers = [each for each in values if not isinstance(each, str)]
             value = getattr(best, name)

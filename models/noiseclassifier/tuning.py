@@ -10,11 +10,11 @@ and gamma share the distances between frames, and those that differ in C alone t
 that a point costs little more than libsvm's own work.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import accumulate, groupby, product, repeat, takewhile
 from math import floor, isnan, log, nan, prod
-from typing import Any, Literal, Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
@@ -30,7 +30,6 @@ from noiseclassifier.signals import Array, Index, Words
 
 Value: TypeAlias = int | float | str
 Point: TypeAlias = Mapping[str, Value]
-Criterion: TypeAlias = Literal["balanced-accuracy", "subset-accuracy"]
 
 # Settings of the features that can be tuned.
 FEATURE_SETTINGS = ("window", "stride", "bands", "floor", "least_deviation")
@@ -219,12 +218,9 @@ class Validation:
         return measures
 
 
-def order(criterion: Criterion) -> Callable[[Measures], tuple[float, float]]:
-    """Key that sorts points, the best first; the other criterion breaks ties."""
-    first, other = "balanced_accuracy", "subset_accuracy"
-    if criterion == "subset-accuracy":
-        first, other = other, first
-    return lambda measures: (-getattr(measures, first), -getattr(measures, other))
+def rank(measures: Measures) -> tuple[float, float]:
+    """Sorts points, the best first: by balanced accuracy, ties by subset accuracy."""
+    return -measures.balanced_accuracy, -measures.subset_accuracy
 
 
 def measure(profiles: Sequence[Profile], trial: Trial) -> list[Measures]:
