@@ -248,11 +248,9 @@ class Beside:
     repetitions: int = 0  # that these have
     shares: Mapping[str, float] = field(default_factory=dict)  # of the run, by kind of evidence
     margins_db: Mapping[str, float] = field(default_factory=dict)  # by kind of evidence
-    bounds: Mapping[str, str] = field(default_factory=dict)  # what is known of these margins
     over_db: float | None = None  # largest score of a frame; None without one
     joints_db: Mapping[str, float] = field(default_factory=dict)  # their loudest exceedance
     quieter_db: float = 0.0  # than each repetition; 0 if it is not
-    speed: float | None = None  # divided by the repetitions'; None without
     failures: tuple[tuple[str, str], ...] = ()  # what it lacks of its scenario, and why
     words: str = ""  # the evidence, in a line
 

@@ -257,7 +257,6 @@ def test_a_run_played_slower_and_begun_later_is_aligned(reference, simulate):
     found = reference.compare(slow)
     assert found.share(judging.Kind.REPETITIONS) > 0.9
     assert not found.exceedances
-    assert found.slope == pytest.approx(0.97, abs=0.01)
 
 
 def test_another_motion_is_judged_by_other_motions_and_says_so(reference, sweep):
@@ -555,11 +554,11 @@ def test_a_motion_is_aligned_with_itself_delayed():
 
 
 def test_margins_follow_from_scores_and_are_assumed_without():
-    assert judging.margin_of([], 1).db == judging.ASSUMED_DB
-    assert "assumed" in str(judging.margin_of([], 1))
-    quiet, loud = judging.margin_of([0.1, 0.2, 0.3], 3), judging.margin_of([4.0, 5.0, 9.0], 3)
+    assert judging.margin_of([]).db == judging.ASSUMED_DB
+    assert str(judging.margin_of([])) == "margin 6.0 dB assumed"
+    quiet, loud = judging.margin_of([0.1, 0.2, 0.3]), judging.margin_of([4.0, 5.0, 9.0])
     assert quiet.db < loud.db
-    assert "at most once in 4" in quiet.bound
+    assert "assumed" not in str(quiet)
     assert store.calibrated(store.Scenario("a", ())).scores_db == ()
 
 

@@ -135,36 +135,22 @@ class Margin:
     """From how many decibels over the reference on a moment is a finding."""
 
     db: float
-    scores: tuple[float, ...] = ()  # that it is from; empty if it is assumed
-    repetitions: int = 0  # with which the run is compared
+    assumed: bool = False  # as repeatability is not known
 
     def __str__(self) -> str:
-        return f"margin {self.db:.1f} dB{'' if self.scores else ' assumed'}"
-
-    @property
-    def bound(self) -> str:
-        """How often a fault-free run exceeds it, as far as that is known, in a sentence."""
-        if not self.scores:
-            return f"{self.db:.1f} dB are assumed, not calibrated: nothing repeats."
-        told = f"{self.db:.1f} dB are extrapolated from {len(self.scores)} leave-one-out scores."
-        if not self.repetitions:
-            return told
-        return (
-            f"{told} A fault-free run recorded like the {self.repetitions} repetitions is louder"
-            f" than each of them would be by the others at most once in {self.repetitions + 1}."
-        )
+        return f"margin {self.db:.1f} dB{' assumed' if self.assumed else ''}"
 
 
-def margin_of(scores: Sequence[float], repetitions: int) -> Margin:
+def margin_of(scores: Sequence[float]) -> Margin:
     """The margin by the leave-one-out scores of fault-free runs, in [dB]."""
     found = np.sort([score for score in scores if np.isfinite(score)])
     if len(found) < 2:
-        return Margin(ASSUMED_DB, (), repetitions)
+        return Margin(ASSUMED_DB, assumed=True)
     low = float(np.median(found))
     excess = max(1.0, float(np.mean(found[found >= low] - low)))
     # Exponential tail: half of the scores exceed the median.
     db = low + excess * np.log(0.5 / RATE)
-    return Margin(max(LEAST_DB, float(db)), tuple(found.tolist()), repetitions)
+    return Margin(max(LEAST_DB, float(db)))
 
 
 class Exceedance(NamedTuple):
@@ -230,7 +216,6 @@ class Comparison:
     margins: Mapping[Kind, Margin]
     exceedances: tuple[Exceedance, ...]  # in order of time
     quieter: float  # than each repetition, in [dB]; 0 if it is not
-    slope: float  # speed divided by the repetitions'; NaN without
     # Level of the noise of the quietest and of the loudest repetition at each frame, shape
     # (frames, 2), in [dB re 1 rad/s]; NaN without.
     band: Array
@@ -305,16 +290,14 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     matched, aligned, told = _matching(run, known, cells.joints) if over.size else ([], [], [])
     remarks += told
     references = _repetitions(matched)
-    quieter, slope, band = 0.0, float("nan"), np.full((frames, 2), np.nan)
+    quieter, band = 0.0, np.full((frames, 2), np.nan)
     if references:
         quieter = _quieter(run, references, aligned, cells)
         band = _band(references, aligned, cells)
         over, covered = _over_repetitions(run, references, aligned, cells)
         kind[covered] = KINDS.index(Kind.REPETITIONS)
         scores = [score for scenario in known for score in scenario.scores_db]
-        margins[Kind.REPETITIONS] = margin_of(scores, len(references))
-        slopes = [each.slope for each in aligned if np.isfinite(each.slope)]
-        slope = float(np.median(slopes)) if slopes else slope
+        margins[Kind.REPETITIONS] = margin_of(scores)
         longest = max(each.duration for each in references)
         if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
             remarks.append(
@@ -329,7 +312,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
         over[left[covered]] = found[covered]
         kind[left[covered]] = KINDS.index(Kind.OTHER_MOTIONS)
         scores = [score for scenario in known for score in scenario.elsewhere_db]
-        margins[Kind.OTHER_MOTIONS] = margin_of(scores, 0)
+        margins[Kind.OTHER_MOTIONS] = margin_of(scores)
     score = scores_of(over)
     return Comparison(
         run,
@@ -343,7 +326,6 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
         margins,
         _exceedances(run, cells, over, score, kind, margins),
         quieter,
-        slope,
         band,
         tuple(remarks),
     )
@@ -636,7 +618,6 @@ class Aligned:
     # Largest difference of positions in any joint, in standard deviations of the motion, shape
     # (frames,); infinite where the speeds differ too much.
     residual: Array
-    inside: NDArray[np.bool_]  # whether it is not before the repetition's start or after its end
 
     @property
     def same(self) -> NDArray[np.bool_]:
@@ -647,15 +628,6 @@ class Aligned:
     def share(self) -> float:
         """Share of the run that lies on the motion."""
         return float(np.mean(self.same))
-
-    @property
-    def slope(self) -> float:
-        """Speed of the run divided by the repetition's."""
-        moved = np.flatnonzero(self.inside)
-        if len(moved) < 2:
-            return float("nan")
-        first, last = int(moved[0]), int(moved[-1])
-        return float(self.frame[last] - self.frame[first]) / (last - first)
 
 
 def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> list[Aligned]:
@@ -696,7 +668,7 @@ def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:
         residual = np.abs(run - other[path]).max(axis=1)
         inside = (path >= PAD) & (path < PAD + len(repetition))
         residual[inside & ~_comparable(path)] = np.inf
-        found.append(Aligned(np.clip(path - PAD, 0, len(repetition) - 1), residual, inside))
+        found.append(Aligned(np.clip(path - PAD, 0, len(repetition) - 1), residual))
     return found
 
 

@@ -301,7 +301,7 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
 
 
 def _margin(scenario: Scenario) -> float:
-    return margin_of(scenario.scores_db, len(scenario.repetitions)).db
+    return margin_of(scenario.scores_db).db
 
 
 def wanted_in(

@@ -179,13 +179,11 @@ def beside(
         repetitions=comparison.repetitions,
         shares={str(kind): round(comparison.share(kind), 4) for kind in Kind},
         margins_db={str(kind): round(each.db, 2) for kind, each in margins.items()},
-        over_db=_known(comparison.worst),
+        over_db=round(comparison.worst, 3) if np.isfinite(comparison.worst) else None,
         joints_db={joint: round(peak, 2) for joint, peak in peaks if np.isfinite(peak)},
         quieter_db=round(quieter, 2),
-        speed=_known(comparison.slope),
         failures=tuple(_failures(comparison, reference)),
         words=_words(comparison, quieter),
-        bounds={str(kind): each.bound for kind, each in margins.items()},
     )
     covered = known.shares[Kind.GENERAL] < 1.0
     status = verdict.status
@@ -208,17 +206,10 @@ def seen(analysis: Analysis, verdict: Verdict) -> Analysis:
     return replace(analysis, status=verdict.status, findings=found, spans=found)
 
 
-def _known(value: float) -> float | None:
-    return round(value, 3) if np.isfinite(value) else None
-
-
 def _words(comparison: Comparison, quieter: float) -> str:
     parts = [str(comparison)]
     if quieter:
         parts.append(f"{quieter:.1f} dB quieter than each repetition")
-    slope = comparison.slope
-    if np.isfinite(slope) and abs(slope - 1) > 0.02:
-        parts.append(f"aligned at {slope:.2f} of its speed")
     if comparison.run.guided_by.startswith("measured"):
         parts.append(f"aligned by {comparison.run.guided_by}: the log has no desired motion")
     return "; ".join(filter(None, [*parts, *comparison.remarks]))

@@ -47,15 +47,6 @@ class Series:
         return f"{self.scenario}, {self.joint}" if self.joint else self.scenario
 
 
-@dataclass(frozen=True)
-class Change:
-    """A step at a commit, or a drift from the first to the last of several."""
-
-    first: int
-    last: int
-    by: float
-
-
 @dataclass(frozen=True, eq=False)
 class History:
     """Commits in order, series with most change first, and what was not read or left out."""
@@ -70,16 +61,13 @@ class History:
         yield f"{counted(len(self.commits), 'commit')}, {self.commits[0]} to {self.commits[-1]}"
         yield from self.notes
         for series in self.series:
-            for change in changes(series):
-                yield f"{series.name}: {self.told(series, change)}"
+            for commit, by in changes(series):
+                yield f"{series.name}: {self.told(series, commit, by)}"
 
-    def told(self, series: Series, change: Change) -> str:
+    def told(self, series: Series, commit: int, by: float) -> str:
         """A change in words."""
-        by, number = f"{change.by:+.1f} {series.unit}", len(self.commits)
-        first, last = self.commits[change.first], self.commits[change.last]
-        if change.first == change.last:
-            return f"{by} at {first} ({change.first + 1} of {number})"
-        return f"drift of {by} from {first} to {last}"
+        number = f"{commit + 1} of {len(self.commits)}"
+        return f"{by:+.1f} {series.unit} at {self.commits[commit]} ({number})"
 
 
 def read(folder: Path) -> History:
@@ -105,7 +93,7 @@ def read(folder: Path) -> History:
         raise InspectorError(f"{folder}: no result of `classify --write json=FILE`{why}")
 
     series = list(_series(results))
-    series.sort(key=lambda each: -max([abs(change.by) for change in changes(each)], default=0.0))
+    series.sort(key=lambda each: -max([abs(by) for _, by in changes(each)], default=0.0))
     return History(tuple(commits), tuple(series), tuple(problems), tuple(notes))
 
 
@@ -142,60 +130,40 @@ def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
         yield Series(name, joint, "findings", number / runs[name])
 
 
-def changes(series: Series) -> list[Change]:
-    """Steps and drifts of a series, in order; commits at which it was not run do not count."""
+def changes(series: Series) -> list[tuple[int, float]]:
+    """Steps of a series, by commit and size; commits at which it was not run do not count."""
     there = np.flatnonzero(~np.isnan(series.value))
     value = series.value[there]
     least = LEAST_DB if series.unit == "dB" else LEAST_FINDINGS
-    found, before = [], None
-    for first, last in pairwise([*_stretches(value), len(value)]):
-        start, stop = _line(value[first:last])
-        if before is not None and abs(by := start - before) >= least:
-            found.append(Change(int(there[first]), int(there[first]), float(by)))
-        if abs(stop - start) >= least:
-            found.append(Change(int(there[first]), int(there[last - 1]), float(stop - start)))
-        before = stop
-    return found
+    edges = [*_stretches(value, least), len(value)]
+    levels = [float(value[first:last].mean()) for first, last in pairwise(edges)]
+    steps = zip(edges[1:], pairwise(levels), strict=False)
+    found = [(int(there[first]), after - before) for first, (before, after) in steps]
+    return [(commit, by) for commit, by in found if abs(by) >= least]
 
 
-def _stretches(value: Array) -> list[int]:
-    """Where stretches begin in each of which a line describes a series.
+def _stretches(value: Array, least: float) -> list[int]:
+    """Where stretches of one level begin.
 
-    It is cut where two lines explain it better than one, by Schwarz's criterion.
+    A stretch is cut where two levels that differ explain it better, by Schwarz's criterion.
     """
     n = len(value)
     places = range(SHORTEST, n - SHORTEST + 1)
     errors = {k: _error(value[:k]) + _error(value[k:]) for k in places}
     best = min(errors, key=errors.__getitem__, default=0)
-    # Three more numbers: two of a line, and the place, found among n.
-    if not best or _gain(n, _error(value), errors[best]) < 4 * np.log(n):
-        return [0]
-    return [*_stretches(value[:best]), *(best + place for place in _stretches(value[best:]))]
-
-
-def _line(value: Array) -> tuple[float, float]:
-    """Values at both ends of the line through a stretch; its mean if it is no better."""
-    n, mean = len(value), float(value.mean())
-    constant = float(np.square(value - mean).sum())
-    if n < 2 * SHORTEST or _gain(n, constant, _error(value)) < 2 * np.log(n):
-        return mean, mean
-    slope, begin = np.polyfit(np.arange(n), value, 1)
-    return float(begin), float(begin + slope * (n - 1))
-
-
-def _gain(n: int, error: float, better: float) -> float:
-    """Twice the logarithm of the likelihood that smaller errors gain."""
     floor = 1e-4 * n  # of values without any noise
-    return float(n * np.log((error + floor) / (better + floor)))
+    # Twice the gain in log likelihood, for two more numbers: a level, and the place, found among n.
+    if not best or n * np.log((_error(value) + floor) / (errors[best] + floor)) < 3 * np.log(n):
+        return [0]
+    if abs(value[best:].mean() - value[:best].mean()) < least:
+        return [0]
+    later = [best + place for place in _stretches(value[best:], least)]
+    return [*_stretches(value[:best], least), *later]
 
 
 def _error(value: Array) -> float:
-    """Sum of squares about the line through a stretch."""
-    x = np.arange(len(value)) - (len(value) - 1) / 2
-    y = value - value.mean()
-    square = float(np.square(x).sum())
-    slope = float(x @ y) / square if square else 0.0
-    return float(np.square(y - slope * x).sum())
+    """Sum of squares about the mean of a stretch."""
+    return float(np.square(value - value.mean()).sum())
 
 
 def page(history: History) -> str:
@@ -210,23 +178,24 @@ def page(history: History) -> str:
         if series.joint and not found:
             continue
         add_text(body, "h2", series.name)
-        for change in found:
-            add_text(body, "p", history.told(series, change), "step")
+        for commit, by in found:
+            add_text(body, "p", history.told(series, commit, by), "step")
         _draw(body, history, series, found)
     return written(html)
 
 
-def _draw(body: ET.Element, history: History, series: Series, found: Sequence[Change]) -> None:
+def _draw(
+    body: ET.Element, history: History, series: Series, found: Sequence[tuple[int, float]]
+) -> None:
     """Draw a series: a point for each commit, a line at each step."""
     value = series.value
     low, high = min(0.0, float(np.nanmin(value))), max(float(np.nanmax(value)), 1.0)
     x = (np.arange(len(value)) + 0.5) * WIDTH / len(value)
     y = HEIGHT - 10 - (value - low) / (high - low) * (HEIGHT - 20)
     drawn = ET.SubElement(body, "svg", viewBox=f"0 0 {WIDTH} {HEIGHT}", role="img")
-    for change in found:
-        if change.first == change.last:
-            at = f"{x[change.first] - WIDTH / len(value) / 2:.1f}"
-            ET.SubElement(drawn, "line", x1=at, x2=at, y1="0", y2=str(HEIGHT))
+    for commit, _ in found:
+        at = f"{x[commit] - WIDTH / len(value) / 2:.1f}"
+        ET.SubElement(drawn, "line", x1=at, x2=at, y1="0", y2=str(HEIGHT))
     for place in np.flatnonzero(~np.isnan(value)):
         point = ET.SubElement(drawn, "circle", cx=f"{x[place]:.1f}", cy=f"{y[place]:.1f}", r="3")
         told = f"{history.commits[place]}: {value[place]:.1f} {series.unit}"

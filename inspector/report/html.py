@@ -13,8 +13,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from inspector.analysis import Analysis
 from inspector.errors import Status
 from inspector.export.sound import clip, worst_time
@@ -26,8 +24,6 @@ from inspector.report.formats import summary
 from inspector.report.picture import picture, require
 from inspector.verdict import Verdict
 from noisemodel.files import write_whole
-from noisemodel.noise import REFERENCE_POWER, decibel, vibrating_pieces
-from noisemodel.types import Array
 
 AUDIBLE = "Audible are the joints' velocities above 20 Hz; their powers are added."
 # Policy for browsers: nothing is fetched, whatever a run's names are.
@@ -48,7 +44,6 @@ th, td { text-align: left; padding: .25rem 1.2rem .25rem 0; border-bottom: 1px s
 th { font-weight: 600; }
 li { margin: .2rem 0; }
 """
-MOST = 20  # links and joints that are listed, the loudest first
 
 
 def write(analysis: Analysis, path: Path, *, overwrite: bool = False, **shown: Any) -> None:
@@ -96,7 +91,6 @@ def page(
         ET.SubElement(body, "audio", controls="controls", src=source)
         span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.description}."
         add_text(body, "p", f"{span} {AUDIBLE}", "note")
-    _add_parts(body, analysis)
     _add_list(body, "What the log can show", audit.splitlines())
     _add_list(body, "Remarks", [spoken(remark) for remark in analysis.remarks])
     made = (
@@ -135,16 +129,13 @@ def written(html: ET.Element) -> str:
     return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
 
 
-def _add_table(body: ET.Element, head: Sequence[str], rows: Sequence[Sequence[str]]) -> ET.Element:
-    """Add a table; returns its body."""
+def _add_table(body: ET.Element, head: Sequence[str]) -> ET.Element:
+    """Add a table without rows; returns its body."""
     frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
-    parts = [ET.SubElement(frame, tag) for tag in ("thead", "tbody")]
-    for part, tag, lines in zip(parts, ("th", "td"), ([head], rows), strict=True):
-        for cells in lines:
-            row = ET.SubElement(part, "tr")
-            for cell in cells:
-                add_text(row, tag, cell)
-    return parts[1]
+    row = ET.SubElement(ET.SubElement(frame, "thead"), "tr")
+    for cell in head:
+        add_text(row, "th", cell)
+    return ET.SubElement(frame, "tbody")
 
 
 def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
@@ -157,44 +148,6 @@ def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
 
 def _encoded(data: bytes) -> str:
     return b64encode(data).decode("ascii")
-
-
-# --- links and joints
-
-
-def _add_parts(body: ET.Element, analysis: Analysis) -> None:
-    """Rank links and joints by what vibrates in them."""
-    run, links = analysis.run, analysis.links
-    if links is not None:
-        peaks = links.vibration.max(axis=0, initial=0.0)
-        levels = decibel(np.maximum(peaks, REFERENCE_POWER) / REFERENCE_POWER)
-        power, head = links.vibration.sum(axis=0), ("link", "share", "peak [dB re 1 pW]")
-        told = "Sound power of the measured motion above 10 Hz, normal to the surface."
-        _add_ranked(body, "Links", links.links, power, [f"{each:.1f}" for each in levels], head)
-        add_text(body, "p", told, "note")
-    energy = np.zeros(len(run.joint_names))
-    for _, fast in vibrating_pieces(run.velocity, run.mask, run.rate):
-        energy += np.square(fast).sum(axis=0)
-    rms = [f"{each:.3g}" for each in np.sqrt(energy / len(run.time))]
-    _add_ranked(body, "Joints", run.joint_names, energy, rms, ("joint", "share", "rms [rad/s]"))
-    add_text(body, "p", "Measured velocity above 10 Hz; of joints that slide in [m/s].", "note")
-
-
-def _add_ranked(
-    body: ET.Element,
-    title: str,
-    names: Sequence[str],
-    power: Array,
-    levels: Sequence[str],
-    head: Sequence[str],
-) -> None:
-    """Add a table of parts, the loudest first, and how many are left out."""
-    share = power / (power.sum() or 1.0)
-    order = np.argsort(-power, kind="stable")[:MOST]
-    add_text(body, "h2", title)
-    _add_table(body, head, [(names[i], f"{share[i]:.1%}", levels[i]) for i in order])
-    if left := len(names) - len(order):
-        add_text(body, "p", f"{left} quieter ones are left out.", "note")
 
 
 # --- the page of many runs
@@ -269,7 +222,7 @@ def index_page(verdicts: Sequence[Verdict]) -> str:
     shared = [fact for fact in first if others and all(fact in facts for facts in others)]
     for fact in shared:
         add_text(body, "p", fact, "note")
-    rows = _add_table(body, ("status", "run", "findings"), ())
+    rows = _add_table(body, ("status", "run", "findings"))
     for number, verdict in enumerate(ranked, 1):
         _add_row(rows, verdict, number)
     add_text(body, "h2", "Pictures")
