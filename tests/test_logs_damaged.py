@@ -1,7 +1,5 @@
 """Bags that were cut off or damaged: intact messages are read, losses are reported."""
 
-import sqlite3
-
 import numpy as np
 import pytest
 from mcap.writer import Writer
@@ -105,12 +103,3 @@ def test_a_bag_without_intact_messages_is_an_error_of_one_line(whole, tmp_path, 
         read_log(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
-
-
-def test_a_bag_of_before_2023_has_no_definitions(whole, tmp_path):
-    path = copied(whole["sqlite3"], tmp_path)
-    with sqlite3.connect(path) as database:
-        database.execute("DROP TABLE message_definitions")
-        database.execute("UPDATE schema SET schema_version = 3")
-    database.close()
-    assert np.array_equal(read_log(path).run.position[:, :3], POSITION)

@@ -1,14 +1,17 @@
 """ROS bags, written by rosbags."""
 
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.writer import Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
+from inspector.logs.bags import STATE, STATES, Topic, decoder
 from noisemodel import Robot
 
 TALK, OLD = Talk(), Talk(ros1=True)
@@ -165,6 +168,25 @@ def test_a_controllers_state_holds_measured_and_desired_motion_under_its_old_nam
     assert np.array_equal(run.effort, EFFORT)
     assert np.array_equal(run.position_desired, VELOCITY)
     assert np.array_equal(run.velocity_desired, POSITION)
+
+
+@pytest.mark.parametrize("version", STATES)
+def test_the_version_of_a_controllers_state_is_told_by_its_messages(version):
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg(version, STATE))
+    many = store.types["trajectory_msgs/msg/MultiDOFJointTrajectoryPoint"]
+    made = {
+        "std_msgs/Header": TALK.header(EPOCH),
+        "string[]": [],
+        "trajectory_msgs/JointTrajectoryPoint": TALK.point(POSITION[0], VELOCITY[0]),
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint": many([], [], [], TALK.duration(0.0)),
+        "float64": 0.5,
+    }
+    parts = {name: made[kind] for kind, name in map(str.split, version.strip().splitlines())}
+    message = store.types[STATE](**parts | {"joint_names": list(JOINTS)})
+    decode = decoder(Path("bag"), Topic("/state", STATE))
+    found = vars(decode(bytes(store.serialize_cdr(message, STATE))))
+    assert {*found} - {"__msgtype__"} == {*parts}
 
 
 def test_joint_states_take_precedence_over_a_controllers_feedback(tmp_path):

@@ -71,8 +71,6 @@ def test_a_chunk_of_zeros_is_not_unpacked(tmp_path, limit, how):
         "UPDATE topics SET name = NULL",
         "UPDATE topics SET name = x'ff'",
         "UPDATE topics SET type = NULL",
-        "UPDATE message_definitions SET encoded_message_definition = x'ff00'",
-        "UPDATE message_definitions SET encoded_message_definition = NULL",
     ],
 )
 @pytest.mark.parametrize("damaged", [False, True])

@@ -30,7 +30,6 @@ from inspector.export.labels import read_labels
 from inspector.library import load_library, model_files
 from inspector.live import pipe
 from inspector.live.samples import Clock, Warnings
-from inspector.logs.bags import STATE, STATES, Topic, decoder
 from inspector.logs.clocks import ordered, stamps_of
 from inspector.logs.log import Track
 from inspector.logs.mapping import ReadOptions, parse_mapping
@@ -418,29 +417,6 @@ def _read_names(path: Path) -> None:
     time_column(names)
 
 
-def _read_definition(path: Path) -> None:
-    """The definition of a controller's state in a bag, and then a message of it."""
-    text = path.read_text(errors="replace")
-    for ros1, data in enumerate(_states()):
-        decode = decoder(path, Topic("/state", STATE, text, bool(ros1)))
-        decode(data)
-
-
-@cache
-def _states() -> tuple[bytes, bytes]:
-    """A controller's state in ROS 2 and ROS 1."""
-    from samplelogs import Talk
-
-    found = []
-    for ros1 in (False, True):
-        talk = Talk(ros1=ros1)
-        stages = {name: talk.point([1.0], [2.0]) for name in ("desired", "actual", "error")}
-        kind = "control_msgs/JointTrajectoryControllerState"
-        message = talk.make(kind, header=talk.header(10**9), joint_names=["a"], **stages)
-        found.append(bytes(talk.raw(message)))
-    return found[0], found[1]
-
-
 def compile_in_fork() -> None:
     """From now on, compile each MJCF in a fork of this process: starting another takes a second."""
 
@@ -646,7 +622,6 @@ READERS: Mapping[str, Reader] = MappingProxyType(
             "bytes", _written("stamps", np.sort(_jumping())[::5].tobytes()), _read_stamps, ()
         ),
         "names": Reader("text", _written("names", NAMES.replace(";", "\n")), _read_names, ()),
-        "ROS definition": Reader("text", _written("state.msg", STATES[3]), _read_definition, ()),
         "NoisyTest log": Reader("text", _noisytest_log, _read_folder, EVALUATE),
         "NoisyTest labels": Reader("text", _noisytest, _read_folder, EVALUATE),
         "NoisyTest, two columns": Reader("text", _noisytest_log, nc.read_log, CLASSIFY),

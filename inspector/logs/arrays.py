@@ -162,7 +162,6 @@ def log_of(
     log = Log(
         path,
         tuple(fields),
-        episode,
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
         remarks=remarks,
         suggested=tuple(_of_mujoco(arrays, roles)),

@@ -67,7 +67,6 @@ class Topic:
 
     name: str
     type: str
-    definition: str = ""  # text of the type's definition, if the bag has it
     ros1: bool = False  # whether messages are serialised in the format of ROS 1
 
     def __str__(self) -> str:
@@ -89,7 +88,7 @@ def _state(joints: tuple[str, ...], others: tuple[str, ...] = (), last: str = ""
 
 OLD = ("desired", "actual", "error")
 NEW = ("reference", "feedback", "error", "output")
-# Versions of a controller's state; bags from before 2023 do not contain the definition.
+# Versions of a controller's state: which one a bag has, its messages tell by their length.
 STATES = (
     _state(NEW, NEW, "float64 speed_scaling_factor"),
     _state((*NEW, *OLD[:2]), (*NEW, *OLD[:2])),
@@ -101,45 +100,26 @@ STATES = (
 )
 
 
-def _fields_in(definition: str) -> list[str]:
-    """Names of the fields of a definition, without the fields of the types in it."""
-    own = definition.partition("\n===")[0].splitlines()
-    words = (line.partition("#")[0].split() for line in own)
-    return [each[1] for each in words if len(each) == 2]
-
-
 def decoder(path: Path, topic: Topic) -> Callable[[bytes], Any]:
     """What deserialises the messages of a topic, by the version of their type that fits."""
-    stores: list[Any] = []
+    versions = list(STATES if topic.type == STATE else [""])
 
     def decode(data: bytes) -> Any:
         problem: Exception | None = None
-        stores[:] = stores or _stores(path, topic)
-        for store in stores:
+        for version in versions:
+            store = _store(topic.type, version, topic.ros1)
             parse = store.deserialize_ros1 if topic.ros1 else store.deserialize_cdr
             try:
                 message = parse(data, topic.type)
             except DAMAGE as error:
                 problem = error
                 continue
-            stores[:] = [store]
+            versions[:] = [version]
             return message
         what = " ".join(str(problem).split()) or type(problem).__name__
         raise LogError(path, f"{topic.name}: a message is not a {topic.type} ({what})")
 
     return decode
-
-
-def _stores(path: Path, topic: Topic) -> list[Any]:
-    """What may deserialise messages: several where versions of their type are known."""
-    definitions = [""]
-    if topic.type == STATE:
-        names = _fields_in(topic.definition)
-        definitions = [each for each in STATES if not names or _fields_in(each) == names]
-        if not definitions:
-            problem = f"{topic.name}: the definition of {topic.type} is none that is known"
-            raise LogError(path, problem)
-    return [_store(topic.type, definition, topic.ros1) for definition in definitions]
 
 
 @cache  # a store takes 20 ms to make
@@ -472,8 +452,7 @@ def _mcap(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Mes
                     elif isinstance(each, Channel):
                         channels[each.id] = each.topic
                         schema = schemas.get(each.schema_id)
-                        text = schema.data.decode(errors="replace") if schema else ""
-                        yield Topic(each.topic, schema.name if schema else "", text)
+                        yield Topic(each.topic, schema.name if schema else "")
                     elif isinstance(each, McapMessage) and each.channel_id in channels:
                         yield channels[each.channel_id], each.log_time, each.data
                 place = stream.tell()
@@ -518,17 +497,11 @@ def _sqlite(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | M
                 lost.append(f"the bag is damaged or cut off ({one_line(error)})")
             (page,) = database.execute("PRAGMA page_size").fetchone()
             database.execute("PRAGMA writable_schema = ON")  # else SQLite refuses such a file
-            tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
-            definitions = {}
-            if "message_definitions" in tables:
-                rows = "SELECT topic_type, encoded_message_definition FROM message_definitions"
-                definitions = dict(database.execute(rows))
             names = {}
             for place, name, kind in database.execute("SELECT id, name, type FROM topics"):
                 if isinstance(name, str) and isinstance(kind, str):
-                    definition = definitions.get(kind)
                     names[place] = name
-                    yield Topic(name, kind, definition if isinstance(definition, str) else "")
+                    yield Topic(name, kind)
             size = 0
             messages = "SELECT topic_id, timestamp, data FROM messages"
             for topic, received, data in database.execute(messages):
@@ -556,10 +529,8 @@ def _ros1(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Mes
                 name = "/" * name.startswith("/") + "/".join(filter(None, name.split("/")))
                 names[number] = name
                 with suppress(struct.error, KeyError):  # a record that is damaged itself
-                    fields = _fields(data)
-                    package, _, kind = fields["type"].decode(errors="replace").partition("/")
-                    definition = fields["message_definition"].decode(errors="replace")
-                    yield Topic(name, f"{package}/msg/{kind}", definition, ros1=True)
+                    package, _, kind = _fields(data)["type"].decode(errors="replace").partition("/")
+                    yield Topic(name, f"{package}/msg/{kind}", ros1=True)
             elif header.get("op") == MESSAGE and number in names and len(time) == 8:
                 seconds, fraction = struct.unpack("<II", time)
                 yield names[number], seconds * 10**9 + fraction, data

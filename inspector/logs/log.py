@@ -181,7 +181,6 @@ class Log:
 
     path: Path
     fields: tuple[Field, ...]  # none once `tracks` are known
-    episode: str = ""  # where the file holds several
     not_read: tuple[str, ...] = ()  # names of what was not read
     remarks: tuple[str, ...] = ()  # what was lost or decided, a sentence each
     units: str = ""  # why the unit of angles is not known, if the format does not define it

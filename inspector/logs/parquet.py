@@ -368,7 +368,6 @@ def _episode(
     return Log(
         path,
         tuple(fields),
-        episode,
         not_read=tuple(n for n in features if n not in arrays and not n.startswith(IMAGES)),
         remarks=tuple(remarks),
         units=UNKNOWN if any(dot and end in PARTS for dot, end in ends) else "",
