@@ -32,19 +32,13 @@ def test_the_audit_of_a_30_hz_episode_in_degrees_gives_its_limits(episode):
     assert "impact: cannot tell: 30 Hz is below the rate of every model; needs 80 Hz" in out
 
 
-def test_all_classes_are_observable_in_the_demo(tmp_path):
-    status, out, err = call("audit", demo_run())
-    assert (status, err) == (0, "")
-    assert "oscillations: observable, 20 to 1000 Hz" in out
-    assert "warning" not in out
-
-
 def test_audits_as_json(episode):
     status, out, _ = call("audit", demo_run(), episode, "--format", "json")
     assert status == 4
     found = json.loads(out)
     assert found["format"] == "noise-audit/2"
     demo, slow = found["runs"]
+    assert demo["warnings"] == []
     assert demo["bandwidth"]["usable"] == 5000
     assert {each["observability"] for each in demo["classes"]} == {"observable"}
     assert {each["needed"] for each in slow["classes"]} == {80}
@@ -62,16 +56,6 @@ def test_one_bad_file_does_not_stop_the_rest(tmp_path):
     status, out, _ = call("audit", tmp_path / "bad.npz", "--format", "json")
     assert status == 3
     assert "not a run file" in json.loads(out)["runs"][0]["message"]
-
-
-def test_a_csv_log_is_audited_as_it_is_imported(tmp_path):
-    time = np.arange(3000) / 1000
-    table = np.column_stack((time, np.sin(3 * time), 3 * np.cos(3 * time)))
-    header = "time,elbow.position,elbow.velocity"
-    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
-    status, out, err = call("audit", tmp_path / "log.csv")
-    assert (status, err) == (0, "")
-    assert "rate: 1000 Hz, stamps are uniform" in out
 
 
 @pytest.mark.parametrize("command", ["classify", "audit", "smoothness"])

@@ -12,8 +12,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from benchmarks.fuzz import malformed
-from benchmarks.fuzz.bombs import Bomb
 from benchmarks.fuzz.damage import damaged
 from benchmarks.fuzz.readers import EXPECTED, READERS
 
@@ -76,32 +74,6 @@ def test_damage_is_of_every_kind_and_reproducible():
     assert made.count(data) < 5
     assert any(b"[[[[" in each for each in made)
     assert any(len(each) < len(data) / 2 for each in made)
-
-
-@pytest.mark.parametrize(
-    ("outcome", "status", "out", "err", "more"),
-    [
-        ("handled", 0, "a: ok", "", {}),
-        ("handled", 3, "", "inspector: a: damaged", {}),
-        ("nonsense", 0, "a: ok", "", {"refuse": True}),
-        ("nonsense", 0, "rms inf √W, peak 3 √W", "", {}),
-        ("traceback", 3, "", "", {}),
-        ("traceback", 70, "", "Traceback", {}),
-        ("traceback", -11, "", "", {}),
-        ("hang", -9, "", "", {}),
-        ("hang", 0, "a: ok", "", {"seconds": 21.0}),
-        ("memory", -9, "", "", {"peak": 2.1e9}),
-        ("raw text", 0, "a\n::error::b", "", {}),
-        ("raw text", 3, "", "inspector: \x1b[31m: damaged", {}),
-    ],
-)
-def test_a_command_is_judged_by_status_words_time_and_memory(outcome, status, out, err, more):
-    case = Bomb("x", b"", refuse=more.get("refuse", False))
-    found = malformed.judged(
-        "run", case, status, more.get("seconds", 0.1), more.get("peak", 10**8), out, err
-    )
-    assert found.outcome == outcome
-    assert re.search(r"\| run \| 1 \|.*\n\| all \| 1 \|.* 1 \|", malformed.table([found]), re.S)
 
 
 @pytest.mark.slow

@@ -233,12 +233,6 @@ KINDS = (
         hint=NO_HEADER, typed=f"--columns {QD}",
     ),
     Kind(
-        "a quadruped, no header", "12 numbers",
-        lambda folder: csv(folder / "legs.csv", "", motion(12, 200.0)[1]), 200.0,
-        numbered("joint_#", 12), "position",
-        hint=NO_HEADER, typed=f"--columns {names('q#', 12)} {HZ}",
-    ),
-    Kind(
         "UR by RTDE, no stamps", "actual_q_0…,actual_qd_0…,actual_TCP_pose_0…", rtde, 50.0,
         numbered("joint_#", 6, 0), said=f"there are no stamps: 50 Hz, {FITS}",
     ),
@@ -397,12 +391,6 @@ def test_two_patterns_for_one_column_take_the_more_specific(tmp_path):
     patterns = ["position.{joint}={joint}", "position_desired.{joint}={joint}_cmd"]
     run = read_log(path, mapping=patterns).run
     assert run.joint_names == run.desired_joint_names == ("a", "b")
-
-
-def test_names_that_two_rules_claim_are_named_with_the_option_to_type(tmp_path):
-    path = written(tmp_path, "t,q1,position_1", T6, Q6[:, :2])
-    with pytest.raises(InspectorError, match="'q1' and 'position_1' both hold .*; choose with --m"):
-        read_log(path)
 
 
 def test_a_quaternion_is_no_four_joints(tmp_path):
