@@ -23,12 +23,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO, TypeAlias
 
+import lz4.frame
 import numpy as np
 from mcap.records import Channel, Chunk, McapRecord, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from zstandard import ZstdDecompressor
 
 from inspector.errors import LogError
 from inspector.logs.log import Field, Log, LogReader, Stamps
@@ -355,20 +357,16 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
 # Chunks, unpacked piece by piece
 
 
-def _lz4(stream: BinaryIO) -> Any:
-    import lz4.frame
-
-    return lz4.frame.open(stream)
-
-
 def _zstd(stream: BinaryIO) -> Any:
-    import zstandard
-
-    return zstandard.ZstdDecompressor().stream_reader(stream, read_across_frames=True)
+    return ZstdDecompressor().stream_reader(stream, read_across_frames=True)
 
 
 # What opens a compressed stream, by the name that bags have for it.
-METHODS: dict[str, Callable[[BinaryIO], Any]] = {"bz2": bz2.open, "lz4": _lz4, "zstd": _zstd}
+METHODS: dict[str, Callable[[BinaryIO], Any]] = {
+    "bz2": bz2.open,
+    "lz4": lz4.frame.open,
+    "zstd": _zstd,
+}
 ZSTD = b"\x28\xb5\x2f\xfd"  # the first bytes of a file or a message that was compressed whole
 
 

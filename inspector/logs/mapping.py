@@ -32,7 +32,7 @@ from inspector.text import toml_shown
 from noiseclassifier.jsontext import from_toml, text_of
 from noisemodel import Robot
 from noisemodel.files import replacing
-from noisemodel.types import Array, Mask, Real
+from noisemodel.types import Array, Real
 
 FORMAT = "noise-mapping/1"
 COMMAND = "command"  # the signal of fields that may be desired positions: their values decide
@@ -444,7 +444,8 @@ def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
     if choice := by_signal.get("base_pose"):
         pose = pose_of(choice.values, choice.joint)
         track = Track("base_pose", (), (choice.field.name,) * 7, choice.field.stamps, pose)
-        if (wrong := not_normalised(pose)).any():
+        wrong = np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1) > 0.01
+        if wrong.any():
             raise track.fault(
                 log.path,
                 f"{choice.label}: a quaternion whose norm is not 1; expected x, y, z and the"
@@ -469,11 +470,6 @@ def pose_of(values: Real, convention: str) -> Array:
     """Pose of a base as the run has it, x, y, z and the quaternion x, y, z, w, in `CONVENTIONS`."""
     order = [0, 1, 2, 4, 5, 6, 3] if convention == "wxyz" else slice(None)
     return np.asarray(values, dtype=np.float64)[:, order]
-
-
-def not_normalised(pose: Array) -> Mask:
-    """Whether the norm of each sample's quaternion is not near 1, shape (samples,)."""
-    return np.asarray(np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1) > 0.01)
 
 
 def velocity_of(values: Real, convention: str, pose: Array) -> Array:

@@ -276,7 +276,9 @@ def _in_si(
         )
     found: list[Track] = []
     for track in tracks:
-        angles = np.array([not (log.units and _is_gripper(joint)) for joint in track.joints])
+        # A gripper is logged by LeRobot as a share of its way.
+        gripper = [bool(re.search("gripper|finger", joint)) for joint in track.joints]
+        angles = np.array([not (log.units and each) for each in gripper])
         if units == "degrees" and not angles.all():
             remark = (
                 f"left out, since grippers have no angles: {listed(_chosen(track.joints, ~angles))}"
@@ -356,11 +358,6 @@ def _ratio(position: Track, velocity: Track) -> float:
     if not known.any():
         return 0.0
     return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
-
-
-def _is_gripper(joint: str) -> bool:
-    """Whether a name is a gripper's, which LeRobot logs as a share of its way."""
-    return "gripper" in joint or "finger" in joint
 
 
 def _refuse_degrees(path: Path, track: Track, kinds: Mapping[str, str]) -> None:

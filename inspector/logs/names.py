@@ -267,23 +267,13 @@ def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
     number_text = found.get("index") or found.get("round") or found.get("number")
     if number_text is not None:
         joint = f"{joint}_{number_text}" if joint else int(number_text)
+    # A word for desired motion within a joint's name: no set point is read as a measured signal.
+    if match.re is not FIRST and any(map(_is_desired, re.split(GAP, str(joint)))):
+        return None
     signal = _signal(found, naming, name)
-    if isinstance(joint, str) and match.re is not FIRST:
-        joint, says_desired = _without_side(joint)
-        if says_desired and signal in ("position", "velocity", "effort"):
-            signal = None if signal == "effort" else f"{signal}_desired"
     if not signal or joint == "" or not signal.startswith(UNITS.get(unit, (signal, 1.0))[0]):
         return None
     return signal, joint
-
-
-def _without_side(joint: str) -> tuple[str, bool]:
-    """Name of a joint without a word for desired motion in it, and whether there was one."""
-    words = re.split(f"({GAP})", joint)
-    kept = [word for word in words if not _is_desired(word)]
-    if len(kept) == len(words):
-        return joint, False
-    return "".join(kept).strip(" _./-").replace("__", "_"), True
 
 
 def array_signal(name: str) -> str | None:
