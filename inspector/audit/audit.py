@@ -226,11 +226,15 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
     check_joints(run.desired_joint_names, run.robot)
     part = excerpt(run)
     reach = bandwidth(part)
+    jitter, noted = None, run.meta.get("jitter")
+    match [noted.get(key) for key in ("rms", "max")] if isinstance(noted, Mapping) else []:
+        case [float(rms), float(largest)]:
+            jitter = rms, largest
     return Audit(
         rate=run.rate,
         duration=run.duration,
         joints=len(run.joint_names),
-        jitter=_jitter(run),
+        jitter=jitter,
         gaps=gaps_of(run),
         bandwidth=reach,
         warnings=(*_warnings(part, reach), *limit_warnings(run)),
@@ -243,15 +247,6 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
             rate=(slower or without_hold(run)).rate,
         ),
     )
-
-
-def _jitter(run: Run) -> tuple[float, float] | None:
-    noted = run.meta.get("jitter")
-    values = [noted.get(key) for key in ("rms", "max")] if isinstance(noted, Mapping) else []
-    match values:
-        case [float(rms), float(largest)]:
-            return rms, largest
-    return None
 
 
 def _warnings(run: Run, reach: Bandwidth) -> Iterator[str]:

@@ -132,23 +132,19 @@ class Labels:
         A stretch has the class of most of its time: the frames at both ends of an oscillation often
         look like an impact.
         """
-        return tuple(map(self._event, self.stretches))
-
-    def _event(self, frames: Index) -> Event:
-        label, scores = self._name(frames), self.scores[frames]
-        if self.above_threshold is not None:  # of any failure, as the alarm threshold
-            score = 1.0 - float(scores[:, 0].min())
-        elif label in self.classes:
-            score = float(scores[:, self.classes.index(label)].max())
-        else:
-            score = float(scores[:, 1:].max())
-        return Event(
-            label,
-            float(self.start[frames[0]]),
-            float(self.stop[frames[-1]]),
-            score,
-            self.novel is not None and bool(self.novel[frames].any()),
-        )
+        found = []
+        for frames in self.stretches:
+            label, scores = self._name(frames), self.scores[frames]
+            if self.above_threshold is not None:  # of any failure, as the alarm threshold
+                score = 1.0 - float(scores[:, 0].min())
+            elif label in self.classes:
+                score = float(scores[:, self.classes.index(label)].max())
+            else:
+                score = float(scores[:, 1:].max())
+            start, stop = float(self.start[frames[0]]), float(self.stop[frames[-1]])
+            novel = self.novel is not None and bool(self.novel[frames].any())
+            found.append(Event(label, start, stop, score, novel))
+        return tuple(found)
 
     @staticmethod
     def concatenated(parts: Sequence["Labels"]) -> "Labels":

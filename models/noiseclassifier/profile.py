@@ -113,7 +113,20 @@ class Profile:
 
     def __post_init__(self) -> None:
         """Check every setting once."""
-        _check_types(self)
+        for field in fields(self):
+            value, kind = getattr(self, field.name), field.type
+            if choices := _CHOICES.get(field.name):
+                fits, wanted = value in choices, f"one of {', '.join(choices)}"
+            elif kind is float:
+                fits, wanted = type(value) in (int, float) and isfinite(value), "a finite number"
+            elif kind in (int, bool, str):
+                fits, wanted = type(value) is kind, f"a value of type {kind.__name__}"
+            else:
+                item = float if field.name.endswith("edges") else str
+                fits = isinstance(value, tuple) and all(type(each) is item for each in value)
+                wanted = f"a tuple of {item.__name__}"
+            if not fits:
+                raise ProfileError(f"{field.name} is {value!r}, expected {wanted}")
         for fits, problem in chain(_rules(self), _rules_of_signals(self)):
             if not fits:
                 raise ProfileError(problem)
@@ -229,23 +242,6 @@ def columns(profile: Profile) -> tuple[str, ...]:
     if profile.reference:
         return (*plain, *(f"{RELATIVE} {name}" for name in plain))
     return (*plain, *["level"] * profile.relative)
-
-
-def _check_types(profile: Profile) -> None:
-    for field in fields(profile):
-        value, kind = getattr(profile, field.name), field.type
-        if choices := _CHOICES.get(field.name):
-            fits, wanted = value in choices, f"one of {', '.join(choices)}"
-        elif kind is float:
-            fits, wanted = type(value) in (int, float) and isfinite(value), "a finite number"
-        elif kind in (int, bool, str):
-            fits, wanted = type(value) is kind, f"a value of type {kind.__name__}"
-        else:
-            item = float if field.name.endswith("edges") else str
-            fits = isinstance(value, tuple) and all(type(each) is item for each in value)
-            wanted = f"a tuple of {item.__name__}"
-        if not fits:
-            raise ProfileError(f"{field.name} is {value!r}, expected {wanted}")
 
 
 def _rules(profile: Profile) -> Iterator[tuple[bool, str]]:
