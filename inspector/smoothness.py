@@ -318,10 +318,9 @@ def as_text(ranking: Ranking) -> str:
     heads = [("rank", ""), ("episode", ""), ("duration", "s"), ("rate", "Hz")]
     heads += [(score.title, score.unit) for score in SCORES.values()]
     names = _short([episode.name for episode in episodes])
-    shared = Counter(ranking.ranks)
     rows = [
         [
-            "" if rank is None else f"{rank}{' equal' if shared[rank] > 1 else ''}",
+            "" if rank is None else str(rank),
             name,
             f"{episode.duration:.2f}",
             f"{episode.rate:g}",
@@ -383,20 +382,11 @@ def _notes(ranking: Ranking) -> Iterator[str]:
     """Say what is missing, what was decided, and what to look at, each once."""
     episodes = ranking.episodes
 
-    def where(count: int) -> str:
-        return "" if count == len(episodes) else f" for {count} of {len(episodes)}"
-
-    missing: dict[str, list[str]] = {}
     for score in SCORES.values():
-        reasons = Counter(
-            each.reasons[score.name] for each in episodes if score.name in each.reasons
-        )
+        reasons = [each.reasons[score.name] for each in episodes if score.name in each.reasons]
         if reasons:
-            (reason, _), others = reasons.most_common(1)[0], len(reasons) - 1
-            more = f" (and {others} other reasons: --format json)" if others else ""
-            text = f"empty{where(reasons.total())}, {reason}{more}"
-            missing.setdefault(text, []).append(score.title)
-    yield from (f"{', '.join(titles)}: {text}" for text, titles in missing.items())
+            why = "; ".join(dict.fromkeys(reasons))
+            yield f"{score.title}: empty for {len(reasons)} of {len(episodes)}, {why}"
     remarks = Counter(remark for episode in episodes for remark in episode.remarks)
     for remark, count in remarks.items():
         yield remark if count == len(episodes) else f"{count} of {len(episodes)}: {remark}"

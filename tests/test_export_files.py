@@ -229,17 +229,13 @@ def test_what_cannot_be_exported_is_an_error_of_one_line(tmp_path):
     assert (tmp_path / "there.csv").read_text() == "mine"
 
 
-def test_a_missing_extra_is_an_error_and_leaves_no_file(tmp_path, monkeypatch):
+def test_a_missing_extra_is_an_error_and_other_formats_are_written(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     plain_run().save(tmp_path / "run.npz")
     status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.mcap")
     assert status == 3
     assert "pip install 'noise-inspector[mcap]'" in err
     assert [path.name for path in tmp_path.iterdir()] == ["run.npz"]
-
-
-def test_the_command_prints_what_it_wrote(tmp_path):
-    plain_run().save(tmp_path / "run.npz")
     status, out, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.parquet")
     assert (status, err) == (0, "")
     assert "No extended noise: that takes a robot and positions." in out

@@ -11,7 +11,6 @@ from generalmodel import fixed
 
 from inspector.library import demo_run, model_files
 from inspector.recording import viewer
-from noisemodel import Run
 
 ROOT = Path(__file__).parents[1]
 HAS_DISPLAY = viewer.has_display
@@ -37,18 +36,6 @@ def test_the_demo_is_shown_without_a_display(tmp_path, monkeypatch):
     assert f"recording: {recording}" in out
     assert f"rerun {recording}" in out
     assert "inspector view RUN --web" in out
-
-
-def test_the_demo_run_is_small_and_has_its_defect():
-    assert demo_run().stat().st_size <= 3_000_000
-    run = Run.load(demo_run())
-    assert run.rate == 10_000.0
-    assert 3.5 <= run.duration <= 4.5
-    assert run.velocity.dtype == np.float32
-    assert {block.label for block in run.blocks} - {"ok"}
-    status, out, _ = inspector("classify", demo_run())
-    assert status == 1
-    assert "FAIL" in out
 
 
 @pytest.fixture
@@ -116,10 +103,7 @@ def test_a_rate_below_every_model_shows_everything_but_the_lanes(tmp_path):
     assert "cannot-tell: logged at 50 Hz" in out
     assert "No labels: logged at 50 Hz" in out
     assert (tmp_path / "slow.rrd").exists()
-    status, out, _ = inspector("classify", run)
-    assert status == 4
-    assert "cannot tell" in out
-    assert "50 Hz" in out
+    assert inspector("classify", run)[0] == 4
 
 
 def test_a_run_between_two_rates_is_decimated_never_upsampled(tmp_path):
@@ -205,35 +189,6 @@ def test_a_kind_that_does_not_exist_or_cannot_be_had_is_one_line(tmp_path):
     status, _, err = inspector("noise", run_without_robot(tmp_path / "run.npz"), "--kind", "paper")
     assert (status, err.count("\n")) == (3, 1)
     assert "kind 'paper' needs a robot, the run names None" in err
-
-
-def test_a_model_is_trained_and_evaluated(tmp_path):
-    generator = np.random.default_rng(0)
-    for seed in range(3):
-        time = np.arange(20_000) / 10_000
-        signal = 1 + 0.01 * generator.normal(size=20_000)
-        signal[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:])
-        np.savez(
-            tmp_path / f"run{seed}.npz",
-            time=time,
-            velocity=signal[:, None],
-            block_start=[0.0, 1.0],
-            block_stop=[1.0, 2.0],
-            block_label=["ok", "oscillations"],
-        )
-    model = tmp_path / "model.npz"
-    runs = [tmp_path / f"run{seed}.npz" for seed in range(2)]
-    call = ["train", *runs, "-o", model, "--rate", 1000]
-    status, out, _ = inspector(*call, "--profile", "logbands")
-    assert status == 0
-    assert "Subset accuracy" in out
-    status, out, _ = inspector("evaluate", model, *runs, "--seen-too")
-    assert status == 0
-    assert "Failure recall" in out
-    status, out, _ = inspector("evaluate", model, tmp_path / "run2.npz", "--json")
-    assert status == 0
-    confusion = np.array(json.loads(out)["frames"]["confusion"])
-    np.testing.assert_array_equal(confusion.sum(axis=1), [7, 7])
 
 
 def test_a_profile_that_does_not_exist_at_a_rate_is_one_line(tmp_path):

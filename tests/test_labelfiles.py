@@ -7,12 +7,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from inspector.errors import InspectorError
-from inspector.export.labels import FORMATS, read_labels, write_labels
+from inspector.export.labels import read_labels, write_labels
 from inspector.library import demo_run
 from noiseclassifier import Event
 from noisemodel import Block, OutputError, Run, RunError
-
-SUFFIXES = list(FORMATS)
 
 words = st.text(min_size=1, max_size=12).filter(str.isprintable)
 times = st.floats(-1e6, 1e6, allow_nan=False)
@@ -50,6 +48,7 @@ def run_with(*blocks, seconds=10.0):
 @pytest.mark.parametrize("suffix", [".csv", ".txt"])
 @settings(deadline=None, max_examples=60)
 @given(run=annotated_runs())
+@example(run=run_with())
 @example(run=run_with(Block(0.1 + 0.2, 1 / 3, " a,\"b\"; 'c' "), Block(1e-300, 0.1, "\\")))
 def test_labels_written_and_read_again_are_equal(folder, suffix, run):
     assert there_and_back(folder, run, suffix) == run.blocks
@@ -57,6 +56,7 @@ def test_labels_written_and_read_again_are_equal(folder, suffix, run):
 
 @settings(deadline=None, max_examples=60)
 @given(run=annotated_runs())
+@example(run=run_with())
 @example(run=run_with(Block(0.5, 1.0, 'say "\\u0041" \\')))
 def test_labels_written_and_read_by_noisytest_are_equal(folder, run):
     if any(block.stop == -1.0 for block in run.blocks):
@@ -64,11 +64,6 @@ def test_labels_written_and_read_by_noisytest_are_equal(folder, run):
             there_and_back(folder, run, ".toml")
     else:
         assert there_and_back(folder, run, ".toml") == run.blocks
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_an_empty_list_of_labels_is_written_and_read(folder, suffix):
-    assert there_and_back(folder, run_with(), suffix) == ()
 
 
 def test_findings_keep_their_scores_in_csv(tmp_path):
@@ -235,12 +230,6 @@ def test_annotated_blocks_are_written_and_read_by_the_command(tmp_path):
     )
     assert (status, err) == (0, "")
     assert Run.load(tmp_path / "n.npz").blocks == bare.blocks
-
-
-def test_the_command_of_old_names_the_new_one():
-    status, out, err = call("labels", demo_run())
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "`inspector labels` is now `inspector export (--labels" in err
 
 
 def test_findings_are_written_by_the_command_and_nothing_is_replaced_unasked(tmp_path):
