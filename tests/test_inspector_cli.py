@@ -86,7 +86,7 @@ def test_a_display_that_cannot_be_opened_ends_with_5_and_what_to_do(monkeypatch,
     monkeypatch.setattr(viewer, "has_display", HAS_DISPLAY)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    monkeypatch.setenv("DISPLAY", ":99")
+    monkeypatch.setenv("DISPLAY", ":4099")
     status, out, err = inspector("view", run_without_robot(tmp_path / "run.npz"))
     assert status == 5
     assert err.count("\n") == 1
