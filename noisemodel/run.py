@@ -548,15 +548,9 @@ def resample(
 ) -> tuple[Array, Mask]:
     """Values at other instants: monotone between samples (PCHIP), without overshoot.
 
-    Args:
-        stamps: Times of the samples, increasing, shape (samples,), in [s].
-        values: Shape (samples, columns); angles have to be continuous, see ``numpy.unwrap``.
-        instants: Increasing, shape (instants,), in [s].
-        between: The samples of each stretch between gaps; all are one unless given.
-        slack: How far outside of a stretch an instant still belongs to it, in [s].
-
-    Returns:
-        Values, 0 in gaps, shape (instants, columns), and which instants are in no gap.
+    Stamps and instants rise, in [s]; values, (samples, columns), are continuous, also angles.
+    ``between`` has the samples of each stretch between gaps; an instant may lie outside of one by a
+    slack, in [s]. Returns values, 0 in gaps, (instants, columns), and which are in no gap.
     """
     from scipy.interpolate import PchipInterpolator
 

@@ -402,11 +402,6 @@ class Surface:
         return np.array([link.area for link in self.links], dtype=np.float64)
 
     @property
-    def mean_square(self) -> Array:
-        """Mean-square speed under a twist nu is nu' M nu, shape (links, 6, 6)."""
-        return np.array([link.mean_square for link in self.links])
-
-    @property
     def mean_square_normal(self) -> Array:
         """Mean-square normal speed under a twist nu is nu' M nu, shape (links, 6, 6)."""
         return np.array([link.mean_square_normal for link in self.links])

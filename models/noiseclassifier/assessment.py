@@ -210,11 +210,7 @@ def measure(
 
 
 def table(assessment: Assessment, by: str = "") -> str:
-    """Table of an assessment, as text.
-
-    Args:
-        by: ``robot``, ``domain`` or ``scenario``: the one table of parts to print.
-    """
+    """Table of an assessment, as text; ``by`` names the one table of parts to print."""
     protocol = assessment.protocol
     keys = [by] if by else [key for key in ("robot", "domain") if len(protocol.by[key]) > 1]
     foot = ["Brackets are 95 % confidence intervals over groups of runs."]

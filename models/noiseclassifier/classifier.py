@@ -401,11 +401,7 @@ def _bound(model: General, rate: float, signals: Sequence[str]) -> Classifier:
 
 
 def frames_of(
-    recordings: Iterable[Recording],
-    recipe: LogBands,
-    *,
-    thin: int = 1,
-    inputs: Sequence[Sequence[str]] = TAKEN,
+    recordings: Iterable[Recording], recipe: LogBands, *, thin: int = 1
 ) -> Iterator[Dataset]:
     """Labelled frames of recordings, once for each of the inputs that they feed.
 
@@ -415,14 +411,13 @@ def frames_of(
 
     Args:
         thin: Keep every ``thin``-th `ok` frame.
-        inputs: Signals to take.
 
     Yields:
         Frames of a recording in all features that there are, NaN where one is missing.
     """
     efforts = np.array([name.startswith(EFFORT) for name in recipe.columns])
     for recording in recordings:
-        fed = [names for names in inputs if feeds(named(recording.signal), names)]
+        fed = [names for names in TAKEN if feeds(named(recording.signal), names)]
         for number, names in enumerate(fed):
             profile = recipe.bound(recording.rate, names)
             starts, features = frame_features(recording.signal, profile, recording.valid)

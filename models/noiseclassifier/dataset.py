@@ -3,14 +3,12 @@
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from noiseclassifier.errors import DatasetError, NoFrameError, RateError, RecordingError
 from noiseclassifier.features import features, first_sample, frame
-from noiseclassifier.noisytest import read_folder
 from noiseclassifier.profile import NOMINAL, Profile
 from noiseclassifier.recording import Block, Recording, group_of
 from noiseclassifier.signals import Mask, Real, Words, stacked
@@ -55,16 +53,6 @@ class Dataset:
         if not labels:
             raise NoFrameError(len(hashes), profile.classes)
         return cls(np.concatenate(found), np.array(labels), np.array(runs), hashes)
-
-    @classmethod
-    def read(cls, folder: str | Path, profile: Profile, *, training: bool = True) -> Self:
-        """Frames of a folder of NoisyTest's ``.log`` and ``.toml`` files, in sorted order.
-
-        Raises:
-            FileError: If a file is missing or cannot be understood.
-            ModelsError: As `of` does.
-        """
-        return cls.of(read_folder(folder, rate=profile.rate), profile, training=training)
 
     @classmethod
     def joined(cls, parts: Iterable[Self]) -> Self:

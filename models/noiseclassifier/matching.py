@@ -22,7 +22,7 @@ Spans are arrays of shape (spans, 2), start and stop of each, in [s].
 """
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, nan
@@ -98,26 +98,14 @@ def duration(spans: Array) -> float:
 
 
 def match(
-    found: Sequence[Span],
-    wanted: Sequence[Span],
-    *,
-    collar: float = COLLAR,
-    same: Callable[[int, int], bool] | None = None,
+    found: Sequence[Span], wanted: Sequence[Span], *, collar: float = COLLAR
 ) -> list[tuple[int, int]]:
-    """Match findings with faults, or findings of two runs, one to one.
-
-    Args:
-        collar: Time between two that still meet, in [s].
-        same: Whether two may be matched at all, by their indices, say because their class is one.
+    """Match findings with faults, or findings of two runs, one to one, up to a collar in [s] apart.
 
     Returns:
         Indices of ``found`` and of ``wanted``, as many pairs as can be, each index in one at most.
     """
-    met = meet(spans_of(found), spans_of(wanted), collar)
-    if same is not None:
-        for row, column in np.argwhere(met):
-            met[row, column] = same(int(row), int(column))
-    return pairs(met)
+    return pairs(meet(spans_of(found), spans_of(wanted), collar))
 
 
 def meet(spans: Array, wanted: Array, collar: float = COLLAR) -> Mask:
@@ -141,8 +129,7 @@ def pairs(met: Mask) -> list[tuple[int, int]]:
 def truth_of(start: Array, stop: Array, blocks: Iterable[Block], *, step: float) -> Words:
     """True class of each frame from start to stop in [s], `UNCLEAR` where annotations tell none.
 
-    Args:
-        step: Time from one sample to the next, in [s].
+    ``step`` is the time from one sample to the next, in [s].
     """
     blocks = list(blocks)
     frames, slack = np.stack((start, stop), axis=1), 1.5 * step

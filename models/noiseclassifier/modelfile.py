@@ -1,9 +1,9 @@
-"""The model file, version 6: one uncompressed `.npz` of plain arrays and a JSON manifest.
+"""The model file, version 7: one uncompressed `.npz` of plain arrays and a JSON manifest.
 
 Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the estimator, as
 its ``DIMENSIONS`` list them. Nothing in it is ever unpickled; sizes are checked before an array is
 made. The same model is the same bytes. A general model has ``recipe`` in the manifest, and its
-profile is for its highest rate. Versions 4 and 5 are read too: they know no missing features
+profile is for its highest rate. Versions 4 to 6 are read too; 4 and 5 know no missing features
 and no reference.
 """
 

@@ -91,11 +91,7 @@ LATEST = 1e12  # all times lie before, in [s]
 
 
 def read_folder(folder: str | Path, *, rate: float | None = None) -> Iterator[Recording]:
-    """Recordings of a folder that holds a ``.toml`` beside each ``.log``, in sorted order.
-
-    Args:
-        rate: Sample rate that all must have, in [Hz]; by default, each has its own.
-    """
+    """Recordings of a folder of ``.log`` and ``.toml``, sorted, of one rate in [Hz] if given."""
     logs = sorted(Path(folder).glob("*.log"))
     if not logs:
         state = "has no .log file" if Path(folder).is_dir() else "is no folder"
