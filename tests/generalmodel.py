@@ -1,5 +1,6 @@
 """A tiny general model, trained in a second, and logs of three joints at any rate."""
 
+import json
 from dataclasses import replace
 from functools import cache
 
@@ -83,3 +84,15 @@ def fixed(names=(NOISE,), rate=1000.0):
     still = {name: np.zeros_like(each) for name, each in recordings[0].signal.items()}
     recordings.append(replace(recordings[0], name="panda/still-009", signal=still))
     return nc.Classifier.train(nc.Dataset.of(recordings, profile), profile)
+
+
+def rewrite(path, manifest=(), /, **changes):
+    """Write a model file anew, with changes of its manifest and arrays; None leaves one out."""
+    with np.load(path, allow_pickle=False) as members:
+        arrays = dict(members) | changes
+    if manifest:
+        whole = json.loads(str(arrays["manifest"])) | dict(manifest)
+        kept = {name: value for name, value in whole.items() if value is not None}
+        arrays["manifest"] = np.array(json.dumps(kept))
+    kept = {name: array for name, array in arrays.items() if array is not None}
+    np.savez(path, allow_pickle=True, **kept)

@@ -138,41 +138,33 @@ def test_a_push_that_velocities_do_not_show_has_a_label_where_efforts_show_it(tw
     assert noisy.blocks == blind.blocks
 
 
-def test_a_logger_of_efforts_leaves_velocities_as_they_are(twin):
+def test_a_logger_of_efforts_leaves_velocities_as_they_are_and_repeats_itself_by_seed(twin):
     rough = replace(TORQUE, jitter=0.1, lost=0.02, repeated=0.02, hold=3, velocity="filtered")
-    kinds = [
-        logged(twin, twin, replace(rough, effort=kind, current=8.0), seed=4)
-        for kind in ("missing", "torque", "current")
-    ]
-    for found in kinds[1:]:
-        assert np.array_equal(found.velocity, kinds[0].velocity)
-        assert np.array_equal(found.velocity_desired, kinds[0].velocity_desired)
-    again = logged(twin, twin, replace(rough, effort="current", current=8.0), seed=4)
-    assert np.array_equal(again.effort, kinds[2].effort)
-    noise = replace(rough, effort_noise=0.01)
-    other = [logged(twin, twin, noise, seed=seed).effort for seed in (4, 4, 5)]
-    assert np.array_equal(other[0], other[1])
-    assert not np.array_equal(other[0], other[2])
+    plain = logged(twin, twin, replace(rough, effort="missing"), seed=4)
+    for kind in ("torque", "current"):
+        logger = replace(rough, effort=kind, current=8.0, effort_noise=0.01)
+        found, again, other = (logged(twin, twin, logger, seed=seed) for seed in (4, 4, 5))
+        assert np.array_equal(found.velocity, plain.velocity)
+        assert np.array_equal(found.velocity_desired, plain.velocity_desired)
+        assert np.array_equal(found.effort, again.effort)
+        assert not np.array_equal(found.effort, other.effort)
 
 
-def test_currents_are_torques_by_the_torque_constant_of_each_joint(twin):
+def test_efforts_have_steps_and_noise_are_held_and_as_currents_by_each_joint_s_constant(twin):
     limit = np.array(twin.meta["effort_limit"])
-    torque = logged(twin, twin, TORQUE, seed=1).effort
-    current = logged(twin, twin, replace(TORQUE, effort="current", current=10.0), seed=1).effort
-    np.testing.assert_allclose(current * limit / 10.0, torque, atol=1e-3)
-
-
-def test_efforts_have_steps_noise_and_are_held_as_velocities_are(twin):
-    limit = np.array(twin.meta["effort_limit"])
-    fine = logged(twin, twin, TORQUE, seed=1).effort
-    coarse = logged(twin, twin, replace(TORQUE, effort_bits=8), seed=1).effort
     step = 2 * limit / 2**8
+    fine, coarse, noisy, held, current = (
+        logged(twin, twin, replace(TORQUE, **changes), seed=1).effort
+        for changes in (
+            *({}, {"effort_bits": 8}, {"effort_noise": 0.01}, {"hold": 10}),
+            {"effort": "current", "current": 10.0},
+        )
+    )
     np.testing.assert_allclose(coarse / step, np.rint(coarse / step), atol=1e-3)
     assert (np.abs(coarse - fine) <= 0.51 * step).all()
-    noisy = logged(twin, twin, replace(TORQUE, effort_noise=0.01), seed=1).effort
     np.testing.assert_allclose((noisy - fine).std(axis=0), 0.01 * limit, rtol=0.1)
-    held = logged(twin, twin, replace(TORQUE, hold=10), seed=1).effort
     assert np.array_equal(held[::10], held[9::10])
+    np.testing.assert_allclose(current * limit / 10.0, fine, atol=1e-3)
 
 
 def test_a_slow_change_is_visible_beside_a_weight_only_where_means_are_left_out():

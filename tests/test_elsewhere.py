@@ -34,19 +34,6 @@ def test_the_labels_of_a_run_hold_its_fault(domains, name, module):
     assert run.meta["simulator"].split()[0] == name.split("-")[0]
 
 
-def test_a_foot_is_where_inverse_kinematics_puts_it(domains):
-    legs = domains.A1
-    place = [np.full((1, 4), each) for each in (0.05, 0.0, -0.3)]
-    place[1] = place[1] + domains.bulletlegs.SIDES * 0.1
-    hip, upper, knee = np.moveaxis(domains.bulletlegs.angles(legs, *place), 2, 0)
-    lateral, thigh, calf = domains.bulletlegs.SIDES * legs.lengths[0], *legs.lengths[1:]
-    depth = thigh * np.cos(upper) + calf * np.cos(upper + knee)
-    ahead = -thigh * np.sin(upper) - calf * np.sin(upper + knee)
-    np.testing.assert_allclose(ahead, place[0])
-    np.testing.assert_allclose(lateral * np.cos(hip) + depth * np.sin(hip), place[1])
-    np.testing.assert_allclose(lateral * np.sin(hip) - depth * np.cos(hip), place[2])
-
-
 def test_references_start_at_rest_and_are_their_velocity_s_integral(domains):
     for kind in domains.references.KINDS:
         rng = np.random.default_rng(3)
@@ -85,12 +72,3 @@ def test_a_run_that_is_dropped_is_named_and_not_tried_again(domains, monkeypatch
     assert capsys.readouterr().out == "dropped pybullet-a1/a1/good-90000: fell after 1.00 s\n"
     reason = tmp_path / "pybullet-a1" / "a1" / "good-90000.dropped.txt"
     assert reason.read_text() == "fell after 1.00 s\n"
-
-
-def test_a_simulation_that_diverges_is_dropped(domains):
-    from benchmarks.elsewhere.recorded import DroppedError, Recorded
-
-    velocity = np.zeros((100, 2))
-    velocity[50:, 1] = np.inf
-    with pytest.raises(DroppedError, match=r"diverged after 0\.50 s"):
-        Recorded(velocity, velocity, velocity).checked(100.0)

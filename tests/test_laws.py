@@ -127,21 +127,13 @@ def test_a_faint_fault_that_is_found_is_found_louder_too(kind, joint, frequency,
     assert found == sorted(found)
 
 
-@pytest.mark.parametrize(("frequency", "amplitude"), [(35.0, 100.0), (90.0, 1.0), (180.0, 0.1)])
-def test_a_tone_on_one_joint_of_a_panda_is_a_finding_however_loud(frequency, amplitude):
-    run = good_run("panda", 10_000.0)
-    tone = added(run, "tone", frequency, 0) / np.sqrt(2.0)
-    found = analyse(with_fault(run, 2, tone, amplitude), LIBRARY)
-    assert found.status is Status.FINDINGS
-    if amplitude / np.sqrt(2.0) > 10.0:  # louder than the faults that models/build.py adds
-        assert any(event.novel for event in found.findings)
-
-
 def test_to_ignore_unknown_frames_never_adds_a_finding():
     run = good_run("panda", 1000.0)
     for kind in KINDS:
-        loud = with_fault(run, 1, added(run, kind, 60.0, 0), 10.0)
+        loud = with_fault(run, 1, added(run, kind, 60.0, 0), 100.0)
         reported = analyse(loud, LIBRARY)
+        if kind == "tone":  # louder than the faults that models/build.py adds
+            assert any(event.novel for event in reported.findings)
         ignoring = analyse(loud, LIBRARY, unknown=Unknown.IGNORE)
         spans = {(span.start, span.stop) for span in reported.spans}
         for span in ignoring.spans:

@@ -139,13 +139,15 @@ def test_lines_are_short_and_lists_too():
     assert ["have none" in str(measure(many(groups))) for groups in (4, 5)] == [True, False]
 
 
-def sure(name, annotated, labels, confidence, findings, *, cut=None, faults=(), **facts):
+def sure(name, annotated, labels, confidence, findings, domain, *, cut=None):
     """A recording of a model with such a confidence, and with these findings."""
     scores = np.full((len(labels), 4), (1.0 - confidence) / 3)
     scores[np.arange(len(labels)), [CLASSES.index(each) for each in labels]] = confidence
-    spans = tuple(Event(*each) for each in findings)
+    words = [each.split() for each in findings.split(";") if each]
+    spans = tuple(Event(label, *map(float, numbers)) for label, *numbers in words)
     one = predicted(name, annotated, labels, scores=scores, cut=cut)
-    return replace(one, events=faults, facts=facts, located=(spans, spans))
+    facts = {"domain": domain, "scenario": name.split("/")[1].split("-")[0]}
+    return replace(one, facts=facts, located=(spans, spans))
 
 
 def of_two_robots():
@@ -155,43 +157,21 @@ def of_two_robots():
     late = ["highaccelerations" if 20 < n < 40 else "ok" for n in range(len(calm))]
     series = blocks(*((0.5 * n + 0.1, 0.5 * n + 0.2, "impact") for n in range(6)), (3.5, 4.5, "ok"))
     faults = (Fault(2.03, 2.2, "impact"), Fault(4.0, 4.1, "impact", felt=False))
-    stiff, soft = ({"domain": domain} for domain in ("stiff", "soft"))
-    runs = [
-        sure(
-            *("talos/good-000", GOOD, false, 0.85),
-            [("impact", 0.35, 0.75, 0.9), ("unknown", 3.0, 3.6, 0.4)],
-            cut=["impact"],
-            **stiff,
-            scenario="good",
-        ),
-        sure(
-            *("talos/blow-000", IMPACT, perfect(IMPACT), 0.95),
-            [("impact", 2.01, 2.2, 0.9)],
-            **stiff,
-            scenario="blow",
-        ),
-        sure(
-            *("talos/blow-001", IMPACT, calm, 0.75),
-            [("impact", 2.6, 2.7, 0.9)],
-            faults=faults,
-            **soft,
-            scenario="blow",
-        ),
-        sure(
-            *("go2/swing-002", OSCILLATION, late, 0.65),
-            [("highaccelerations", 2.1, 4.2, 0.9)],
-            cut=["ok", "highaccelerations", "ok"],
-            **soft,
-            scenario="swing",
-        ),
-        sure(
-            *("go2/blow-003", series, calm, 0.55),
-            [],
-            cut=["ok", *["impact"] * 4, "oscillations", "ok"],
-            **soft,
-            scenario="blow",
-        ),
+    stiff, soft = "stiff", "soft"
+    rows = [
+        ("talos/good-000", GOOD, false, 0.85, "impact 0.35 0.75 0.9; unknown 3.0 3.6 0.4", stiff),
+        ("talos/blow-000", IMPACT, perfect(IMPACT), 0.95, "impact 2.01 2.2 0.9", stiff),
+        ("talos/blow-001", IMPACT, calm, 0.75, "impact 2.6 2.7 0.9", soft),
+        ("go2/swing-002", OSCILLATION, late, 0.65, "highaccelerations 2.1 4.2 0.9", soft),
+        ("go2/blow-003", series, calm, 0.55, "", soft),
     ]
+    cuts = {
+        "talos/good-000": ["impact"],
+        "go2/swing-002": ["ok", "highaccelerations", "ok"],
+        "go2/blow-003": ["ok", *["impact"] * 4, "oscillations", "ok"],
+    }
+    runs = [sure(*row, cut=cuts.get(row[0])) for row in rows]
+    runs[2] = replace(runs[2], events=faults)
     slow = Unanswered("a1/slow-000", {"robot": "a1", "domain": "field"}, "rate 50 Hz < 80 Hz")
     return measure(
         runs,

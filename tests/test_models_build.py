@@ -64,10 +64,9 @@ def test_a_fault_far_below_the_noise_has_no_label():
 
 
 def test_equal_seeds_add_equal_faults():
-    assert np.array_equal(with_faults(log(), seed=1).velocity, with_faults(log(), seed=1).velocity)
-    assert not np.array_equal(
-        with_faults(log(), seed=1).velocity, with_faults(log(), seed=2).velocity
-    )
+    one, same, other = (with_faults(log(), seed=seed).velocity for seed in (1, 1, 2))
+    assert np.array_equal(one, same)
+    assert not np.array_equal(one, other)
 
 
 def test_a_piece_of_a_log_begins_at_zero_with_what_it_has_of_labels_and_events():

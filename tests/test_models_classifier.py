@@ -56,12 +56,6 @@ def test_the_training_set_is_classified_right(ours):
     assert dict(ours.runs) == {each.name: each.sha256 for each in DATA}
 
 
-def test_a_validation_set_is_measured_along(ours):
-    dataset = nc.Dataset.of(DATA, OURS)
-    validated = nc.Classifier.train(dataset, OURS, validation=dataset)
-    assert validated.metrics["validation"] == ours.metrics["training"]
-
-
 def test_features_that_hardly_change_are_not_amplified():
     features = nc.Dataset.of(DATA, OURS).features
     scale = trained(replace(OURS, least_deviation=1.0)).scale
@@ -163,9 +157,6 @@ def test_all_gaps_are_no_labels(ours):
 def test_signals_that_cannot_be_classified_are_refused(ours, signal, reason):
     with pytest.raises(nc.SignalError, match=reason):
         ours.classify(signal, RATE)
-
-
-def test_validity_of_another_length_is_refused(ours):
     with pytest.raises(nc.SignalError, match=r"validity of shape \(3,\)"):
         ours.classify(np.zeros(500), RATE, valid=np.ones(3, bool))
 
@@ -176,17 +167,14 @@ def test_a_signal_of_another_rate_is_refused(ours, rate):
         ours.classify(np.zeros(500), rate)
 
 
-def test_one_class_is_not_enough_to_learn():
-    alone = nc.Dataset.of(DATA[:1], OURS)
+def test_one_class_is_not_enough_to_learn_and_two_are_without_ok():
+    alone, failures = nc.Dataset.of(DATA[:1], OURS), nc.Dataset.of(DATA[1:], OURS)
     with pytest.raises(nc.DatasetError, match="two classes or more of .*; the frames are ok"):
         nc.Classifier.train(alone, OURS)
-
-
-def test_failures_are_classified_without_ok():
-    profile = OURS
-    classifier = nc.Classifier.train(nc.Dataset.of(DATA[1:], profile), profile)
+    classifier = nc.Classifier.train(failures, OURS, validation=failures)
     assert classifier.classes == ("impact", "oscillations")
     assert classifier.classify(noise(1.0, hum=0.2), RATE).events()[0].label == "oscillations"
+    assert classifier.metrics["validation"] == classifier.metrics["training"]
 
 
 def test_the_nearest_model_is_the_one_below(ours):

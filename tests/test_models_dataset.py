@@ -9,7 +9,8 @@ import noiseclassifier as nc
 from noiseclassifier.dataset import cut, cut_frames
 from noiseclassifier.recording import Block, Recording
 
-PROFILE = replace(nc.Profile.paper(), rate=1000.0, length=400, hop=100, window=256, stride=48)
+OURS = nc.LogBands().at(1000.0)
+PAPER = replace(nc.Profile.paper(), rate=1000.0, length=400, hop=100, window=256, stride=48)
 THEIRS = replace(nc.Profile.noisytest(), rate=1000.0, length=400, hop=100, window=256, stride=48)
 
 
@@ -19,47 +20,33 @@ def recording(*blocks, samples=3000, **changes):
     return Recording(**{**facts, **changes})
 
 
-def cut_block(begin, stop, profile=PROFILE, *, training=True, **changes):
+def cut_block(begin, stop, profile=PAPER, *, training=True, **changes):
     block = Block(begin, stop, "impact")
     return cut(recording(block, **changes), block, profile, training=training)[0]
 
 
-def first_frames(recording, profile=PROFILE):
+def first_frames(recording, profile=PAPER):
     """All frames that training cuts from a recording."""
     return np.concatenate([each for _, each in cut_frames(recording, profile, training=True)])
 
 
-def test_a_block_holds_its_start_and_not_its_stop():
-    assert cut_block(1.0, 1.5).tolist() == list(range(1000, 1500))
-
-
-def test_time_counts_from_the_start_of_the_recording():
-    assert cut_block(11.0, 11.5, start=10.0).tolist() == list(range(1000, 1500))
-
-
-def test_an_open_block_reaches_the_last_sample():
-    assert cut_block(2.5, inf).tolist() == list(range(2500, 3000))
-    ours = nc.LogBands().at(1000.0)
-    assert cut_block(2.5, inf, ours, training=False).tolist() == list(range(2500, 3000))
-
-
-def test_a_short_block_is_padded_in_training():
-    samples = cut_block(1.0, 1.25)
-    assert samples.tolist() == list(range(1000, 1400))  # odd reflection continues a ramp
-
-
-def test_a_short_block_is_widened_on_both_sides_otherwise():
-    assert cut_block(1.0, 1.2, training=False).tolist() == list(range(900, 1300))
-
-
-@pytest.mark.parametrize(("start", "stop", "first"), [(0.0, 0.1, 0), (2.9, 3.0, 2600)])
-def test_a_block_near_an_end_is_widened_inside(start, stop, first):
-    assert cut_block(start, stop, training=False).tolist() == list(range(first, first + 400))
-
-
-def test_noisytest_takes_the_stop_in_and_loses_the_first_sample():
-    assert cut_block(1.0, 1.5, THEIRS).tolist() == list(range(1000, 1501))
-    assert cut_block(0.0, 0.5, THEIRS).tolist() == list(range(1, 501))
+@pytest.mark.parametrize(
+    ("block", "profile", "options", "samples"),
+    [
+        ((1.0, 1.5), PAPER, {}, (1000, 1500)),  # its start, and not its stop
+        ((11.0, 11.5), PAPER, {"start": 10.0}, (1000, 1500)),
+        ((2.5, inf), PAPER, {}, (2500, 3000)),
+        ((2.5, inf), OURS, {"training": False}, (2500, 3000)),
+        ((1.0, 1.25), PAPER, {}, (1000, 1400)),  # padded: odd reflection continues a ramp
+        ((1.0, 1.2), PAPER, {"training": False}, (900, 1300)),  # widened on both sides
+        ((0.0, 0.1), PAPER, {"training": False}, (0, 400)),  # or inside, near an end
+        ((2.9, 3.0), PAPER, {"training": False}, (2600, 3000)),
+        ((1.0, 1.5), THEIRS, {}, (1000, 1501)),  # NoisyTest takes the stop in
+        ((0.0, 0.5), THEIRS, {}, (1, 501)),  # and loses the first sample
+    ],
+)
+def test_a_block_is_cut_and_padded_in_training_or_else_widened(block, profile, options, samples):
+    assert cut_block(*block, profile, **options).tolist() == list(range(*samples))
 
 
 def test_noisytest_widens_by_a_sample_more_and_pads_at_the_ends():
@@ -69,12 +56,9 @@ def test_noisytest_widens_by_a_sample_more_and_pads_at_the_ends():
     assert samples.tolist() == list(range(1, 401))  # the ramp, padded behind 0.251 s
 
 
-def test_a_recording_shorter_than_a_frame_cannot_be_widened():
+def test_what_cannot_be_cut_is_refused():
     with pytest.raises(nc.RecordingError, match="walk: 300 samples are too short"):
         cut_block(0.1, 0.2, training=False, samples=300)
-
-
-def test_a_block_between_two_samples_is_refused():
     with pytest.raises(nc.RecordingError, match=r"from 1.0001 s to 1.0002 s holds no sample"):
         cut_block(1.0001, 1.0002)
 
@@ -82,8 +66,8 @@ def test_a_block_between_two_samples_is_refused():
 def test_a_dataset_keeps_labels_runs_and_hashes():
     walk = recording(Block(0.0, 0.5, "ok"), Block(0.6, 0.7, "impact"))
     stand = recording(Block(1.0, 1.6, "ok"), name="stand", sha256="abc")
-    dataset = nc.Dataset.of([walk, stand], PROFILE)
-    joined = nc.Dataset.joined(nc.Dataset.of([each], PROFILE) for each in (walk, stand))
+    dataset = nc.Dataset.of([walk, stand], PAPER)
+    joined = nc.Dataset.joined(nc.Dataset.of([each], PAPER) for each in (walk, stand))
     for field in ("features", "labels", "runs"):
         assert np.array_equal(getattr(joined, field), getattr(dataset, field))
     assert joined.hashes == dataset.hashes
@@ -91,7 +75,7 @@ def test_a_dataset_keeps_labels_runs_and_hashes():
     assert dataset.runs.tolist() == ["walk"] * 3 + ["stand"] * 3
     frames = np.concatenate([first_frames(each) for each in (walk, stand)])
     assert frames[:, 0].tolist() == [0, 100, 600, 1000, 1100, 1200]
-    assert np.array_equal(dataset.features, nc.features(frames, PROFILE))
+    assert np.array_equal(dataset.features, nc.features(frames, PAPER))
     assert dict(dataset.hashes) == {"walk": walk.sha256, "stand": "abc"}
 
 
@@ -100,29 +84,29 @@ def test_frames_that_touch_a_gap_are_left_out():
     valid[450] = False
     walk = recording(Block(0.0, 1.0, "ok"), Block(0.44, 0.46, "ok"), valid=valid)
     assert first_frames(walk)[:, 0].tolist() == [0, 500, 600]
-    assert nc.Dataset.of([walk], PROFILE).labels.tolist() == ["ok"] * 3
+    assert nc.Dataset.of([walk], PAPER).labels.tolist() == ["ok"] * 3
 
 
-def test_a_label_that_is_no_class_is_named():
-    with pytest.raises(
-        nc.RecordingError, match="walk: label 'rattle' is no class; there are ok, impact"
-    ):
-        nc.Dataset.of([recording(Block(0.0, 1.0, "rattle"))], PROFILE)
-
-
-def test_a_recording_of_another_rate_is_refused():
-    with pytest.raises(nc.RateError, match=r"rate of 970 Hz; .* 1000 Hz: recording 'walk'"):
-        nc.Dataset.of([recording(Block(0.0, 1.0, "ok"), rate=970.0)], PROFILE)
-
-
-def test_two_recordings_of_one_name_are_refused():
-    with pytest.raises(nc.DatasetError, match="two recordings are called 'walk'"):
-        nc.Dataset.of([recording(), recording()], PROFILE)
-
-
-def test_no_frame_at_all_is_refused():
-    with pytest.raises(nc.NoFrameError, match="no annotated frame in 1 recordings"):
-        nc.Dataset.of([recording()], PROFILE)
+@pytest.mark.parametrize(
+    ("recordings", "error", "reason"),
+    [
+        (
+            [recording(Block(0.0, 1.0, "rattle"))],
+            nc.RecordingError,
+            "walk: label 'rattle' is no class; there are ok, impact",
+        ),
+        (
+            [recording(Block(0.0, 1.0, "ok"), rate=970.0)],
+            nc.RateError,
+            r"rate of 970 Hz; .* 1000 Hz: recording 'walk'",
+        ),
+        ([recording(), recording()], nc.DatasetError, "two recordings are called 'walk'"),
+        ([recording()], nc.NoFrameError, "no annotated frame in 1 recordings"),
+    ],
+)
+def test_recordings_that_make_no_data_set_are_refused(recordings, error, reason):
+    with pytest.raises(error, match=reason):
+        nc.Dataset.of(recordings, PAPER)
 
 
 @pytest.mark.parametrize(
@@ -185,20 +169,14 @@ def test_recordings_that_cannot_be_are_refused(changes, reason):
 
 @pytest.mark.parametrize("duration", [0.1, 0.2, 0.3, 0.7])
 def test_our_profile_trains_on_failures_anywhere_in_a_frame(duration):
-    profile = nc.LogBands().at(1000.0)
-    signal = np.arange(4000.0)
-    block = Block(2.0, 2.0 + duration, "impact")
-    first = first_frames(Recording("a", signal, 1000.0, (block,)), profile)[:, 0]
+    blocks = (Block(0.5, 0.9, "ok"), Block(2.0, 2.0 + duration, "impact"))
+    one = recording(*blocks, samples=4000)
+    at_rest, *first = first_frames(one, OURS)[:, 0]
+    assert at_rest == 500  # of ok, one frame
+    first = np.array(first)
     overlap = np.minimum(first + 400, 2000 + 1000 * duration) - np.maximum(first, 2000)
     assert len(first) > 2
     assert overlap.min() >= min(1000 * duration, 200) - 1e-9
     assert first.min() == pytest.approx(2000 + min(1000 * duration, 200) - 400)
-
-
-def test_failures_are_spread_in_training_alone_and_ok_never_is():
-    profile = nc.LogBands().at(1000.0)
-    blocks = (Block(0.5, 0.9, "ok"), Block(2.0, 2.1, "impact"))
-    recording = Recording("a", np.arange(4000.0), 1000.0, blocks)
-    assert nc.Dataset.of([recording], profile).labels.tolist().count("ok") == 1
-    measured = nc.Dataset.of([recording], profile, training=False)
-    assert measured.labels.tolist() == ["ok", "impact"]
+    measured = nc.Dataset.of([one], OURS, training=False).labels.tolist()
+    assert measured == ["ok", *["impact"] * max(1, round(10 * duration - 3))]

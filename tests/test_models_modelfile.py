@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from generalmodel import relative
+from generalmodel import relative, rewrite
 
 import noiseclassifier as nc
 from noiseclassifier.estimators import Networks, Trees, calibrated
@@ -40,21 +40,6 @@ def path(tmp_path):
     """A model file in a folder of its own."""
     CLASSIFIER.save(tmp_path / "model.npz")
     return tmp_path / "model.npz"
-
-
-def rewrite(path, **changes):
-    """Write the members of a model file anew, with changes; None leaves one out."""
-    with np.load(path, allow_pickle=False) as members:
-        arrays = dict(members) | changes
-    kept = {name: array for name, array in arrays.items() if array is not None}
-    np.savez(path, allow_pickle=True, **kept)
-
-
-def rewrite_manifest(path, **changes):
-    with np.load(path, allow_pickle=False) as members:
-        manifest = json.loads(str(members["manifest"])) | changes
-    kept = {name: value for name, value in manifest.items() if value is not None}
-    rewrite(path, manifest=np.array(json.dumps(kept)))
 
 
 def refused(path, reason):
@@ -262,7 +247,7 @@ def test_wrong_arrays_are_refused(path, changes, reason):
     ],
 )
 def test_wrong_manifests_are_refused(path, changes, reason):
-    rewrite_manifest(path, **changes)
+    rewrite(path, changes)
     refused(path, reason)
 
 
@@ -305,7 +290,7 @@ def earlier(path, version=6, **profile):
         rewrite(path, missing=None)
     if version < 5:
         settings["machine"] = settings.pop("estimator")
-    rewrite_manifest(path, format=f"noise-model/{version}", profile=settings)
+    rewrite(path, {"format": f"noise-model/{version}", "profile": settings})
 
 
 @pytest.mark.parametrize("version", [4, 5, 6])

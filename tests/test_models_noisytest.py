@@ -55,20 +55,6 @@ def test_logs_are_read_in_every_common_layout(log, text):
 
 
 @IN_PLACE
-@given(
-    noise=st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=20),
-    start=st.integers(-1000, 1000),
-    gap=st.sampled_from([" ", "\t", "   "]),
-    end=st.sampled_from(["\n", "\r\n", " # remark\n", "\n\n"]),
-)
-def test_logs_give_back_what_was_written(log, noise, start, gap, end):
-    text = end.join(f"{start + i}{gap}{value!r}" for i, value in enumerate(noise))
-    time, read = nc.read_log(log(text))
-    assert time.tolist() == [start + i for i in range(len(noise))]
-    assert read.tolist() == noise
-
-
-@IN_PLACE
 @given(st.text(max_size=60))
 def test_any_text_is_read_or_refused_with_a_reason(log, text):
     with suppress(nc.FileError):
@@ -98,9 +84,19 @@ def test_what_is_wrong_with_a_log_is_named(log, text, reason):
         nc.read_log(log(text))
 
 
-def test_a_log_that_is_not_there_is_named(tmp_path):
+def test_folders_that_are_no_recordings_are_refused(log, tmp_path):
+    with pytest.raises(nc.FileError, match=r"has no .log file; name a folder"):
+        list(read_folder(tmp_path))
+    with pytest.raises(nc.FileError, match="is no folder"):
+        list(read_folder(tmp_path / "none"))
     with pytest.raises(nc.FileError, match=r"none.log: cannot be read"):
         nc.read_log(tmp_path / "none.log")
+    log(rows(20_000, rate=9_200))
+    with pytest.raises(nc.FileError, match=r"walk.toml: .* each .log needs its .toml"):
+        list(read_folder(tmp_path))
+    log(TOML, "walk.toml")
+    with pytest.raises(nc.RateError, match=r"rate of 9200 Hz; .* 10000 Hz: .*walk.log"):
+        list(read_folder(tmp_path, rate=10_000.0))
 
 
 def test_the_rate_is_that_of_the_whole_log():
@@ -143,23 +139,3 @@ def test_a_recording_joins_signal_annotations_and_hash(log):
     recording = read_recording(path, rate=10_000.0)
     assert (recording.name, recording.rate, len(recording.signal)) == ("walk", 10_000.0, 20_000)
     assert recording.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def test_a_log_without_annotations_is_refused(log, tmp_path):
-    log(rows(10))
-    with pytest.raises(nc.FileError, match=r"walk.toml: .* each .log needs its .toml"):
-        list(read_folder(tmp_path))
-
-
-def test_a_log_of_another_rate_is_refused(log, tmp_path):
-    log(TOML, "walk.toml")
-    log(rows(20_000, rate=9_200))
-    with pytest.raises(nc.RateError, match=r"rate of 9200 Hz; .* 10000 Hz: .*walk.log"):
-        list(read_folder(tmp_path, rate=10_000.0))
-
-
-def test_an_empty_folder_is_refused(tmp_path):
-    with pytest.raises(nc.FileError, match=r"has no .log file; name a folder"):
-        list(read_folder(tmp_path))
-    with pytest.raises(nc.FileError, match="is no folder"):
-        list(read_folder(tmp_path / "none"))

@@ -76,7 +76,10 @@ def test_the_test_set_is_fixed_by_names_alone():
 TRAIN = {"talos/straight-001": "aa", "run7": "bb", "standin": ""}
 
 
-def test_what_is_apart_passes():
+def test_what_is_apart_passes_and_what_is_not_is_counted():
+    names = {f"talos/curve-001-{copy}": "" for copy in range(3)} | {"other": "aa", "run8": "bb"}
+    with pytest.raises(nc.DatasetError, match=r"\(and 1 more of 5\); measure it on other runs$"):
+        check_apart(TRAIN, names)
     check_apart(TRAIN, {"talos/straight-002": "cc", "go2/straight-001": "dd", "run8": ""})
     check_apart(TRAIN, {"run7": "cc"})  # another file of that name
     assert seen(TRAIN, {"talos/straight-002": "cc"}) == {}
@@ -99,9 +102,3 @@ def test_a_run_a_group_or_a_content_on_both_sides_is_refused(test, text):
         check_apart(TRAIN, {"fresh": "ee", **test})
     assert str(caught.value).endswith("; measure it on other runs")
     assert not any(each in str(caught.value) for each in ("\n", "more of"))
-
-
-def test_the_refusal_names_the_number_of_runs():
-    names = {f"talos/curve-001-{copy}": "" for copy in range(3)} | {"other": "aa", "run8": "bb"}
-    with pytest.raises(nc.DatasetError, match=r"\(and 1 more of 5\); measure it on other runs$"):
-        check_apart(TRAIN, names)

@@ -10,6 +10,7 @@ from noisemodel.robot import listed_folders
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
 BRICK = urdf.box(1, 2, 3)
+NIL, X, Y = np.zeros(3), np.eye(3)[0], np.eye(3)[1]
 
 
 @pytest.fixture(autouse=True)
@@ -89,6 +90,11 @@ NODE_H = NODE.replace("#g", "#h")
         ("brick.obj", obj(BRICK)),
         ("brick.dae", dae(geometry(BRICK), NODE)),
         ("brick.DAE", dae(geometry(BRICK), NODE)),
+        (
+            "millimetres.dae",
+            dae(geometry(BRICK), NODE, '<unit meter="0.001"/><up_axis>Y_UP</up_axis>'),
+        ),
+        ("latin.stl", ascii_stl(BRICK).replace(b"part", b"\xe4")),
         ("two.stl", ascii_stl(BRICK[:5], "a") + ascii_stl(BRICK[5:], "b")),
         ("two.dae", dae(geometry(BRICK[:5]) + geometry(BRICK[5:], "h"), NODE + NODE_H)),
         ("two.obj", obj(BRICK).replace(b"f 7", b"o second\nusemtl paint\nf 7")),
@@ -116,32 +122,24 @@ def test_what_is_cached_belongs_to_the_content_not_to_the_name(tmp_path, cache):
     assert area(read(tmp_path, "a.obj", obj(2 * BRICK))) == 88.0
 
 
-def test_faces_of_an_obj_may_come_before_their_points_and_be_broken_into_lines(tmp_path):
-    content = b"f 1 2 \\\n 3 # comment\nv 0 0 0 1 # a weight\nv 1 0 0 .5 .5 .5\nv 0 1 0\n"
-    assert np.array_equal(read(tmp_path, "a.obj", content), TRIANGLE)
+RIGHT = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
 
-def test_faces_of_an_obj_may_count_backwards_from_their_own_line(tmp_path):
-    content = (
-        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 0\nv 2 0 0\nv 0 2 0\nf -3/1 -2/1 -1//2\n"
-    )
-    triangles = read(tmp_path, "a.obj", content)
-    assert np.array_equal(triangles, np.concatenate((TRIANGLE, 2 * TRIANGLE)))
-
-
-def test_an_obj_names_no_other_file_that_is_read(tmp_path):
-    content = b"mtllib /etc/hostname\nusemtl x\n" + obj(BRICK)
-    assert area(read(tmp_path, "a.obj", content)) == 22.0
-
-
-def test_comments_in_any_encoding_do_not_matter(tmp_path):
-    assert area(read(tmp_path, "a.obj", "# Größe\n".encode("latin-1") + obj(BRICK))) == 22.0
-    assert area(read(tmp_path, "a.stl", ascii_stl(BRICK).replace(b"part", b"\xe4"))) == 22.0
-
-
-def test_a_dae_is_taken_as_it_is_written_whatever_its_unit_and_upward_axis(tmp_path):
-    asset = '<unit meter="0.001" name="mm"/><up_axis>Y_UP</up_axis>'
-    assert np.array_equal(read(tmp_path, "a.dae", dae(geometry(BRICK), NODE, asset)), BRICK)
+@pytest.mark.parametrize(
+    ("content", "corners"),
+    [
+        # faces before their points, broken into lines
+        (b"f 1 2 \\\n 3 # a\nv 0 0 0 1 # weight\nv 1 0 0 .5 .5 .5\nv 0 1 0\n", [NIL, X, Y]),
+        # counting backwards from their own line
+        (RIGHT + b"f -3 -2 -1\nv 1 0 0\nv 0 1 0\nf -3/1 -2/1 -1//2\n", [NIL, X, Y, Y, X, Y]),
+        (b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", [NIL, X, X + Y, NIL, X + Y, Y]),
+        # what names nothing is passed over, and no other file is read
+        (b"f\n\nvn 1 0 0\n" + RIGHT + b"f 1 2 3\nf 1 2\nf 1\n#\n", [NIL, X, Y]),
+        (b"# Gr\xf6\xdfe\nmtllib /etc/hostname\nusemtl x\n" + RIGHT + b"f 1 2 3\n", [NIL, X, Y]),
+    ],
+)
+def test_faces_of_an_obj_name_points_in_many_ways(tmp_path, content, corners):
+    assert np.array_equal(read(tmp_path, "a.obj", content), np.reshape(corners, (-1, 3, 3)))
 
 
 def test_a_node_of_a_dae_may_stand_in_several_places(tmp_path):
@@ -268,12 +266,9 @@ def test_a_file_that_is_no_mesh_is_named_in_one_line(tmp_path, cache, name, cont
     assert not list(cache.glob("*"))
 
 
-def test_a_file_that_cannot_be_opened_is_named(tmp_path):
+def test_a_file_that_cannot_be_opened_is_named_and_a_flat_mesh_has_no_hull(tmp_path):
     with pytest.raises(MeshError, match=r"gone.stl: cannot be read \(No such file or directory\)"):
         meshes.read(tmp_path / "gone.stl")
-
-
-def test_a_flat_mesh_has_no_hull(tmp_path):
     (tmp_path / "flat.stl").write_bytes(stl(BRICK[:2]))
     with pytest.raises(MeshError, match="flat.stl: is flat, it has no convex hull"):
         meshes.hull(tmp_path / "flat.stl")
@@ -341,15 +336,6 @@ def test_the_limit_of_triangles_counts_points_and_instances(monkeypatch):
         monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", str(most - 1))
         with pytest.raises(ValueError, match=f"triangles or points, the limit is {most - 1}"):
             meshes.READERS[".dae"](content)
-
-
-def test_faces_of_an_obj_that_name_nothing_are_passed_over(tmp_path):
-    content = b"f\n\nvn 1 0 0\n" + obj(TRIANGLE) + b"f 1 2\nf 1\n#\n"
-    assert np.array_equal(read(tmp_path, "a.obj", content), TRIANGLE)
-    quad = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
-    (one, other) = read(tmp_path, "b.obj", quad)
-    assert np.array_equal(one, [[0, 0, 0], [1, 0, 0], [1, 1, 0]])
-    assert np.array_equal(other, [[0, 0, 0], [1, 1, 0], [0, 1, 0]])
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed"])

@@ -96,22 +96,16 @@ def handler(_):
 
 
 @pytest.mark.parametrize("address", ["localhost", "tcp://localhost", "tcp://:8786", "8786"])
-def test_an_address_has_a_protocol_a_host_and_a_port(address):
+def test_an_address_has_a_protocol_a_host_and_a_port_and_needs_the_extra(address, monkeypatch):
     pytest.importorskip("distributed")
     with pytest.raises(
         NoiseModelError, match=r"is no address of a Dask scheduler, tcp://HOST:PORT"
     ):
         list(in_order(invert, [1], jobs=address, died=dead))
-
-
-def test_without_the_extra_it_is_one_line(monkeypatch):
+    assert list(in_order(invert, [], jobs=address, died=dead)) == []  # none is asked
     monkeypatch.setattr(parallel, "find_spec", lambda name: None)
     with pytest.raises(NoiseModelError, match=r"run `pip install 'noise-inspector\[cluster\]'`$"):
-        list(in_order(invert, [1], jobs="tcp://127.0.0.1:8786", died=dead))
-
-
-def test_without_items_no_scheduler_is_asked():
-    assert list(in_order(invert, [], jobs="tcp://127.0.0.1:1", died=dead)) == []
+        list(in_order(invert, [1], jobs=address, died=dead))
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch):

@@ -58,15 +58,6 @@ def test_values_by_name_are_put_in_the_recorders_order():
         recorder.push(velocity={"a": 1.0, "b": 1.0}, velocity_desired={"a": 3.0})
 
 
-def test_missing_velocities_are_differentiated_from_positions():
-    recorder = nm.Recorder(None, 100)
-    for step in range(300):
-        recorder.push(position=[np.sin(step / 100)], position_desired=[np.sin(step / 100)])
-    run = recorder.run()
-    assert set(run.meta["differentiated"]) == {"velocity", "velocity_desired"}
-    assert np.allclose(run.velocity[:, 0], np.cos(run.time), atol=1e-4)
-
-
 @pytest.mark.parametrize(
     ("sample", "message"),
     [
@@ -112,14 +103,6 @@ def test_time_has_to_rise(now):
         recorder.push(velocity=[1.0], time=now)
 
 
-@pytest.mark.parametrize("samples", [0, 1])
-def test_too_few_samples_are_no_run(tmp_path, samples):
-    recorder = pushed(nm.Recorder(None, 100), samples)
-    with whole(f"the recorder has {samples} samples, a run needs at least 2"):
-        recorder.save(tmp_path / "run.npz")
-    assert not (tmp_path / "run.npz").exists()
-
-
 def failing(path, samples):
     with nm.Recorder(None, 100, path=path) as recorder:
         pushed(recorder, samples)
@@ -136,6 +119,13 @@ def test_a_loop_that_is_interrupted_leaves_what_it_had(tmp_path):
         pass
     with nm.Recorder(None, 100) as recorder:
         pushed(recorder, 10)
+    for samples in (0, 1):
+        with whole(f"the recorder has {samples} samples, a run needs at least 2"):
+            pushed(nm.Recorder(None, 100), samples).save(tmp_path / "c.npz")
+    with nm.Recorder(None, 100, path=tmp_path / "a.npz") as recorder:  # replaces what there was
+        pushed(recorder, 20)
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.npz"]
+    assert len(nm.Run.load(tmp_path / "a.npz").time) == 20
 
 
 def test_a_robot_names_the_joints_and_joints_are_checked():
@@ -305,17 +295,13 @@ def test_without_names_the_first_sample_names_the_joints():
     assert run.velocity.tolist() == [[1.0, 2.0]] * 2
 
 
-def test_a_loop_that_ends_replaces_what_an_earlier_one_has_saved(tmp_path):
-    for samples in (10, 20):
-        with nm.Recorder(None, 100, path=tmp_path / "a.npz") as recorder:
-            pushed(recorder, samples)
-    assert len(nm.Run.load(tmp_path / "a.npz").time) == 20
-    assert nm.Run.load(tmp_path / "a.npz").meta == {}
-
-
-def test_desired_joints_keep_their_names_where_the_others_have_none():
+def test_desired_joints_keep_their_names_and_missing_velocities_are_differentiated():
     recorder = nm.Recorder(None, 100, desired_joint_names=["b"])
-    for _ in range(2):
-        recorder.push(velocity=[1.0, 2.0], velocity_desired=[3.0])
+    for step in range(300):
+        swing = np.sin(step / 100)
+        recorder.push(position=[swing, 0.0], position_desired=[swing])
     run = recorder.run()
+    assert set(run.meta["differentiated"]) == {"velocity", "velocity_desired"}
+    assert np.allclose(run.velocity[:, 0], np.cos(run.time), atol=1e-4)
+    np.testing.assert_array_equal(run.velocity_desired[:, 0], run.velocity[:, 0])
     assert (run.joint_names, run.desired_joint_names) == (("joint1", "joint2"), ("b",))

@@ -311,28 +311,20 @@ def test_the_limits_of_a_panda_are_those_of_its_data_sheet():
 
 
 @pytest.mark.parametrize(
-    ("attributes", "lower", "upper"),
+    ("attributes", "expected"),
     [
-        ("lower='-1' upper='2' velocity='3'", -1.0, 2.0),
-        ("upper='2' velocity='3'", 0.0, 2.0),  # of the URDF's specification: 0 by default
-        ("lower='-2' velocity='3'", -2.0, 0.0),
-        ("lower='1' upper='1' velocity='3'", -inf, inf),
-        ("lower='-1' upper='2e6' velocity='3'", -inf, inf),
+        ("lower='-1' upper='2' velocity='3'", (-1.0, 2.0, 3.0)),
+        ("upper='2' velocity='3'", (0.0, 2.0, 3.0)),  # of the URDF's specification: 0 by default
+        ("lower='-2' velocity='0.5'", (-2.0, 0.0, 0.5)),
+        ("lower='1' upper='1' velocity='0'", (-inf, inf, inf)),
+        ("lower='-1' upper='2e6' velocity='-1'", (-inf, inf, inf)),
+        ("lower='-1' upper='1' velocity='1e6'", (-1.0, 1.0, inf)),
+        ("lower='-1' upper='1' velocity='fast'", (-1.0, 1.0, inf)),
     ],
 )
-def test_a_range_is_as_it_is_written_and_none_if_it_is_empty_or_without_end(
-    tmp_path, attributes, lower, upper
+def test_limits_are_as_they_are_written_and_none_if_empty_without_end_or_too_fast(
+    tmp_path, attributes, expected
 ):
-    assert limits(tmp_path, attributes) == Limits(lower, upper, 3.0, turns=True)
-
-
-@pytest.mark.parametrize(
-    ("written", "speed"), [("0.5", 0.5), ("0", inf), ("-1", inf), ("1e6", inf), ("fast", inf)]
-)
-def test_a_speed_is_as_it_is_written_and_none_if_no_joint_moves_so(tmp_path, written, speed):
-    assert limits(tmp_path, f"lower='-1' upper='1' velocity='{written}'").velocity == speed
-
-
-def test_a_joint_that_turns_for_ever_has_a_speed_and_no_range(tmp_path):
-    found = limits(tmp_path, "lower='-1' upper='1' velocity='3'", kind="continuous")
-    assert found == Limits(-inf, inf, 3.0, turns=True)
+    assert limits(tmp_path, attributes) == Limits(*expected, turns=True)
+    for_ever = limits(tmp_path, attributes, kind="continuous")
+    assert for_ever == Limits(-inf, inf, expected[2], turns=True)

@@ -65,9 +65,10 @@ def test_obstacles_lie_on_the_table_where_the_tool_comes_down():
 
 def test_of_some_obstacles_only_so_many_are_drawn_and_they_are_offset_along_the_effector():
     settings = {"height": (0.02, 0.02), "half": (0.01, 0.01), "offset": (3.0, -1.0), "most": 1}
-    (box,) = draw(faults.obstacles, **settings).boxes
-    offsets = [np.subtract(box.centre[:2], contact.place[:2]) for contact in PICKS.contacts]
-    assert any(np.allclose(offset, [0.03, -0.01]) for offset in offsets)
+    for seed in range(20):
+        (box,) = draw(faults.obstacles, seed=seed, **settings).boxes
+        offsets = [np.subtract(box.centre[:2], contact.place[:2]) for contact in PICKS.contacts]
+        assert any(np.allclose(each, [0.03, -0.01]) for each in offsets[:-1])  # never the last
 
 
 def test_ground_that_gives_way_is_as_high_as_before_until_it_does():
@@ -165,16 +166,6 @@ def test_an_overhang_takes_away_ground_under_the_last_step_on_the_platform_alone
     assert 0 < event.start < event.stop < plan.duration
     flat = draw(faults.overhang, walk(), share=(0.4, 0.4))
     assert (flat.ground, flat.events) == (None, ())
-
-
-def test_one_obstacle_is_never_under_the_last_step():
-    plan = walk()
-    last = max(contact.start for contact in plan.contacts)
-    for seed in range(20):
-        settings = {"height": (0.01, 0.02), "half": (0.1, 0.1), "most": 1}
-        (box,) = draw(faults.obstacles, plan, seed, **settings).boxes
-        (contact,) = [one for one in plan.contacts if one.approach == box.since and one.start > 0]
-        assert contact.start < last
 
 
 @pytest.mark.parametrize("robot", [GO2, SOLO12, ANYMAL], ids=lambda robot: robot.name)

@@ -1,4 +1,6 @@
-"""Quadrupeds in simulation stand, trot as planned, and have impacts on obstacles."""
+"""Gaits are timed and placed so that feet carry the body; quadrupeds trot, and hit obstacles."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -6,19 +8,167 @@ from simulated import simulated
 
 from noiseclassifier.scenarios.faults import Faults, Imperfections, no_defect
 from noiseclassifier.scenarios.labels import annotate
-from noiseclassifier.scenarios.motions import Trot
+from noiseclassifier.scenarios.motions import TICK, Trot, times
+from noiseclassifier.scenarios.quadruped import (
+    ACROSS,
+    CHANGE,
+    GAITS,
+    LANDING,
+    NEAR,
+    TOP,
+    TROT,
+    beats,
+    footholds,
+    height_of,
+    loads,
+    progress_of,
+    scene,
+    stand,
+    steer,
+    swings,
+)
 from noiseclassifier.scenarios.quadruped import plan as planned
-from noiseclassifier.scenarios.quadruped import scene, stand
 from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.simulation import SCENARIOS, Start, _trial
 from noiseclassifier.scenarios.world import reduced_model, sensors_of
+
+GO2 = WIDE["go2"]
+
+TIME = times(6000, TICK)
+
+
+@pytest.fixture
+def timing():
+    rng = np.random.default_rng(3)
+    return beats(rng, begin=0.5, end=5.5, period=0.5, jitter=0.1)
+
+
+def test_pairs_swing_in_turn_and_never_together(timing):
+    assert [beat.group for beat in timing] == [0, 1] * (len(timing) // 2)
+    for one, two in pairwise(timing):
+        assert one.touch == two.begin < two.lift < two.touch
+    assert timing[0].begin == 0.5
+    assert 5.5 - 0.55 <= timing[-1].touch <= 5.5
+
+
+def test_cycles_vary_by_the_given_share(timing):
+    cycles = np.diff([beat.begin for beat in timing[::2]])
+    assert cycles.min() >= 0.45
+    assert cycles.max() <= 0.55
+    assert np.ptp(cycles) > 0.02
+    stands = [two.lift - one.touch for one, two in zip(timing, timing[2:], strict=False)]
+    assert np.mean(stands) / cycles.mean() == pytest.approx(TROT.duty, abs=0.02)
+
+
+def test_weight_goes_from_pair_to_pair_and_does_not_jump(timing):
+    load = loads(TIME, timing)
+    assert load.min() == 0
+    np.testing.assert_array_equal(load[[0, -1]], 0.25)
+    assert np.abs(np.diff(load, axis=0)).max() < 0.02
+    np.testing.assert_array_equal(load[:, 0], load[:, TROT.groups.index(0, 1)])
+
+
+def test_a_foot_goes_up_and_comes_down_softly():
+    share = np.linspace(0, 1, 10001)
+    height = height_of(share)
+    slope = np.gradient(height, share)
+    assert height[[0, -1]] == pytest.approx([0, 0], abs=1e-12)
+    assert height.max() == pytest.approx(1, abs=1e-12)
+    assert np.argmax(height) == pytest.approx(TOP * 10000, abs=1)
+    assert slope[-1] == pytest.approx(-LANDING / (1 - TOP), rel=1e-2)
+    assert slope.min() < 10 * slope[-1]
+    assert np.abs(np.diff(slope)).max() < 0.01
+
+
+def test_a_foot_is_over_its_place_before_it_may_touch():
+    assert progress_of(np.array([0.0, ACROSS, 1.0])) == pytest.approx([0, 1, 1])
+    assert height_of(np.array([NEAR]))[0] < 0.35
+
+
+def test_feet_come_down_at_the_neutral_point(timing):
+    speed, hip = 0.4, np.array([0.2, 0.1])
+    way = np.column_stack((speed * TIME, np.zeros_like(TIME)))
+    own = [beat for beat in timing if beat.group == 0]
+    places = footholds(own, hip, way=way, yaw=np.zeros_like(TIME), stop=6.0 - TICK)
+    assert places[0] == (*hip, 0.0)
+    for (beat, following), place in zip(pairwise(own), places[1:-1], strict=True):
+        standing = following.lift - beat.touch  # Raibert: half a stance ahead of the hip
+        expected = hip[0] + speed * (beat.touch + standing / 2)
+        assert place[0] == pytest.approx(expected, abs=speed * TICK)
+        assert place[1] == hip[1]
+
+
+def test_feet_turn_with_the_body(timing):
+    yaw = 0.3 * TIME
+    own = [beat for beat in timing if beat.group == 1]
+    places = footholds(own, np.array([0.2, 0.1]), way=np.zeros((6000, 2)), yaw=yaw, stop=5.5)
+    for x, y, direction in places:
+        turned = (0.2 + 0.1j) * np.exp(1j * direction)
+        assert (x, y) == pytest.approx((turned.real, turned.imag))
+    assert places[-1][2] == pytest.approx(0.3 * 5.5)
+
+
+@pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])
+def test_the_body_goes_from_rest_to_rest_its_way(way):
+    rng = np.random.default_rng(1)
+    path, yaw = steer(TIME, way, GO2, rng, bouts=[(0.5, 5.5)])
+    velocity = np.gradient(path, TICK, axis=0)
+    speed = np.linalg.norm(velocity, axis=1)
+    ahead = velocity[:, 0] * np.cos(yaw) + velocity[:, 1] * np.sin(yaw)
+    assert not speed[TIME < 0.49].any()
+    assert speed[TIME > 5.51].max() < 1e-9
+    assert speed.max() <= GO2.speed * 1.001
+    assert np.abs(np.diff(velocity, axis=0)).max() < 2 * GO2.speed / CHANGE * 2 * TICK
+    if way == "spot":
+        assert speed.max() == 0
+    elif way == "directions":
+        assert ahead[TIME > 1].max() < 0.5 * GO2.speed
+    else:
+        assert ahead[(TIME > 1) & (TIME < 4)].min() > 0.3 * GO2.speed
+        assert (np.ptp(yaw) > 0.2) == (way == "curve")
+
+
+@pytest.mark.parametrize(
+    ("name", "together"), [("trot", {(0, 3), (1, 2)}), ("pace", {(0, 2), (1, 3)})]
+)
+def test_two_feet_swing_at_once_in_a_trot_and_a_pace(name, together):
+    assert {tuple(np.flatnonzero(now).tolist()) for now in _swing(name) if now.any()} == together
+
+
+def test_a_walk_lifts_one_foot_at_a_time_in_the_lateral_sequence():
+    swing = _swing("walk")
+    assert swing.sum(axis=1).max() == 1
+    order = [int(np.argmax(now)) for now in swing if now.any()]
+    sequence = [foot for foot, after in pairwise(order) if foot != after]
+    assert sequence[:8] == [2, 0, 3, 1] * 2  # rear left, front left, rear right, front right
+    inside = (TIME > 1.5) & (TIME < 4.5)
+    assert swing[inside].mean() == pytest.approx(1 - GAITS["walk"].duty, abs=0.02)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_the_feet_on_the_ground_share_the_weight_in_every_gait(name):
+    gait = GAITS[name]
+    timing = _timing(gait)
+    load, share = loads(TIME, timing, gait), swings(TIME, timing, gait)
+    np.testing.assert_allclose(load.sum(axis=1), 1, atol=1e-12)
+    assert not load[share < 1].any()
+
+
+def _timing(gait):
+    rng = np.random.default_rng(4)
+    return beats(rng, begin=0.5, end=5.5, period=0.7, jitter=0.1, gait=gait)
+
+
+def _swing(name):
+    gait = GAITS[name]
+    return swings(TIME, _timing(gait), gait) < 1
+
 
 QUADRUPED = {
     name: each.cases["quadruped"] for name, each in SCENARIOS.items() if "quadruped" in each.cases
 }
 
 ANYMAL = WIDE["anymal"]
-GO2 = WIDE["go2"]
 SOLO12 = WIDE["solo12"]
 
 SHORT = 3.0
