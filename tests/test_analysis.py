@@ -4,7 +4,6 @@ import hashlib
 import json
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -268,30 +267,6 @@ def test_a_desired_velocity_made_of_coarse_positions_is_left_out():
     assert without_placeholder(stepping(1e-4))[1] == ""
 
 
-def test_a_run_is_labelled_and_audited_once(tmp_path, monkeypatch):
-    import inspector.analysis as module
-
-    counts = {"audit": 0, "label_run": 0}
-
-    def counted(name):
-        function = getattr(module, name)
-
-        def count(*arguments, **options):
-            counts[name] += 1
-            return function(*arguments, **options)
-
-        return count
-
-    for name in counts:
-        monkeypatch.setattr(module, name, counted(name))
-    moving(tone=1.0).save(tmp_path / "run.npz")
-    found = module.analyse_file(tmp_path / "run.npz", LIBRARY)
-    findings.report(found)
-    html.page(found)
-    assert found.localisations
-    assert counts == {"audit": 1, "label_run": 1}
-
-
 @given(st.text(alphabet="..iIoOu", min_size=1, max_size=30))
 @settings(deadline=None, max_examples=60)
 def test_a_finding_lies_within_its_frames(text):
@@ -312,18 +287,6 @@ def test_a_run_file_is_analysed_by_its_path_and_a_shipped_model_by_its_name(tmp_
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
     assert (found.name, found.model, found.model_sha256) == ("shaken", "general", sha256)
     assert found.findings == analyse(run, library).findings
-
-
-def test_a_verdict_has_localisations_where_they_are_asked_for():
-    found, other = analysed("..III..O."), Event("impact", 8.0, 9.0, 1.0)
-    (blow, *_) = found.findings
-    found.__dict__["localisations"] = {blow: "there", other: "elsewhere"}
-    path = Path("run.npz")
-    (event,) = Verdict.of(path, found).events
-    assert event.localisation == "there"
-    calm = analysed("....")
-    assert Verdict.of(path, calm).events == ()
-    assert "localisations" not in calm.__dict__  # which takes time
 
 
 def test_a_file_is_analysed_with_its_links_unless_told():

@@ -161,7 +161,8 @@ def test_runs_that_name_a_scenario_are_of_it_in_each_folder():
     assert "run:     a/one.npz [no model]" in text(runs, verbose=True).splitlines()
 
 
-def test_text_ends_with_the_counts_of_several_runs():
+def test_text_ends_with_the_counts_of_several_runs_and_says_what_is_ignored():
+    assert "1 of the bad input ignored" in text([replace(BROKEN, ignored=True), QUIET])
     assert text(ALL).splitlines()[-1] == (
         "7 runs: 1 internal error, 1 bad input, 2 with findings, 1 cannot tell, 2 ok;"
         " findings: 2 failing, 1 missing, 1 allowed, 1 waived"
@@ -270,7 +271,6 @@ def test_ignored_bad_input_is_skipped_and_a_warning():
     skipped = ET.fromstring(junit([ignored])).find(".//skipped")
     assert skipped.get("message") == "not a run file: 100%\nbad"
     assert github([ignored]).startswith("::warning file=broken")
-    assert "1 of the bad input ignored" in text([ignored, QUIET])
 
 
 def test_names_and_texts_are_kept_apart_and_escaped():

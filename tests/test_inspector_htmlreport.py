@@ -8,7 +8,6 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from commandline import call
 
 from inspector.analysis import analyse_file
 from inspector.errors import InspectorError
@@ -145,11 +144,3 @@ def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("inspector.report.picture.find_spec", lambda _: None)
     with pytest.raises(InspectorError, match=r'pip install "noise-inspector\[report\]"'):
         html.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
-
-
-def test_the_command_line_writes_a_page(tmp_path):
-    short_run().save(tmp_path / "run.npz")
-    status, out, _ = call("view", tmp_path / "run.npz", "-o", tmp_path / "out.html")
-    assert status == 0
-    assert f"{tmp_path}/out.html: " in out
-    assert "rate: 1000 Hz" in Page((tmp_path / "out.html").read_text()).words

@@ -85,14 +85,6 @@ def test_a_reversed_run_ends_when_it_began_to_fail():
     assert end == pytest.approx(5.0 - 2.3, abs=0.02)
 
 
-def test_a_scalar_noise_is_a_run_of_one_joint():
-    run = tone(10_000.0)
-    noise = np.sqrt(np.square(run.velocity).sum(axis=1))
-    onset, end = extent(run_of(run.time, noise[:, None]), START, STOP)
-    assert onset == pytest.approx(ON, abs=0.02)
-    assert end == pytest.approx(OFF, abs=0.02)
-
-
 def test_a_base_that_shakes_alone_is_found():
     time, velocity = moving(1000.0)
     base = np.zeros((len(time), 6))

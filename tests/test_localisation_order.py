@@ -161,16 +161,13 @@ FOUND = Verdict(
 )
 
 
-def test_text_junit_and_github_say_with_which_joint_a_finding_goes():
+def test_every_format_says_with_which_joint_a_finding_goes():
     line = f"oscillations from 0.30 s to 1.50 s, {PHRASE}"
     first, second, _ = text([FOUND]).splitlines()[1:]
     assert first == f"    0.30 -   1.50 s   oscillations   {PHRASE}"
     assert second == "    2.00 -   2.10 s   impact"
     assert line in FORMATS["junit"]([FOUND])
     assert line in FORMATS["github"]([FOUND])
-
-
-def test_json_has_the_order_or_null():
     (run,) = json.loads(as_json([FOUND]))["runs"]
     assert run["events"][0]["order"] == {"joint": "knee", "periods_per_turn": 160.0}
     assert run["events"][1]["order"] is None

@@ -482,13 +482,6 @@ def test_a_store_inside_the_runs_is_no_log(own):
     assert inspector.Reference.load(own / "runs" / "reference").named("pick").robot == ""
 
 
-@pytest.mark.parametrize("name", ["adapt", "baseline", "expect"])
-def test_commands_that_accept_replaces_say_so(name):
-    status, _, err = call(name, "a.npz", "--output", "b.npz")
-    assert status == 2
-    assert "is now `inspector accept`" in err
-
-
 # --- levels and margins
 
 
