@@ -17,20 +17,21 @@ from inspector.reference.store import Reference
 from noisemodel import Run
 
 
+def streamed(run):
+    """A run as rows."""
+    names = [f"{name}.velocity" for name in run.joint_names]
+    names += [f"{name}_desired" for name in names]
+    text = io.StringIO()
+    columns = np.hstack([run.time[:, None], run.velocity, run.velocity_desired])
+    np.savetxt(text, columns, "%.8g", ",", header=",".join(["time", *names]), comments="")
+    return text.getvalue()
+
+
 @pytest.fixture(scope="module")
 def rows():
     """The demo run, which has an impact at 1.78 s, as CSV."""
     run = Run.load(demo_run())
-    names = [f"{name}.velocity" for name in run.joint_names]
-    columns = [run.time[:, None], run.velocity]
-    if run.velocity_desired is not None:
-        names += [f"{name}_desired" for name in names]
-        columns.append(run.velocity_desired)
-    text = io.StringIO()
-    np.savetxt(
-        text, np.hstack(columns), "%.8g", ",", header=",".join(["time", *names]), comments=""
-    )
-    return text.getvalue(), run.rate
+    return streamed(run), run.rate
 
 
 @pytest.fixture
@@ -100,16 +101,6 @@ def accepted(simulate, tmp_path_factory):
     simulate.write(folder / "runs")
     assert call("accept", folder / "runs", "--reason", "first release")[0] == 0
     return folder / "reference"
-
-
-def streamed(run):
-    """A run as rows."""
-    names = [f"{name}.velocity" for name in run.joint_names]
-    names += [f"{name}_desired" for name in names]
-    text = io.StringIO()
-    columns = np.hstack([run.time[:, None], run.velocity, run.velocity_desired])
-    np.savetxt(text, columns, "%.8g", ",", header=",".join(["time", *names]), comments="")
-    return text.getvalue()
 
 
 def test_a_stream_louder_than_its_reference_ends_with_1_and_names_joint_and_decibels(

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 import rerun as rr
-from generalmodel import fixed
+from generalmodel import fixed, run_at, trained
 
 import noisemodel as nm
 from inspector.levels import SPECTRUM
+from inspector.library import label_run
 from inspector.live.drawing import LiveRobot, Messages, SpectrogramStream
 from inspector.live.labels import Labeller, noise_signal
 from inspector.live.samples import Clock, Warnings
@@ -140,6 +141,32 @@ def test_rates_that_no_model_fits_have_no_labels_and_a_remark(rate, remark):
     labeller.skip(100)
     assert labeller.classes == ()
     assert labeller.elapsed == 1000 / rate
+
+
+def streamed(run):
+    """A labeller, and its labels of a run that comes in chunks."""
+    labeller = Labeller({"general": trained()}, run.rate, {"velocity": 3, "velocity_desired": 3})
+    motion = np.hstack((run.velocity, run.velocity_desired))
+    ones = np.ones(len(motion), dtype=bool)
+    parts = [labeller.push(motion[i : i + 37], ones[i : i + 37]) for i in range(0, len(motion), 37)]
+    fields = ("start", "label", "scores")
+    return labeller, {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in fields
+    }
+
+
+@pytest.mark.parametrize("rate", [80.0, 125.0, 333.0, 1000.0, 2500.0])
+def test_live_motion_of_any_rate_is_labelled_as_it_comes(rate):
+    run = run_at(rate, "oscillations")
+    labeller, found = streamed(run)
+    assert (labeller.model, labeller.remark) == ("general", "")
+    whole = label_run(run, {"general": trained()}).labels
+    count = len(found["start"])
+    assert len(whole) - count in (0, 1)  # the last frame comes with the end of the run
+    for name, each in found.items():
+        np.testing.assert_allclose(
+            each, getattr(whole, name)[:count]
+        ) if name != "label" else np.testing.assert_array_equal(each, whole.label[:count])
 
 
 # The spectrogram.

@@ -305,26 +305,3 @@ def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(tmp_path):
     assert "/class/after/annotated/oscillations" in entities(tmp_path / "ab.rrd")
     status, out, _ = inspector("view", *runs, *save, "--align", "start", "--overwrite")
     assert (status, "aligned from the start, as requested" in out) == (0, True)
-
-
-@pytest.mark.slow
-def test_the_viewer_draws_a_comparison_and_reports_no_error(whole):
-    picture = pytest.importorskip("picture")
-    if not picture.DRIVERS:
-        pytest.skip(picture.MISSING)
-    path, _ = whole
-    with picture.headless_viewer() as client:
-        png = picture.picture(client, path, 0.7)
-        state = picture.final_state(client)
-        errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
-    assert png.startswith(b"\x89PNG")
-    shown = {view.name for view in state.views}
-    assert {
-        "Before → after",
-        "Robot before",
-        "Robot after",
-        "Level",
-        "Change",
-    } <= shown
-    assert not [report for view in state.views for report in view.reports]
-    assert not errors

@@ -377,7 +377,6 @@ class Drawing:
         self._classes = (
             Panel("class", panels.ROW * len(self._rows) + axes.AXIS) if classes else None
         )
-        self._lane_end = -np.inf  # until when the class of the latest frame is drawn, in [ns]
         self._told: str | None = None  # findings of the verdict that is drawn
         self._begun = False
         self._camera: Camera | None = None
@@ -476,19 +475,13 @@ class Drawing:
         """
         centres = (labels.start + labels.stop) / 2
         self._messages.add(SCORES, nanoseconds(centres), labels.scores, urgent=True)
-        points, shown = list[int](), list[list[bool]]()
-        begins = nanoseconds(centres - self._hop / 2).tolist()
-        for begin, label in zip(begins, labels.raw.tolist(), strict=True):
-            if begin - self._lane_end > 5e8 * self._hop:  # the band before ends where it does
-                points.append(begin - 1)
-                shown.append([False] * len(self._rows))
-            else:
-                begin = int(self._lane_end)
-            self._lane_end = begin + round(1e9 * self._hop)
-            points += [begin, int(self._lane_end) - 1]
-            shown += 2 * [[label == name for name in self._rows]]
-        times = np.array(points, dtype=np.int64)
-        self._messages.add("/class/found", times, np.array(shown), _found, urgent=True)
+        begins, ends = (nanoseconds(centres + sign * self._hop / 2) for sign in (-1, 1))
+        # A value that is none before each: where frames are missing, nothing is drawn.
+        times = np.stack((begins - 1, begins, ends - 3), axis=1)
+        shown = labels.raw[:, None] == np.array(self._rows)
+        states = np.stack((np.zeros_like(shown), shown, shown), axis=1)
+        points = states.reshape(-1, len(self._rows))
+        self._messages.add("/class/found", times.ravel(), points, _found, urgent=True)
 
     def findings(self, time: float, found: Sequence[Event]) -> None:
         """Show the verdict on the stream so far, where it changes."""

@@ -62,26 +62,21 @@ class SampleBuffer:
 
     def put(self, rows: Mapping[str, Array], time: Array) -> None:
         """Take samples; missing signals, or of other widths, are unknown."""
-        piece, since, count = {"time": time}, f"from {time[0]:.3f} s on", len(time)
-        for name, width in self._widths.items():
-            given = rows.get(name)
-            if given is not None and given.shape[1] == width:
-                piece[name] = given
-                continue
-            piece[name] = np.full((count, width), np.nan)
-            kind, line = f"samples without {name}", f"no {name} {since}: it was there at first"
-            if given is not None:
-                kind = f"samples with another width of {name}"
+        widths = {name: values.shape[1] for name, values in rows.items()}
+        for name in sorted(widths.keys() | self._widths.keys()):
+            now, first = widths.get(name, 0), self._widths.get(name, 0)
+            if now != first:
                 line = (
-                    f"{name} of {given.shape[1]} columns {since}, where it had {width}: not shown,"
-                    " and not labelled where it makes noise"
+                    f"{name} has {now} columns from {time[0]:.3f} s on, and had {first} at first:"
+                    " not shown, and not labelled where it makes noise"
                 )
-            self._warnings.note(kind, line, count)
-        for name in (name for name in rows if name not in self._widths):
-            line = f"{name} {since} was not there at first: not shown"
-            self._warnings.note(f"samples with a new {name}", line, count)
+                self._warnings.note(f"samples with another width of {name}", line, len(time))
+        piece = {"time": time}
+        for name, width in self._widths.items():
+            known = widths.get(name) == width
+            piece[name] = rows[name] if known else np.full((len(time), width), np.nan)
         self._pieces.append(piece)
-        self.held += count
+        self.held += len(time)
 
     def take(self, kept: Mask) -> dict[str, Array]:
         """Take out the signals of the samples that are kept; those after them wait."""
