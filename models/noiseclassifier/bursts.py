@@ -12,14 +12,14 @@ enough of it.
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from noiseclassifier.labels import Event
 from noiseclassifier.lasting import AROUND, MEASURED, STRONG, Windows, loud, merged, spectrum
-from noiseclassifier.signals import Array
+from noiseclassifier.signals import Array, Index
 
 WINDOW, HOP = 0.5, 0.125  # duration of a window, and time from one to the next, in [s]
 # Time by which a burst begins after its window, and ends before it, in [s]: those of windows that
@@ -42,16 +42,16 @@ PURE = 0.7  # least share of a line in its octave
 ABOVE = 20.0
 
 
-@dataclass
-class Line:
-    """A line that is prominent in a window."""
+@dataclass(frozen=True)
+class Lines:
+    """The lines that are prominent in a window; arrays have shape (lines,)."""
 
-    row: int  # the joint
-    places: slice  # its frequencies
-    power: float  # its mean square
-    near: float  # sum of these over the windows nearby, and its own
+    row: Index  # the joint
+    place: Index  # the middle one of the frequencies
+    power: Array  # the mean square
+    near: Array  # sum of these over the windows nearby, and the own one
     windows: int  # how many these are
-    first: int  # number of its first sample
+    first: int  # number of the first sample
 
 
 class Bursts(Windows):
@@ -70,8 +70,10 @@ class Bursts(Windows):
         self._whole = whole
         self._sum: Array = np.zeros(())  # of the spectra of all windows
         self._windows = 0
-        self._recent: deque[Array] = deque(maxlen=NEAR)
-        self._lines: list[Line] = []
+        # The same before each of the latest windows, those that are nearby.
+        self._recent: deque[Array] = deque(maxlen=NEAR + 1)
+        self._open: deque[Lines] = deque()  # windows that are nearby may still come
+        self._lines: list[Lines] = []
         self._events: list[Event] = []
 
     @property
@@ -79,76 +81,85 @@ class Bursts(Windows):
         """Findings so far, in order of time."""
         if not self._whole:
             return tuple(self._events)
-        found = (self._event(line, REST) for line in self._lines)
+        lines = [*self._lines, *map(self._closed, self._open)]
+        found = (self._event(each, REST) for each in lines)
         return merged(*(event for event in found if event is not None))
 
-    def _found(self, slopes: Array) -> Iterable[tuple[Array, list[tuple[int, slice]]]]:
+    def _found(self, slopes: Array) -> Iterable[tuple[Array, Index, Index]]:
         power, frequency = spectrum(slopes[0], self.rate)
-        return zip(power.swapaxes(0, 1), prominent(power, frequency, self.rate), strict=True)
+        row, window, place = prominent(power, frequency, self.rate)
+        for number in range(power.shape[1]):
+            own = window == number
+            yield power[:, number], row[own], place[own]
 
-    def _follow(self, found: tuple[Array, list[tuple[int, slice]]]) -> None:
-        power, lines = found
-        self._sum = self._sum + power
+    def _follow(self, found: tuple[Array, Index, Index]) -> None:
+        power, row, place = found
+        while self._open and self._first - self._open[0].first > NEAR * self._hop:
+            self._lines.append(self._closed(self._open.popleft()))
+        self._recent.append(self._sum if self._windows else np.zeros_like(power))
+        self._sum = self._recent[-1] + power
         self._windows += 1
-        for line in reversed(self._lines if self._whole else []):
-            if self._first - line.first > NEAR * self._hop:
-                break
-            line.near += float(power[line.row, line.places].sum())
-            line.windows += 1
-        for row, places in lines:
-            own = float(power[row, places].sum())
-            near = own + sum(float(each[row, places].sum()) for each in self._recent)
-            line = Line(row, places, own, near, len(self._recent) + 1, self._first)
-            if self._whole:
-                self._lines.append(line)
-            elif event := self._event(line, PAST):
-                self._events = [*merged(*self._events, event)]
-        self._recent.append(power)
+        if not len(row):
+            return
+        # Of the windows nearby, what is before them is subtracted until they have come.
+        own, before = summed(power, row, place), summed(self._recent[0], row, place)
+        lines = Lines(row, place, own, -before, len(self._recent) - self._windows, self._first)
+        if self._whole:
+            self._open.append(lines)
+        elif event := self._event(self._closed(lines), PAST):
+            self._events = [*merged(*self._events, event)]
+
+    def _closed(self, lines: Lines) -> Lines:
+        """Lines of which the latest window is the last one nearby."""
+        near = lines.near + summed(self._sum, lines.row, lines.place)
+        return replace(lines, near=near, windows=lines.windows + self._windows)
 
     def _end(self, rest: Array) -> None:
         """Nothing ends: windows before a gap may have the same line as those after it."""
 
-    def _event(self, line: Line, least: int) -> Event | None:
-        """The finding that a line is, if there is enough of the rest of the run and it has less."""
-        windows = self._windows - line.windows
+    def _event(self, lines: Lines, least: int) -> Event | None:
+        """The finding that lines are, if there is enough of the rest of the run and it has less."""
+        windows = self._windows - lines.windows
         if windows < least:
             return None
-        rest = (float(self._sum[line.row, line.places].sum()) - line.near) / windows
-        if line.power < 10.0 ** (ABOVE / 10.0) * rest:
+        rest = (summed(self._sum, lines.row, lines.place) - lines.near) / windows
+        if not (lines.power >= 10.0 ** (ABOVE / 10.0) * rest).any():
             return None
-        first = self.start + line.first / self.rate
+        first = self.start + lines.first / self.rate
         return Event("oscillations", first + MARGIN, first + WINDOW - MARGIN, SCORE)
 
 
-def prominent(power: Array, frequency: Array, rate: float) -> list[list[tuple[int, slice]]]:
-    """Joint and frequencies of each prominent line of each window.
+def summed(power: Array, row: Index, place: Index) -> Array:
+    """Sum over the frequencies of each line, of powers of shape (joints, frequencies)."""
+    own = place[:, None] + np.arange(-(WIDTH // 2), WIDTH // 2 + 1)
+    there = own < power.shape[1]
+    found: Array = (there * power[row[:, None], np.where(there, own, 0)]).sum(axis=1)
+    return found
+
+
+def prominent(power: Array, frequency: Array, rate: float) -> tuple[Index, Index, Index]:
+    """Joint, window and place of each prominent line.
 
     The power is the mean square at each frequency, shape (joints, windows, frequencies).
     """
     row, window, place = loud(power, frequency, LEVEL, LOWEST, rate)
-    found: list[list[tuple[int, slice]]] = [[] for _ in range(power.shape[1])]
+    pairs, pair = np.unique(row * power.shape[1] + window, return_inverse=True)
+    power = power[*np.divmod(pairs, power.shape[1])]  # most often few
     first, stop = place - WIDTH // 2, np.minimum(place + WIDTH // 2 + 1, len(frequency))
     low, high = around(frequency, place, np.sqrt(2.0))
     low, high = np.minimum(low, first), np.maximum(high, stop)
-    summed = power.cumsum(axis=2)
-    own = summed[row, window, stop - 1] - summed[row, window, first - 1]
-    whole = summed[row, window, high - 1] - summed[row, window, low - 1]
+    sums = power.cumsum(axis=1)
+    own = sums[pair, stop - 1] - sums[pair, first - 1]
+    whole = sums[pair, high - 1] - sums[pair, low - 1]
     pure = own >= PURE * whole
-    row, window, place = row[pure], window[pure], place[pure]
-    kept = np.empty(len(place), dtype=bool)
-    for each in np.unique(place).tolist():
-        same = np.flatnonzero(place == each)
-        low, high = around(frequency, each, AROUND)
-        middle = (high - low) // 2
-        beside = np.partition(power[row[same], window[same], low:high], middle, axis=1)
-        own = power[row[same], window[same], each]
-        kept[same] = own >= 10.0 ** (PROMINENT / 10.0) * beside[:, middle]
-    for k in np.flatnonzero(kept).tolist():
-        line = slice(
-            int(place[k]) - WIDTH // 2, min(int(place[k]) + WIDTH // 2 + 1, len(frequency))
-        )
-        found[window[k]].append((int(row[k]), line))
-    return found
+    row, window, place, pair = row[pure], window[pure], place[pure], pair[pure]
+    # It is far enough above the median of those beside if it is above more than half of them.
+    low, high = around(frequency, place, AROUND)
+    number = np.arange(len(frequency))
+    beside = (number >= low[:, None]) & (number < high[:, None])
+    far = 10.0 ** (PROMINENT / 10.0) * power[pair] <= power[pair, place][:, None]
+    kept = (far & beside).sum(axis=1) > (high - low) // 2
+    return row[kept], window[kept], place[kept]
 
 
 def around(frequency: Array, places: Any, ratio: float) -> Any:
