@@ -119,7 +119,9 @@ def in_both(run: Run) -> tuple[list[int], list[int]]:
 
 
 def _rows(signal: Real, columns: list[int]) -> Array:
-    return signal[:, columns].T.astype(np.float64, copy=False)
+    every = columns == list(range(signal.shape[1]))  # no copy more
+    rows = np.asarray(signal)[:, slice(None) if every else columns].T
+    return np.ascontiguousarray(rows, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -524,7 +524,7 @@ class FrameFeatures:
         if self.count < self._frame + length:
             self._held.append((samples.copy(), valid.copy()))
             return self._nothing
-        self._held.append((samples.copy(), valid.copy()))
+        self._held.append((samples, valid))
         frames = np.arange(self._frame, self.count - length + 1, hop)
         self._frame += len(frames) * hop
         samples, valid = self._all_held()

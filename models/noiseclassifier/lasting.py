@@ -46,10 +46,12 @@ STRONG = 18.0  # strength of a line in each of ``WINDOWS`` windows that makes it
 WINDOWS = 3  # windows in a row; in a stretch that has fewer, all of them
 SHARP = 25.0  # strength in one window that makes a finding of a strong line of any length, in [dB]
 DRIFT = 2.0  # how far a line moves from one window to the next, in [Hz]
+# Level by which a line may be lower in each half of a window than in the window, in [dB].
+HALVES = 10.0
 TINY = 1e-30  # mean square of silence, in [rad²/s²]
 MEASURED, ERROR = JOINTS[1], JOINTS[2]
 # How many samples are transformed at once, of all joints: more leave the cache of the processor.
-AT_ONCE = 2**17
+AT_ONCE = 2**15
 Peak: TypeAlias = tuple[int, float, float]  # joint, frequency in [Hz] and strength in [dB]
 
 
@@ -78,6 +80,7 @@ class Windows(ABC):
     """
 
     SIGNALS: ClassVar[tuple[str, ...]] = (MEASURED, ERROR)  # that are taken
+    LEAST: ClassVar[int] = 1  # windows that are taken at once
 
     def __init__(self, rate: float, window: float, hop: float, start: float) -> None:
         self.rate, self.start = rate, start
@@ -116,15 +119,16 @@ class Windows(ABC):
         self._samples = self._samples[..., :0]
 
     def _take(self, fresh: Array) -> None:
-        held = self._samples if len(self._samples) == len(fresh) else fresh[..., :0]
-        self._samples = np.concatenate((held, fresh), axis=2)
+        if len(self._samples) == len(fresh) and self._samples.shape[2]:
+            fresh = np.concatenate((self._samples, fresh), axis=2)
+        self._samples = fresh
         windows = max(0, 1 + (self._samples.shape[2] - self._length) // self._hop)
         if not windows:
             return
         # Of the differences: slow motion, which is far louder, would leak into all frequencies.
         slopes = np.diff(self._samples[..., : (windows - 1) * self._hop + self._length], axis=2)
         cut = sliding_window_view(slopes, self._length - 1, axis=2)[:, :, :: self._hop]
-        at_once = max(1, AT_ONCE // (slopes.shape[1] * self._length))
+        at_once = max(self.LEAST, AT_ONCE // (slopes.shape[1] * self._length))
         for first in range(0, windows, at_once):
             for found in self._found(cut[:, :, first : first + at_once]):
                 self._follow(found)
@@ -147,6 +151,8 @@ class Windows(ABC):
 class Lasting(Windows):
     """Finds lines that last in signals that come in chunks of any size."""
 
+    LEAST = 8  # of which halves are shared
+
     def __init__(self, rate: float, *, start: float = 0.0) -> None:
         super().__init__(rate, WINDOW, HOP, start)
         self._margin = round(MARGIN * rate)
@@ -167,12 +173,34 @@ class Lasting(Windows):
         return self.start + min([self._first, *firsts]) / self.rate
 
     def _found(self, slopes: Array) -> Iterable[list[Peak]]:
-        return strong(slopes, self.rate)
+        return strong(slopes, self.rate, self._heard(slopes[0]))
+
+    def _heard(self, slopes: Array) -> Mask:
+        """Joints and windows that may have a strong line, (joints, windows): a half is loud.
+
+        Few are. Each window shares its second half with the third window from it.
+        """
+        _, windows, samples = slopes.shape
+        length = samples - 2 * self._hop
+        at_once = max(1, AT_ONCE // ((windows + 2) * length))
+        loudest = np.empty((len(slopes), windows + 2))
+        for first in range(0, len(slopes), at_once):
+            some = slopes[first : first + at_once]
+            halves = np.zeros((len(some), windows + 2, length + 1))  # one more is transformed fast
+            halves[:, :windows, 1:] = some[..., :length]
+            halves[:, windows, 1:] = some[:, -1, self._hop : self._hop + length]
+            halves[:, windows + 1, 1:] = some[:, -1, 2 * self._hop :]
+            power, frequency = spectrum(halves, self.rate)
+            least = max(1, int(np.searchsorted(frequency, LOWEST)) - 1)
+            loudest[first : first + at_once] = power[..., least:].max(axis=2, initial=0.0)
+        loudest = np.maximum(np.maximum(loudest[:, :-2], loudest[:, 1:-1]), loudest[:, 2:])
+        return np.asarray(loudest >= 10.0 ** ((STRONG + FLOOR - HALVES) / 10.0))
 
     def _end(self, rest: Array) -> None:
         length = rest.shape[2]
         if not self._windows and length >= SHORTEST * self.rate:
-            (peaks,) = strong(np.diff(rest)[:, :, None], self.rate)
+            slopes = np.diff(rest)[:, :, None]
+            (peaks,) = strong(slopes, self.rate, np.ones(slopes.shape[1:3], dtype=bool))
             self._follow(peaks, length)
         for line in self._lines:
             if line.found or line.windows == self._windows < WINDOWS:
@@ -214,20 +242,22 @@ class Lasting(Windows):
         self._events = [*merged(*self._events, Event("oscillations", *times, score))]
 
 
-def strong(slopes: Array, rate: float) -> list[list[Peak]]:
+def strong(slopes: Array, rate: float, heard: Mask) -> list[list[Peak]]:
     """The strong lines of each window.
 
     It takes differences of measured velocities, and of tracking errors if there are any, in
-    [rad/s], of shape (1 or 2, joints, windows, samples).
+    [rad/s], of shape (1 or 2, joints, windows, samples), and which joints and windows may have any.
     """
-    line, frequency = spectrum(slopes[0], rate)
-    row, window, place = loud(line, frequency, STRONG + FLOOR, LOWEST, rate)
-    found: list[list[Peak]] = [[] for _ in range(line.shape[1])]
+    found: list[list[Peak]] = [[] for _ in range(slopes.shape[2])]
+    rows, windows = np.nonzero(heard)
+    line, frequency = spectrum(slopes[0, rows, windows], rate)
+    pair, place = loud(line, frequency, STRONG + FLOOR, LOWEST, rate)
     if not len(place):
         return found
-    pairs, pair = np.unique([row, window], axis=1, return_inverse=True)  # most often few, or none
-    errors = spectrum(slopes[1:, *pairs], rate)[0]
-    power = np.concatenate((line[None, *pairs], errors))
+    pairs, pair = np.unique(pair, return_inverse=True)
+    rows, windows = rows[pairs], windows[pairs]
+    errors = spectrum(slopes[1:, rows, windows], rate)[0]
+    power = np.concatenate((line[None, pairs], errors))
     median = np.empty((len(power), len(place)))
     band = np.floor(np.log(frequency[place] / LOWEST) / np.log(BAND))
     for each in np.unique(band).tolist():
@@ -243,24 +273,25 @@ def strong(slopes: Array, rate: float) -> list[list[Peak]]:
     prominence = level - 10.0 * np.log10(np.maximum(median, TINY))
     strength = np.minimum(prominence, level - FLOOR).max(axis=0)
     for k in np.flatnonzero(strength >= STRONG).tolist():
-        found[window[k]].append((int(row[k]), float(frequency[place[k]]), float(strength[k])))
+        own = int(rows[pair[k]]), float(frequency[place[k]]), float(strength[k])
+        found[windows[pair[k]]].append(own)
     return found
 
 
 def loud(
     power: Array, frequency: Array, level: float, lowest: float, rate: float
-) -> tuple[Index, Index, Index]:
-    """Joint, window and place of each line of a level in [dB] or more, from a frequency on.
+) -> tuple[Index, ...]:
+    """Where a line has a level in [dB] or more, from a frequency on: the indices of each axis.
 
-    The power is the mean square at each frequency, shape (joints, windows, frequencies).
+    The power is the mean square at each frequency, shape (..., frequencies).
     """
     first = max(1, int(np.searchsorted(frequency, lowest)))
     stop = min(len(frequency) - 1, int(np.searchsorted(frequency, HIGHEST * rate, "right")))
-    joint, window, place = np.nonzero(power[..., first:stop] >= 10.0 ** (level / 10.0))
+    *spectra, place = np.nonzero(power[..., first:stop] >= 10.0 ** (level / 10.0))
     place += first
-    own = power[joint, window, place]
-    top = (own >= power[joint, window, place - 1]) & (own >= power[joint, window, place + 1])
-    return joint[top], window[top], place[top]
+    own = power[*spectra, place]
+    top = (own >= power[*spectra, place - 1]) & (own >= power[*spectra, place + 1])
+    return tuple(each[top] for each in (*spectra, place))
 
 
 def spectrum(slopes: Array, rate: float) -> tuple[Array, Array]:
