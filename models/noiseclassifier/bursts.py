@@ -142,9 +142,11 @@ def prominent(power: Array, frequency: Array, rate: float) -> tuple[Index, Index
 
     The power is the mean square at each frequency, shape (joints, windows, frequencies).
     """
-    row, window, place = loud(power, frequency, LEVEL, LOWEST, rate)
-    pairs, pair = np.unique(row * power.shape[1] + window, return_inverse=True)
-    power = power[*np.divmod(pairs, power.shape[1])]  # most often few
+    lowest = int(np.searchsorted(frequency, LOWEST))
+    loudest = power[..., lowest:].max(axis=2, initial=0.0)
+    rows, windows = np.nonzero(loudest >= 10.0 ** (LEVEL / 10.0))  # most often few
+    power = power[rows, windows]
+    pair, place = loud(power, frequency, LEVEL, LOWEST, rate)
     first, stop = place - WIDTH // 2, np.minimum(place + WIDTH // 2 + 1, len(frequency))
     low, high = around(frequency, place, np.sqrt(2.0))
     low, high = np.minimum(low, first), np.maximum(high, stop)
@@ -152,14 +154,14 @@ def prominent(power: Array, frequency: Array, rate: float) -> tuple[Index, Index
     own = sums[pair, stop - 1] - sums[pair, first - 1]
     whole = sums[pair, high - 1] - sums[pair, low - 1]
     pure = own >= PURE * whole
-    row, window, place, pair = row[pure], window[pure], place[pure], pair[pure]
+    pair, place = pair[pure], place[pure]
     # It is far enough above the median of those beside if it is above more than half of them.
     low, high = around(frequency, place, AROUND)
     number = np.arange(len(frequency))
     beside = (number >= low[:, None]) & (number < high[:, None])
     far = 10.0 ** (PROMINENT / 10.0) * power[pair] <= power[pair, place][:, None]
     kept = (far & beside).sum(axis=1) > (high - low) // 2
-    return row[kept], window[kept], place[kept]
+    return rows[pair[kept]], windows[pair[kept]], place[kept]
 
 
 def around(frequency: Array, places: Any, ratio: float) -> Any:

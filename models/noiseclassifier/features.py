@@ -24,7 +24,7 @@ from noiseclassifier.signals import Array, Index, Mask, Real, Signals, by_joint,
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 # How many samples are transformed at once, of all rows: more leave the cache of the processor.
-AT_ONCE = 2**16
+AT_ONCE = 2**17
 CHUNK = 64  # frames that are evaluated at once, which bounds the memory that they take
 # Frames' lengths of samples that are taken at once, which bounds the memory that they take.
 LENGTHS = 8
@@ -139,12 +139,18 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
     not depend on the windows beside, bit for bit.
     """
     spectrum = _transform(windows)
+    signals = len(profile.signals) - profile.norms
     if profile.bands == "log":
-        squares = np.square(spectrum.real)
-        squares += np.square(spectrum.imag)
+        pairs = spectrum.view(np.float64)  # real and imaginary parts in turn
+        pairs *= pairs
+        squares = pairs[..., ::2] + pairs[..., 1::2]
         # A product for each row: the rounding of one for all depends on how many they are.
         rows = np.moveaxis(squares, 0, -2)[..., None, :]
-        amplitude = np.sqrt((rows @ _power_shares(profile.rate, resolution))[..., 0, :])
+        amplitude = (rows @ _power_shares(profile.rate, resolution))[..., 0, :]
+        if signals and not profile.relative:  # the loudest joint has the largest logarithm
+            norms, joints = amplitude[..., : profile.norms, :], amplitude[..., profile.norms :, :]
+            amplitude = np.concatenate((norms, _loudest(joints, signals)), axis=-2)
+        np.sqrt(amplitude, out=amplitude)
     else:
         amplitude = np.moveaxis(compress(np.abs(spectrum), comb=profile.bands == "comb"), 0, -2)
     amplitude += profile.floor
@@ -153,17 +159,22 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
     parts = [norms]
     if profile.differences:
         parts.append(norms[..., 1:, :] - norms[..., :-1, :])
-    if joints.size:
-        *leading, rows, bands = joints.shape
-        signals = len(profile.signals) - profile.norms
-        joints = joints.reshape(*leading, signals, rows // signals, bands)
-        loudest = np.maximum.reduce(joints, -2)
+    if signals:
+        loudest = _loudest(joints, signals)
         moving = loudest[..., : profile.moving, :]
         parts += [loudest, moving[..., 1:, :] - moving[..., :-1, :]]
         if profile.relative:
             # The order in which `add.reduce` sums up depends on the shape; this one does not.
-            parts.append(loudest - np.add.reduceat(joints, [0], -2)[..., 0, :] / joints.shape[-2])
+            each = joints.reshape(*loudest.shape[:-1], -1, loudest.shape[-1])
+            parts.append(loudest - np.add.reduceat(each, [0], -2)[..., 0, :] / each.shape[-2])
     return np.concatenate(parts, axis=-2).reshape(*found.shape[:-2], -1)
+
+
+def _loudest(joints: Array, signals: int) -> Array:
+    """The loudest joint of each of some signals, of rows of shape (..., signals x joints, n)."""
+    *leading, rows, bands = joints.shape
+    each = joints.reshape(*leading, signals, rows // signals, bands)
+    return np.asarray(np.maximum.reduce(each, -2))
 
 
 def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
@@ -289,7 +300,8 @@ def _power_shares(rate: float, resolution: Resolution) -> Array:
 
 
 def _transform(windows: Array) -> NDArray[np.complex128]:
-    return np.fft.rfft(windows * _hann(windows.shape[-1]), axis=-1)
+    tapered = np.multiply(windows, _hann(windows.shape[-1]), order="C")
+    return np.fft.rfft(tapered, axis=-1)
 
 
 @lru_cache

@@ -273,8 +273,8 @@ def strong(slopes: Array, rate: float, heard: Mask) -> list[list[Peak]]:
     prominence = level - 10.0 * np.log10(np.maximum(median, TINY))
     strength = np.minimum(prominence, level - FLOOR).max(axis=0)
     for k in np.flatnonzero(strength >= STRONG).tolist():
-        own = int(rows[pair[k]]), float(frequency[place[k]]), float(strength[k])
-        found[windows[pair[k]]].append(own)
+        peak = int(rows[pair[k]]), float(frequency[place[k]]), float(strength[k])
+        found[windows[pair[k]]].append(peak)
     return found
 
 
