@@ -9,7 +9,7 @@ from commandline import call as inspector
 
 import noisemodel as nm
 from inspector.errors import InspectorError
-from inspector.export.sound import clip, common_gain, sonify
+from inspector.export.sound import clip, common_gain, remarks, sonify
 from noisemodel import Run
 
 RATE = 10_000.0
@@ -106,10 +106,11 @@ def test_the_chosen_gain_does_not_clip_and_uses_the_full_scale():
 def test_gaps_are_silent_without_ringing():
     valid = np.ones(20_000, dtype=bool)
     valid[8000:12_000] = False
-    sound = sonify(run_of(tone(440) * valid, valid=valid))
+    run = run_of(tone(440) * valid, valid=valid)
+    sound = sonify(run)
     assert not sound.signal[~valid].any()
     assert np.abs(np.diff(sound.signal)).max() < 0.3  # no click: the tone itself moves by 0.28
-    assert "Gaps are silent." in sound.remarks
+    assert "Gaps are silent." in remarks(run, 1.0)
 
 
 def test_an_impact_sounds_at_its_time():
@@ -129,17 +130,18 @@ def test_a_sound_has_the_duration_of_its_log_at_any_rate(rate):
 
 
 def test_playing_faster_makes_low_frequencies_audible():
-    sound = sonify(run_of(tone(12, 4.0, 100.0), rate=100.0), speed=10.0)
+    run = run_of(tone(12, 4.0, 100.0), rate=100.0)
+    sound = sonify(run, speed=10.0)
     data = sound.file(-6.0)
     assert len(read(data)[0]) / 48_000 == pytest.approx(0.4, abs=0.01)
     assert pitch(data)[0] == pytest.approx(120, abs=3)
-    assert "Played 10 times as fast: frequencies are 10 times as high." in sound.remarks
+    assert "Played 10 times as fast: frequencies are 10 times as high." in remarks(run, 10.0)
 
 
 def test_a_log_at_a_low_rate_has_a_remark_on_its_bandwidth():
-    sound = sonify(run_of(tone(40, rate=250.0), rate=250.0))
-    assert "Audible: 20 Hz to 125 Hz of the motion (half the rate of 250 Hz)." in sound.remarks
-    assert any("no content above 125 Hz" in remark for remark in sound.remarks)
+    found = list(remarks(run_of(tone(40, rate=250.0), rate=250.0), 1.0))
+    assert "Audible: 20 Hz to 125 Hz of the motion (half the rate of 250 Hz)." in found
+    assert any("no content above 125 Hz" in remark for remark in found)
 
 
 def test_a_log_without_audible_frequencies_is_refused_with_a_speed():
@@ -163,6 +165,9 @@ def test_the_command_writes_runs_at_one_gain(tmp_path):
     status, out, err = inspector("listen", *runs, "-o", tmp_path / "ab.wav")
     assert (status, err) == (0, "")
     assert out.count("gain +24.9 dB: full scale is 0.0569 rad/s") == 2
+    assert (
+        out.count("  The run has no desired velocities: the sound is of the measured motion") == 2
+    )
     assert f"{tmp_path}/ab.b.wav: 2.00 s" in out
     files = (tmp_path / f"ab.{letter}.wav" for letter in "ab")
     peaks = [np.abs(middle(read(path.read_bytes())[0])).max() for path in files]

@@ -33,7 +33,7 @@ from inspector.report import findings, html
 from inspector.report.picture import require
 from inspector.text import progress
 from inspector.verdict import EXPECTED, Verdict
-from noisemodel.files import refuse_existing
+from noisemodel.files import refuse_existing, write_whole
 
 # --- view
 
@@ -359,9 +359,12 @@ def listen(
         shared.say_warnings(each)
     sounds = [sonification.sonify(each, joint=joint, speed=speed) for each in recorded]
     level = sonification.common_gain(sounds)
-    sonification.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
-    for run, path, sound in zip(runs, paths, sounds, strict=True):
+    for path, sound in zip(paths, sounds, strict=True):
+        write_whole(path, sound.file(level), overwrite=overwrite)
+    for run, each, path, sound in zip(runs, recorded, paths, sounds, strict=True):
         typer.echo(f"{run}: {sound}")
+        for remark in sonification.remarks(each, speed):
+            typer.echo(f"  {remark}")
         typer.echo(f"{path}: {sound.description(level)}")
 
 

@@ -117,4 +117,6 @@ def evaluate(
     """Evaluate a model on annotated runs that it was not trained on."""
     (file,) = model_files([model])
     report = training.evaluate(file, inputs, part=part, seen_too=seen_too)
-    typer.echo(training.as_json(report, file) if as_json else table(report, by or ""))
+    document = {"model": file.name, **report.as_dict()}
+    shown = dumps(document, indent=1, allow_nan=False) if as_json else table(report, by or "")
+    typer.echo(shown)

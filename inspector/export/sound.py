@@ -12,8 +12,8 @@ signal there. A single signal is not changed.
 
 import io
 import wave
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from string import ascii_lowercase
@@ -25,7 +25,7 @@ import noisemodel as nm
 from inspector.analysis import Analysis, worst
 from inspector.errors import InspectorError, OptionError
 from inspector.text import plain
-from noisemodel.files import refuse_existing, write_whole
+from noisemodel.files import refuse_existing
 from noisemodel.run import part, stretches
 from noisemodel.types import Array, Mask
 
@@ -53,7 +53,6 @@ class Sound:
     rate: float  # of the signal, in [Hz]
     start: float  # of its first sample in the run, in [s]
     speed: float  # factor of the playing speed, and of all frequencies
-    remarks: tuple[str, ...] = ()  # what is inaudible and why, a sentence each
     playing: int = RATE  # sampling rate of the file, in [Hz]
 
     @cached_property
@@ -83,13 +82,13 @@ class Sound:
         return f"{seconds:.2f} s, {scale}{state}"
 
     def file(self, gain: float, *, lead: float = 0.0) -> bytes:
-        """WAV file of one channel of 16 bits, clipped above full scale.
+        """WAV file of one channel of 16 bits.
 
         Args:
-            gain: At 0 dB, full scale is 1 rad/s, in [dB].
+            gain: In [dB], at most `common_gain`: at 0, full scale is 1 rad/s.
             lead: Duration of silence before it, in [s].
         """
-        scaled = np.clip(self.played * _factor(gain), -1.0, 1.0) * FULL_SCALE
+        scaled = self.played * _factor(gain) * FULL_SCALE
         silence = np.zeros(round(lead * self.playing))
         samples = np.round(np.concatenate((silence, scaled))).astype("<i2")
         stream = io.BytesIO()
@@ -103,8 +102,7 @@ class Sound:
     def __str__(self) -> str:
         rms = float(np.sqrt(np.mean(np.square(self.signal))))
         level = f"peak {self.peak:.3g} rad/s, rms {rms:.3g} rad/s"
-        lines = [f"{self.what}: {'silent' if self.silent else level}"]
-        return "\n".join([*lines, *(f"  {remark}" for remark in self.remarks)])
+        return f"{self.what}: {'silent' if self.silent else level}"
 
 
 @dataclass(frozen=True)
@@ -117,25 +115,20 @@ class Clip:
     description: str  # what it is, at which gain
 
 
-def sonify(run: nm.Run, *, joint: str = "", speed: float = 1.0) -> Sound:
-    """Noise of a run as a sound, with remarks on what is inaudible.
+def sonify(run: nm.Run, *, joint: str = "", speed: float = 1.0, playing: int = RATE) -> Sound:
+    """Noise of a run as a sound.
 
     Args:
         joint: The only joint that is played; all of them, and the base, if empty.
         speed: Factor of the playing speed, and of all frequencies.
+        playing: Sampling rate of the file, in [Hz].
     """
-    found = sound_of(run, joint=joint, speed=speed)
-    return replace(found, remarks=tuple(_remarks(run, speed)))
-
-
-def sound_of(run: nm.Run, *, joint: str = "", speed: float = 1.0, playing: int = RATE) -> Sound:
-    """Noise of a run as a sound without remarks; see `sonify`."""
     if not 0.01 <= speed <= 1000.0:
         raise OptionError(f"a speed of {speed:g}, expected 0.01 to 1000")
     lowest = LOWEST_AUDIBLE / speed
     signal = mix(_velocities(run, joint), valid=run.mask, rate=run.rate, lowest=lowest)
     what = f"simplified noise of {joint}" if joint else "simplified noise"
-    return Sound(what, signal, run.rate, float(run.time[0]), speed, playing=playing)
+    return Sound(what, signal, run.rate, float(run.time[0]), speed, playing)
 
 
 def common_gain(sounds: Sequence[Sound]) -> float:
@@ -155,12 +148,6 @@ def output_paths(path: Path, count: int, *, overwrite: bool = False) -> tuple[Pa
     for each in paths:
         refuse_existing(each, overwrite=overwrite)
     return paths
-
-
-def save(sounds: Mapping[Path, Sound], gain: float, *, overwrite: bool = False) -> None:
-    """Write sounds as WAV files, all at the same gain in [dB]."""
-    for path, sound in sounds.items():
-        write_whole(path, sound.file(gain), overwrite=overwrite)
 
 
 def of_recording(analysis: Analysis) -> bytes:
@@ -188,7 +175,7 @@ def clip(run: nm.Run, *, around: float = 0.0, lead: bool = False) -> Clip | None
     middle = int(np.searchsorted(run.time, around))
     first = min(max(middle - count // 2, 0), len(run.time) - count)
     try:
-        sound = sound_of(part(run, first, first + count), playing=SMALL_RATE)
+        sound = sonify(part(run, first, first + count), playing=SMALL_RATE)
     except InspectorError:
         return None
     gain = common_gain([sound])
@@ -286,7 +273,8 @@ def _velocities(run: nm.Run, joint: str) -> Iterator[Array]:
     return (np.asarray(signal, dtype=np.float64) for signal in (*chosen, *base))
 
 
-def _remarks(run: nm.Run, speed: float) -> Iterator[str]:
+def remarks(run: nm.Run, speed: float) -> Iterator[str]:
+    """What of a run is inaudible and why, a sentence each."""
     from inspector.audit.signals import bandwidth
 
     reach = bandwidth(run)

@@ -3,9 +3,7 @@
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from json import dumps
 from pathlib import Path
-from typing import Any
 
 import noiseclassifier as nc
 import noisemodel as nm
@@ -82,12 +80,24 @@ def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
     chosen = slower if held else run
     if chosen.rate < wanted * (1 - NOMINAL):
         reason = f"rate {chosen.rate:g} Hz < {wanted:g} Hz"
-        return nc.Unanswered(_name(path, run.robot), facts(run.robot, run.meta), reason), None
-    found = of_run(path, chosen, wanted)
-    if not (found.blocks or "events" in run.meta or bare_too):
+        return nc.Unanswered(_name(path, run.robot), _facts(run), reason), None
+    lower = min(wanted, chosen.rate)
+    decimated = nm.decimated(chosen, lower)
+    if not (decimated.blocks or "events" in run.meta or bare_too):
         raise InspectorError(f"{path}: has no annotated blocks")
-    signals = nc.signals.without_zero_error(nc.signals.named(found.signal))
-    return replace(found, signal=signals), run
+    signals = nc.signals.named({**nm.norms(decimated), **nm.by_joint(decimated)})
+    found = nc.Recording(
+        name=_name(path, run.robot),
+        signal=nc.signals.without_zero_error(signals),
+        rate=lower,
+        blocks=tuple(nc.Block(b.start, b.stop, b.label) for b in decimated.blocks),
+        start=float(decimated.time[0]),
+        valid=decimated.mask,
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        events=_faults(path, chosen),
+        facts=_facts(run),
+    )
+    return found, run
 
 
 def _apart(
@@ -109,45 +119,28 @@ def _apart(
     return one if name == one.name else replace(one, name=name)
 
 
-def of_run(path: Path, run: nm.Run, rate: float) -> nc.Recording:
-    """Noise of a run, annotated or not, decimated to a rate in [Hz] that is not above its own."""
-    rate = min(rate, run.rate)
-    decimated = nm.decimated(run, rate)
-    return nc.Recording(
-        name=_name(path, run.robot),
-        signal={**nm.norms(decimated), **nm.by_joint(decimated)},
-        rate=rate,
-        blocks=tuple(nc.Block(b.start, b.stop, b.label) for b in decimated.blocks),
-        start=float(decimated.time[0]),
-        valid=decimated.mask,
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        events=faults(path, run.meta, run.blocks),
-        facts=facts(run.robot, run.meta),
-    )
-
-
 def _name(path: Path, robot: str | None) -> str:
     """Name of a run file: with its robot before, if its folder is named so."""
     return f"{robot}/{path.stem}" if path.parent.name == robot else path.stem
 
 
-def facts(robot: str | None, meta: Mapping[str, Any]) -> dict[str, str]:
+def _facts(run: nm.Run) -> dict[str, str]:
     """Robot, scenario and domain of a run, as far as they are known."""
-    domain = meta.get("domain")
+    domain = run.meta.get("domain")
     named = domain.get("name") if isinstance(domain, Mapping) else domain
     found = {
-        "robot": robot,
-        "scenario": meta.get("scenario"),
-        "domain": named or meta.get("simulator") or meta.get("source"),
+        "robot": run.robot,
+        "scenario": run.meta.get("scenario"),
+        "domain": named or run.meta.get("simulator") or run.meta.get("source"),
     }
     return {name: str(value) for name, value in found.items() if value}
 
 
-def faults(path: Path, meta: Mapping[str, Any], blocks: Sequence[nm.Block]) -> tuple[nc.Fault, ...]:
+def _faults(path: Path, run: nm.Run) -> tuple[nc.Fault, ...]:
     """All faults that were injected into a run, as the events of its meta have them."""
-    bad = [block for block in blocks if block.label != "ok"]
+    bad = [block for block in run.blocks if block.label != "ok"]
     found = []
-    events = meta.get("events") or ()
+    events = run.meta.get("events") or ()
     for event in events if isinstance(events, list | tuple) else (events,):
         try:
             label, start, stop = str(event["label"]), float(event["start"]), float(event["stop"])
@@ -290,8 +283,3 @@ def _run_of(recording: nc.Recording) -> nm.Run:
     velocity = nc.signals.stacked(recording.signal, (nc.NOISE,))[:, None]
     time, valid = recording.time, recording.valid
     return nm.Run(time=time, velocity=velocity, joint_names=("joint0",), valid=valid)
-
-
-def as_json(assessment: Assessment, model: Path) -> str:
-    """The measures of a model as a JSON text."""
-    return dumps({"model": model.name, **assessment.as_dict()}, indent=1, allow_nan=False)
