@@ -6,7 +6,6 @@ import pytest
 from inspector.compare.pair import (
     Align,
     align,
-    alike,
     changes,
     compare,
     largest_change,
@@ -243,20 +242,6 @@ def test_the_faster_run_is_decimated_and_both_have_one_level(tmp_path):
     assert whole(pair).change == pytest.approx(0.0, abs=0.1)
     (remark,) = [r for r in pair.remarks if "decimated" in r]
     assert remark.startswith("The run before is decimated from 4000 Hz to the 1000 Hz of the other")
-
-
-def test_a_decimated_run_keeps_the_positions_of_its_links(tmp_path):
-    fast = panda()
-    slow = dataclasses.replace(
-        part(fast, 0, 10_000),
-        time=fast.time[::5],
-        velocity=np.cos(2 * np.pi * np.linspace(0.2, 0.5, 7) * fast.time[::5, None]),
-        position=fast.position[::5],
-        valid=None,
-    )
-    first, second, _ = alike(fast, slow)
-    np.testing.assert_allclose(first.position, second.position)
-    assert compared(tmp_path, fast, slow).links is not None
 
 
 def test_only_the_stretch_that_both_cover_is_compared_and_blocks_move_with_their_run(tmp_path):

@@ -27,7 +27,7 @@ from noisemodel.types import Array
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """Runs that are laid side by side, by names of which no two are alike."""
+    """Runs that are laid side by side, by the names of their files."""
 
     names: tuple[str, ...]
     sides: tuple[Analysis, ...]
@@ -73,10 +73,6 @@ def lay(runs: Sequence[Opened], library: Library, *, from_start: bool = True) ->
     shown = [opened.source.shown for opened in runs]
     unique = len({path.stem for path in shown}) == len(shown)
     names = [path.stem if unique else str(path) for path in shown]
-    seen: dict[str, int] = {}
-    for place, name in enumerate(names):
-        seen[name] = seen.get(name, 0) + 1
-        names[place] = name if seen[name] == 1 else f"{name} ({seen[name]})"
     sides = []
     for opened, name in zip(runs, names, strict=True):
         run = _from_start(opened.run) if from_start else opened.run

@@ -162,9 +162,12 @@ def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
         if run.rate > rate * (1 + SAME_RATE):
             remarks.append(
                 f"The run {which} is decimated from {run.rate:g} Hz to the {rate:g} Hz of the"
-                " other, without its efforts."
+                " other, without its positions and efforts."
             )
-    before, after = (_at_rate(run, rate) for run in (before, after))
+    before, after = (
+        run if run.rate <= rate * (1 + SAME_RATE) else decimated(run, rate)
+        for run in (before, after)
+    )
     return before, after, tuple(remarks)
 
 
@@ -188,21 +191,6 @@ def together(before: Run, after: Run, alignment: Alignment) -> tuple[Run, Run, t
         if run.duration - cut.duration >= REMARKED
     ]
     return cut_before, cut_after, tuple(remarks)
-
-
-def _at_rate(run: Run, rate: float) -> Run:
-    """Decimate a run, but keep the positions that its links are placed by."""
-    if run.rate <= rate * (1 + SAME_RATE):
-        return run
-    lower = decimated(run, rate)
-    nearest = np.round(np.arange(len(lower.time)) * run.rate / rate).astype(int)
-    nearest = np.minimum(nearest, len(run.time) - 1)
-
-    kept: dict[str, Any] = {
-        name: None if (signal := getattr(run, name)) is None else signal[nearest]
-        for name in ("position", "position_desired", "base_pose")
-    }
-    return replace(lower, **kept)
 
 
 def _cut(run: Run, first: int, stop: int, time: Array) -> Run:

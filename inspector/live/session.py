@@ -53,7 +53,6 @@ class Summary:
     status: Status = Status.CANNOT_TELL  # that `inspector classify` gives these labels
     findings: Sequence[Event] = ()  # each from the start of its first frame to the end of its last
     reason: str = "no frame was labelled"  # why nothing can be told
-    frame: float = 0.0  # duration, by which findings may begin too early, in [s]
     levels: Levels | None = None  # of the whole session once it is closed, if they were kept
 
     def __str__(self) -> str:
@@ -203,7 +202,6 @@ class LiveSession:
             status=status,
             findings=findings,
             reason=reason,
-            frame=labeller.length,
             levels=self._levels,
         )
 
