@@ -598,7 +598,7 @@ def test_a_chatter_in_one_scenario_is_worse_and_says_where_in_every_output(proje
     assert (change["joint"], change["band_hz"]) == ("elbow", [32.0, 64.0])
     assert rows["pick"]["margin_db"] < change["low"] <= change["change"] <= change["high"]
     assert {each["kind"] for each in rows["pick"]["findings"]} == {"new"}
-    schema = json.loads((ROOT / "docs" / "noise-diff-1.schema.json").read_text())
+    schema = json.loads((ROOT / "docs" / "noise-diff-2.schema.json").read_text())
     jsonschema.validate(found, schema)
     for form in forms:
         text = (tmp_path / form).read_text()

@@ -553,22 +553,17 @@ def _folded(of: diff.Row, kind: str) -> list[str]:
 
 
 def diff_json(found: Difference) -> str:
-    """The difference as JSON, ``noise-diff/1``; its schema is docs/noise-diff-1.schema.json."""
+    """The difference as JSON, ``noise-diff/2``; its schema is docs/noise-diff-2.schema.json."""
     alone = [(each, path) for each in found.alone for path in (*each.before, *each.after)]
     whole = {
-        "format": "noise-diff/1",
+        "format": "noise-diff/2",
         "version": program_version(),
         "exit_status": found.exit_status,
         "counts": _diff_counts(found),
         "verdict": found.outcome,
-        "alpha": None,
-        "confidence": None,
         "margin_db": found.margin,
-        "paired_by": "name and motion",
         "scenarios": [_row_as_dict(each) for each in found.rows],
-        "together": None,
         "picture": None if found.picture is None else str(found.picture),
-        "not_paired": [str(path) for _, path in alone],
         "unpaired": [
             {
                 "run": str(path),
@@ -587,11 +582,8 @@ def _row_as_dict(of: diff.Row) -> dict[str, Any]:
         "name": of.name,
         "verdict": of.outcome,
         "reason": of.reason,
-        "testable": bool(of.changes),
-        "paired": False,
         "reference": [str(path) for path in of.before],
         "candidate": [str(path) for path in of.after],
-        "confidence": None,
         "margin_db": round(of.margin, 3),
         "over_db": None if of.score is None else round(of.score, 3),
         "findings": [_finding_as_dict(each) for each in of.findings],
@@ -599,15 +591,10 @@ def _row_as_dict(of: diff.Row) -> dict[str, Any]:
             {
                 "kind": "joint and band" if each.signal == "velocity" else "tracking error",
                 "joint": each.joint,
-                "link": None,
                 "band_hz": list(each.band),
-                "label": None,
-                "unit": "dB",
                 "change": round(each.change, 3),
                 "low": round(each.low, 3),
                 "high": round(each.high, 3),
-                "p_louder": None,
-                "p_quieter": None,
             }
             for each in of.changes
         ],
