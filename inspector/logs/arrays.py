@@ -351,6 +351,9 @@ def _floating(qpos: Real, count: int) -> list[int]:
     return places
 
 
+NO_ARRAYS = "no numbers; of a timeseries of MATLAB or Simulink, save ts.Time and ts.Data"
+
+
 def _nothing(path: Path, episode: str, arrays: Arrays, not_read: Sequence[str]) -> LogError:
     """Error of a file that is not known to hold motion: what it holds, and what to type."""
     if arrays and all(each.ndim == 1 for each in arrays.values()):
@@ -365,7 +368,7 @@ def _nothing(path: Path, episode: str, arrays: Arrays, not_read: Sequence[str]) 
     return LogError(
         path,
         f"{episode or 'the file'} holds no known joint positions or velocities; name them, such as"
-        f" {example}; it has {shapes}",
+        f" {example}; it has {shapes or NO_ARRAYS}",
     )
 
 
@@ -460,19 +463,14 @@ HEADER = 128  # bytes before the first variable
 MATRIX, COMPRESSED, FLAGS, DIMENSIONS = 14, 15, 6, 5
 # Numbers by the type of their element, whatever the class of the variable is.
 STORED = ("", "i1", "u1", "i2", "u2", "i4", "u4", "f4", "", "f8", "", "", "i8", "u8")
-CELL, STRUCT, TEXT = 1, 2, 4  # classes of variables; cells are not read
-NO_NUMBERS = (3, 5, 16, 17, 18)  # classes of objects, sparse matrices and functions
+STRUCT, TEXT = 2, 4  # classes of variables
+NO_NUMBERS = (1, 3, 5, 16, 17, 18)  # classes of cells, objects, sparse matrices and functions
 COMPLEX = 0x800  # the flag of a variable with imaginary parts
 DEPTH = 20  # structs within each other
 
 # Fields of a timeseries, or of what Simulink logs as a struct, that hold the signal itself.
 DATA = ("signals/values", "Data", "data", "Values", "values")
 STAMPS = ("Time", "time", "t")
-
-MATLAB_OBJECTS = (
-    "holds MATLAB objects ({}), such as a timeseries or Simulink's logsout, not numbers; in MATLAB:"
-    " t = ts.Time; q = ts.Data; save('log.mat', 't', 'q'); of Simulink, ts = logsout{{1}}.Values"
-)
 
 
 def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log:
@@ -496,31 +494,19 @@ def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log
     return log_of(path, turned, options, stated=stated_rate(turned))
 
 
-def check_numbers(path: Path, arrays: Arrays, objects: Collection[str]) -> None:
-    """Refuse a file of objects alone: only MATLAB's own code reads what they hold."""
-    if objects and not any(each.size > 1 for each in arrays.values()):
-        raise LogError(path, MATLAB_OBJECTS.format(", ".join(sorted(set(objects))[:3])))
-
-
 def _variables(path: Path) -> dict[str, NDArray[Any]]:
     """Arrays of numbers in a file, and in the fields of a struct."""
-    objects, found = list[str](), dict[str, NDArray[Any]]()
+    found: dict[str, NDArray[Any]] = {}
     try:
         for data in _unpacked_variables(path.read_bytes()):
-            parts = _elements(data, 8, len(data))
-            texts = [data[slice(*part[1:])].decode("latin1") for part in parts if part[0] in (1, 2)]
-            name = next(iter(texts), "")
-            arrays = dict(_numbers_in(data, 8, len(data), name))
-            numbers = {each: array for each, array in arrays.items() if array is not None}
-            if len(numbers) < len(arrays):
-                objects.append(next((text for text in texts if text.strip("\0")), "unnamed"))
-            elif name and not name.startswith("__"):
-                found |= numbers
+            texts = (part[1:] for part in _elements(data, 8, len(data)) if part[0] in (1, 2))
+            name = data[slice(*next(texts, (0, 0)))].decode("latin1")
+            if name and not name.startswith("__"):
+                found |= _numbers_in(data, 8, len(data), name)
     except (ArchiveError, OSError) as error:
         raise LogError(path, one_line(error)) from error
     except (struct_error, ValueError) as error:  # a shape that no array has
         raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
-    check_numbers(path, found, objects)
     return found
 
 
@@ -566,8 +552,8 @@ def _elements(data: bytes, place: int, stop: int) -> Iterator[tuple[int, int, in
 
 def _numbers_in(
     data: bytes, place: int, stop: int, name: str, depth: int = DEPTH
-) -> Iterator[tuple[str, NDArray[Any] | None]]:
-    """Arrays of numbers in a variable, of the sizes that it states; None for an object."""
+) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Arrays of numbers in a variable, of the sizes that it states."""
     parts = [*_elements(data, place, stop)]
     if not parts:
         return
@@ -577,17 +563,15 @@ def _numbers_in(
         dims = unpack_from(f"<{(parts[1][2] - parts[1][1]) // 4}i", data, parts[1][1])
     kind, count = flags & 0xFF, prod(dims)
     if kind in NO_NUMBERS or min(dims, default=0) < 0:
-        yield name, None
-    elif kind == STRUCT and count == 1 and len(parts) > 4:
+        return
+    if kind == STRUCT and count == 1 and len(parts) > 4:
         (length,) = unpack_from("<i", data, parts[3][1])
         names = data[slice(*parts[4][1:])]
         fields = (names[at : at + length] for at in range(0, len(names), max(1, length)))
         for field, part in zip(fields, parts[5:], strict=False):
             text = field.partition(bytes(1))[0].decode("latin1")
             yield from _numbers_in(data, *part[1:], f"{name}/{text}", depth - 1)
-    elif kind in (CELL, STRUCT):
-        return
-    else:
+    elif kind != STRUCT:
         size = sum(end - start for _, start, end in parts[3:])
         stored, start, end = (*parts, (1, stop, stop))[3]
         dtype = np.dtype(dict(enumerate(STORED)).get(stored) or "i1")

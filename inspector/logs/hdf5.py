@@ -5,7 +5,6 @@ MATLAB's files of version 7.3 are HDF5 too: structs are groups, and arrays are t
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,6 @@ from inspector.logs.arrays import (
     STATES,
     STEPS,
     Arrays,
-    check_numbers,
     episodes_of,
     log_of,
     log_of_variables,
@@ -45,8 +43,6 @@ SMALL = 8 * 2**20  # bytes up to which a dataset is read whatever its name is
 NAMES = {*TIMES, *EPISODE_ENDS}
 
 MATLAB = b"MATLAB 7.3"  # the first bytes of a file that MATLAB wrote
-# An attribute of MATLAB's objects, of which a file holds numbers and references alone.
-OBJECT = "MATLAB_object_decode"
 REFERENCES = "#refs#"  # the group in which MATLAB keeps the cells and objects of a file
 
 
@@ -92,18 +88,14 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str, *, is_matla
         with h5py.File(path) as file:
             group = _own(path, file[f"{home}/{episode}"], file) if home else file
             datasets, left_out = _wanted(group, options)
-            objects = [name for name, each in datasets.items() if OBJECT in each.attrs]
-            plain = {name: each for name, each in datasets.items() if name not in objects}
-            arrays: Arrays = _values(path, file, plain)
+            arrays: Arrays = _values(path, file, datasets)
             attributes = {**_single(file.attrs), **_single(group.attrs)}
     except LogError:
         raise
     except DAMAGE as error:
         raise LogError(path, f"{episode or 'it'} is damaged ({one_line(error)})") from error
     if is_matlab:
-        check_numbers(path, arrays, objects)
-        log = log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
-        return replace(log, not_read=(*log.not_read, *objects))
+        return log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
     arrays = arrays if home else part_of(arrays, episode)
     return log_of(
         path,
