@@ -214,6 +214,8 @@ def test_quantisation_and_rest_are_no_hold():
     everywhere = np.ones(len(velocity), dtype=bool)
     assert hold_length(np.round(velocity, 2), everywhere) == 1.0
     assert hold_length(np.round(velocity[:, :1], 1), everywhere) == 1.0
+    ramp = np.floor(np.arange(len(velocity)) / 7)[:, None]  # of an encoder at a steady speed
+    assert hold_length(ramp, everywhere) == 1.0
     velocity[2000:8000] = velocity[2000]
     assert hold_length(velocity, everywhere) == 1.0
 

@@ -254,7 +254,7 @@ def _wanted(
         and (
             name in mapped
             or column_signal(name, naming)
-            or (array_signal(name) in JOINT_SIGNALS and naming.only is not None)
+            or (array_signal(name) in JOINT_SIGNALS and naming.alone)
             or CELLS.fullmatch(name)
         )
     ]
@@ -368,10 +368,8 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
             if len(cells) != width:
                 if cells in ([], [""]) or cells[0].lstrip().startswith(COMMENTS):
                     continue
-                if len(cells) == width - 1 and not layout.header[-1]:
-                    cells = [*cells, ""]  # the header ends with a separator
-                elif not any(map(str.strip, cells[width:])):
-                    cells = cells[:width]  # the row does
+                if not any(map(str.strip, cells[width:])):
+                    cells = cells[:width]  # the row ends with a separator
                 if len(cells) != width:
                     names = "the header names" if layout.row else "--columns names"
                     problem = f"{len(cells)} cells where {names} {width} columns"

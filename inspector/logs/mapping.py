@@ -548,11 +548,9 @@ def _meaning(
     """Signal of a field by the format or by its name, and the joint if it is a column of one."""
     known = column_signal(field.name, naming) if _is_column(field) else None
     signal = field.signal or array_signal(field.name) or ""
-    if known is None and _is_column(field) and signal in JOINT_SIGNALS and naming.only != "":
-        known = None if naming.only is None else (signal, naming.only)
-        signal = ""
     if known is None:
-        return signal, ""
+        unnamed = _is_column(field) and signal in JOINT_SIGNALS and not naming.alone
+        return "" if unnamed else signal, ""
     signal, joint = known
     number, first = number_of(joint), naming.first
     if number is not None and joint not in joints and first <= number < first + len(joints):

@@ -152,7 +152,7 @@ class Naming:
     qd_is_desired: bool = False  # whether `qd` is the desired position, since `dq` is the velocity
     bare: dict[str, Meaning] = field(default_factory=dict)  # of columns that name a joint alone
     remark: str = ""  # what was decided about these, a sentence; empty if nothing
-    only: str | int | None = ""  # joint of columns that name none; None where several are named
+    alone: bool = True  # whether a column that names no joint is of the only one
 
     @classmethod
     def of(cls, columns: Iterable[str], joints: Collection[str] = ()) -> "Naming":
@@ -170,18 +170,16 @@ class Naming:
             match = _match(without_unit(column)[0])
             if match and not any(_sides(match.groupdict())):
                 words.add(match["quantity"].lower())
-        moved = {
-            key_of(joint): joint
-            for signal, joint in (named | bare).values()
-            if signal.startswith(("position", "velocity"))
-        }
+        moves = any(
+            signal.startswith(("position", "velocity")) for signal, _ in (named | bare).values()
+        )
         is_pose = {"x", "y"} <= {column.lower() for column in columns}  # beside x, y, an angle
         return cls(
             first=int(min(numbers, default=0) == 1),
             qd_is_desired={"dq", "qd"} <= words,
             bare=bare,
             remark=remark,
-            only=None if len(moved) > 1 or is_pose else next(iter(moved.values()), ""),
+            alone=not (moves or is_pose),
         )
 
 

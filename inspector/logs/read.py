@@ -65,15 +65,14 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     return reader(path, options)
 
 
-def is_one_log(folder: Path) -> bool:
-    """Whether a folder is one log: a LeRobot data set, or a bag; not a folder of logs."""
+def _module_of_folder(folder: Path) -> str:
+    """What reads a folder that is one log, a LeRobot data set or a bag; empty for one of logs."""
     try:
+        if (folder / INFO).is_file():
+            return "parquet"
         files = [each for each in folder.iterdir() if not each.name.startswith(".")]
-        return (
-            (folder / INFO).is_file()
-            or (folder / BAG).is_file()
-            or (len(files) == 1 and files[0].suffix in (".mcap", ".db3"))
-        )
+        alone = len(files) == 1 and files[0].suffix in (".mcap", ".db3")
+        return "bags" if alone or (folder / BAG).is_file() else ""
     except OSError as error:
         raise LogError(folder, f"cannot be read ({error.strerror})") from error
 
@@ -88,10 +87,8 @@ def _is_folder(path: Path) -> bool:
 def _module_of(path: Path) -> str:
     """The module that reads a log."""
     if _is_folder(path):
-        if (path / INFO).is_file():
-            return "parquet"
-        if any(map(Path.is_file, (path / BAG, *path.glob("*.mcap"), *path.glob("*.db3")))):
-            return "bags"
+        if module := _module_of_folder(path):
+            return module
         raise LogError(
             path,
             "a folder that is neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
@@ -325,7 +322,7 @@ def sources(
 
 def logs_in(path: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     """List the logs of a folder and of the folders in it, and its other files."""
-    if not _is_folder(path) or is_one_log(path):
+    if not _is_folder(path) or _module_of_folder(path):
         return (path,), ()
     logs: list[Path] = []
     others: list[Path] = []
@@ -346,7 +343,7 @@ def logs_in(path: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
                 continue
             if not each.is_dir():
                 (logs if here.suffix.lower() in SUFFIXES else others).append(here)
-            elif is_one_log(here):
+            elif _module_of_folder(here):
                 logs.append(here)
             elif not each.is_symlink():
                 waiting.append(here)
