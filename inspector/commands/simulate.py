@@ -1,9 +1,8 @@
 """`inspector simulate`: one simulated run, or a data set of them."""
 
 import json
-from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -129,33 +128,6 @@ def domains(
     folder = Folder.opened(output, wide=True)
     _make(folder, folder.missing(chosen), jobs)
     typer.echo(f"{output}: {described(statistics(folder))}")
-
-
-@app.command(epilog="Example: inspector simulate logs data/ -o logs/ --copies 2")
-def logs(
-    data: Annotated[Path, argument("A folder of `inspector simulate domains`.")],
-    output: To,
-    copies: Annotated[int, option("Logs of each run.", min=1)] = 1,
-    rate: Annotated[float | None, option("Of all, in Hz; drawn by default.")] = None,
-    side: Annotated[
-        Literal["all", "source", "target", "logger"],
-        option("What to learn from, or to measure on only."),
-    ] = "all",
-) -> None:
-    """Write logs of wide domains: ripple, sensing and sampling, with labels decided anew."""
-    from noiseclassifier.scenarios.dataset import Folder, write_logs
-
-    if not data.is_dir():
-        raise typer.BadParameter(f"{data}: there is no such folder")
-    folder = Folder.opened(data, wide=True, any_recipe=True)
-    rates, labelled, lost = Counter[float](), 0, 0
-    for _, run in write_logs(folder, output, copies=copies, rate=rate, side=side):
-        rates[run.rate] += 1
-        labelled += sum(event["labelled"] > 0 for event in run.meta["events"])
-        lost += sum(not event["labelled"] for event in run.meta["events"])
-    counts = ", ".join(f"{count} at {rate:g} Hz" for rate, count in sorted(rates.items()))
-    seen = f"{labelled} events with a label, {lost} that cannot be seen"
-    typer.echo(f"{output}: {rates.total()} logs ({counts}); {seen}")
 
 
 def _make(folder: "Folder", tasks: list[Any], jobs: Any) -> None:
