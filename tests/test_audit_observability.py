@@ -9,7 +9,6 @@ from inspector.audit.audit import (
     Observability,
     audit,
     band_edges,
-    has_frame,
     shortcomings,
     summary,
 )
@@ -134,16 +133,13 @@ def test_with_quantisation_loud_failures_stay_observable():
 
 
 def test_a_frame_requires_a_stretch_without_a_gap():
-    valid = np.ones(1000, dtype=bool)
-    valid[::400] = False
-    assert not has_frame(valid, 400)
-    valid[400] = True
-    assert has_frame(valid, 400)
     run = noisy_run(1000.0)
     gaps = np.ones(len(run.time), dtype=bool)
-    gaps[::300] = False
-    broken = run_of(run.velocity * gaps[:, None], 1000.0, valid=gaps)
-    assert not audit(broken, LIBRARY).observable
+    gaps[::400] = False  # a frame takes 400 samples
+    for joined in (True, False):
+        gaps[400] = joined
+        broken = run_of(run.velocity * gaps[:, None], 1000.0, valid=gaps.copy())
+        assert audit(broken, LIBRARY).observable == joined
     assert "no stretch of 0.4 s without a gap" in summary(audit(broken, LIBRARY))[0]
     with pytest.raises(CannotTellError, match="no stretch of 0.6 s without a gap"):
         label_run(broken, LIBRARY)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.audit.audit import excerpt, gaps_of
+from inspector.audit.audit import audit, excerpt
 from inspector.audit.signals import copies, unit_warnings
 
 
@@ -103,9 +103,9 @@ def test_copies_are_found_by_name():
 
 def test_gaps_are_counted_and_measured():
     valid = np.ones(1000, dtype=bool)
-    assert str(gaps_of(run_of(np.zeros((1000, 1)), 100.0))) == "no gaps"
+    assert str(audit(run_of(np.zeros((1000, 1)), 100.0), {}).gaps) == "no gaps"
     valid[:10] = valid[500:530] = valid[999] = False
-    found = gaps_of(run_of(np.zeros((1000, 1)), 100.0, valid=valid))
+    found = audit(run_of(np.zeros((1000, 1)), 100.0, valid=valid), {}).gaps
     assert (found.count, found.total, found.longest) == (3, pytest.approx(0.41), pytest.approx(0.3))
     assert str(found) == "3 gaps, 0.41 s in all, 0.3 s the longest"
 

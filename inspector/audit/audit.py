@@ -99,7 +99,8 @@ def observable_classes(
         return _none_of(classes, reason, min(rates, default=None))
     profile = chosen.profile
     labels = [label for label in chosen.classes if label != "ok"]
-    if not has_frame(valid, profile.duration * logged):
+    gaps = np.flatnonzero(np.concatenate(([True], ~valid, [True])))
+    if np.diff(gaps).max() - 1 < profile.duration * logged * (1 - 1e-3):
         return _none_of(labels, f"no stretch of {profile.duration:g} s without a gap")
     general = isinstance(library[name], nc.General)
     return tuple(
@@ -113,12 +114,6 @@ def _none_of(
     """Say of all classes that they cannot be observed, why, and which rate it takes, in [Hz]."""
     cannot_tell = Observability.CANNOT_TELL
     return tuple(ClassObservability(each, cannot_tell, 0.0, 0.0, needed, reason) for each in labels)
-
-
-def has_frame(valid: Mask, length: float) -> bool:
-    """Whether a stretch without a gap is as long as a frame."""
-    gaps = np.flatnonzero(np.concatenate(([True], ~valid, [True])))
-    return bool((np.diff(gaps) - 1).max() >= length * (1 - 1e-3))
 
 
 def _observability(
@@ -226,6 +221,8 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
     check_joints(run.desired_joint_names, run.robot)
     part = excerpt(run)
     reach = bandwidth(part)
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], run.mask, [True]))))
+    lengths = np.diff(edges)[::2] / run.rate  # of its gaps
     jitter, noted = None, run.meta.get("jitter")
     match [noted.get(key) for key in ("rms", "max")] if isinstance(noted, Mapping) else []:
         case [float(rms), float(largest)]:
@@ -235,7 +232,7 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
         duration=run.duration,
         joints=len(run.joint_names),
         jitter=jitter,
-        gaps=gaps_of(run),
+        gaps=Gaps(len(lengths), float(lengths.sum()), float(lengths.max(initial=0.0))),
         bandwidth=reach,
         warnings=(*_warnings(part, reach), *limit_warnings(run)),
         notes=tuple(_notes(part, reach)),
@@ -291,15 +288,6 @@ def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
             f"above {plain(reach.quiet_from)} Hz the level is below any encoder's noise: filtered"
             " or simulated"
         )
-
-
-def gaps_of(run: Run) -> Gaps:
-    """Count the stretches that a run marks as not valid."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([True], run.mask, [True]))))
-    lengths = np.diff(edges)[::2] / run.rate
-    if not len(lengths):
-        return Gaps()
-    return Gaps(len(lengths), float(lengths.sum()), float(lengths.max()))
 
 
 LONGEST = 60_000  # samples of an excerpt: a minute at 1 kHz

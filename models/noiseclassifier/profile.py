@@ -367,11 +367,20 @@ class LogBands:
         Raises:
             ProfileError: If fewer than ``FEWEST`` bands lie below half the rate.
         """
-        edges, quick = self._edges(rate / 2), self._quick_edges(rate / 2)
+        nyquist = rate / 2
+        highest, edges, quick = min(self.highest, nyquist), [self.lowest], []
+        while (upper := self._upper(edges[-1])) <= highest:
+            edges.append(upper)
+        if self.quick and nyquist * self.quick >= SPEED:  # else its first band does not fit
+            quick = [0.0, SPEED / self.quick] if self.speed else [SPEED / self.quick]
+            while (upper := quick[-1] * WIDE) <= highest:
+                quick.append(upper)
+        if len(quick) < 2:  # no band fits
+            quick = []
         if len(edges) <= FEWEST:
             least = self._upper(self._upper(self.lowest))  # of the second band
             raise ProfileError(
-                f"a rate of {rate:g} Hz leaves {len(edges) - 1} bands up to {rate / 2:g} Hz,"
+                f"a rate of {rate:g} Hz leaves {len(edges) - 1} bands up to {nyquist:g} Hz,"
                 f" expected {FEWEST} or more: take a rate of {ceil(2 * least)} Hz at least"
             )
         shared = {field.name for field in fields(Profile)} & {field.name for field in fields(self)}
@@ -385,10 +394,10 @@ class LogBands:
             window=ceil(self.window * rate - 1e-6),
             stride=round(self.stride * rate),
             bands="log",
-            edges=edges,
+            edges=tuple(edges),
             quick_window=round(self.quick * rate) if quick else 0,
             quick_stride=round(self.quick_stride * rate) if quick else 0,
-            quick_edges=quick,
+            quick_edges=tuple(quick),
             kernel="rbf",
             # Two frames' n standardised features differ by 2 n in squares, whatever the rate.
             gamma=self.softness / (len(STATISTICS) * (len(edges) - 1)),
@@ -453,22 +462,6 @@ class LogBands:
         """Upper edge of the band from an edge on: as wide as the window resolves, or wider."""
         ratio: float = 2.0 ** (1.0 / self.per_octave)
         return max(edge + 1.0 / self.window, edge * ratio)
-
-    def _edges(self, nyquist: float) -> tuple[float, ...]:
-        """Edges up to the Nyquist frequency."""
-        edges = [self.lowest]
-        while (upper := self._upper(edges[-1])) <= min(self.highest, nyquist):
-            edges.append(upper)
-        return tuple(edges)
-
-    def _quick_edges(self, nyquist: float) -> tuple[float, ...]:
-        """Edges of the bands of the quick window, none if not even the first one fits."""
-        if not self.quick or nyquist * self.quick < SPEED:
-            return ()
-        edges = [0.0, SPEED / self.quick] if self.speed else [SPEED / self.quick]
-        while (upper := edges[-1] * WIDE) <= min(self.highest, nyquist):
-            edges.append(upper)
-        return tuple(edges) if len(edges) > 1 else ()
 
 
 # For any rate and whatever signals there are; features relative to a reference beside.

@@ -63,16 +63,12 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
             raise MissingSignalError(lacking, there)
         there = {**there, NOISE: np.hypot(there["measured"], there["desired"])}
     chosen = [np.asarray(there[name]) for name in names]
-    if not _fit(names, chosen):
-        found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
-        joints = ", and (joints, samples) joint by joint" * any(map(by_joint, names))
-        raise SignalError(f"a signal has another shape, {found}, expected (samples,){joints}")
-    return chosen[0] if len(chosen) == 1 else np.vstack(chosen)
-
-
-def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
-    """Whether all norms have one shape, and all that goes joint by joint has another one."""
+    # All norms have one shape, and all that goes joint by joint has another one.
     count, joints = chosen[0].shape[-1:], chosen[-1].shape[:-1]
     wanted = [joints + count if by_joint(name) else count for name in names]
-    alike = [each.shape for each in chosen] == wanted
-    return alike and len(count) == 1 and len(joints) == by_joint(names[-1]) and 0 not in joints
+    alike = [each.shape for each in chosen] == wanted and len(count) == 1
+    if not alike or len(joints) != by_joint(names[-1]) or 0 in joints:
+        found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
+        more = ", and (joints, samples) joint by joint" * any(map(by_joint, names))
+        raise SignalError(f"a signal has another shape, {found}, expected (samples,){more}")
+    return chosen[0] if len(chosen) == 1 else np.vstack(chosen)
