@@ -105,6 +105,10 @@ def test_all_labels_that_a_run_accepts_can_be_written(folder):
         run_with(Block(-0.0101, 5.0, "ok"))
 
 
+def toml(ranges, labels):
+    return f"[data]\nchunk_ranges = {ranges}\nchunk_labels = {labels}\n"
+
+
 TIME = np.arange(1000) / 100
 RUN = Run(time=TIME, velocity=np.zeros((1000, 1)), joint_names=("elbow",))
 
@@ -122,25 +126,13 @@ def reading(tmp_path, name, content):
         ("l.txt", "0\t1\tok\n\n2,5\t3\tok\n", r"line 3: '2,5' is not a time in seconds"),
         ("l.txt", "nan\t1\tok\n", "line 1: 'nan' is not a time"),
         ("l.txt", "0\tinf\tok\n", "line 1: 'inf' is not a time"),
-        (
-            "l.txt",
-            "3\t2\tok\n",
-            "line 1: 'ok' from 3 s to 2 s is empty, or lies outside of the run",
-        ),
+        ("l.txt", "3\t2\tok\n", "line 1: 'ok' from 3 s to 2 s is empty, or lies outside of"),
         ("l.txt", "3\t3\tclick\n", "line 1: 'click' from 3 s to 3 s is empty, or lies"),
         ("l.txt", "3\t4\t\n", "line 1: '' is empty or cannot be printed"),
         ("l.txt", "3\t4\ta\tb\n", r"line 1: 'a\\tb' is empty or cannot be printed"),
-        (
-            "l.txt",
-            "3\t12\tok\n",
-            "line 1: 'ok' from 3 s to 12 s is .* outside of the run, -0.01 s to 10.01 s",
-        ),
+        ("l.txt", "3\t12\tok\n", "line 1: 'ok' from 3 s to 12 s .* the run, -0.01 s to 10.01 s"),
         ("l.txt", "-1\t2\tok\n", "line 1: 'ok' from -1 s to 2 s is .* outside of the run"),
-        (
-            "l.txt",
-            "3\t5\tb\n1\t4\ta\n",
-            "line 1: blocks overlap: 'b' starts at 3 s, before 'a' stops at 4 s",
-        ),
+        ("l.txt", "3\t5\tb\n1\t4\ta\n", "line 1: blocks overlap: 'b' starts at 3 s, before 'a'"),
         ("l.txt", b"\xff\xfe\x00", "not text in UTF-8"),
         ("l.csv", "", "line 1: there is no column 'start'; expected start, stop, label"),
         ("l.csv", "start,end,label\n", "line 1: there is no column 'stop'"),
@@ -150,37 +142,17 @@ def reading(tmp_path, name, content):
         (
             "l.csv",
             "start,stop,label\n1,2,a\n1.5,3,b\n",
-            "line 3: blocks overlap: 'b' starts at 1.5 s, before 'a'",
+            "line 3: .* overlap: 'b' .* before 'a'",
         ),
         ("l.toml", "[data\n", r"not TOML \(.*line 1"),
         ("l.toml", "", "lacks chunk_ranges and chunk_labels, lists"),
         ("l.toml", "data = 3\n", "lacks chunk_ranges and"),
-        ("l.toml", "[data]\nchunk_ranges = 3\nchunk_labels = []\n", "lacks chunk_ranges and"),
-        (
-            "l.toml",
-            '[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = ["ok", "ok"]\n',
-            "lacks chunk_ranges and",
-        ),
-        (
-            "l.toml",
-            '[data]\nchunk_ranges = [[0, 1], [2]]\nchunk_labels = ["ok", "ok"]\n',
-            r"chunk 2: \[2\] with label 'ok', expected \[start, stop\]",
-        ),
-        (
-            "l.toml",
-            f'[data]\nchunk_ranges = [[0, {10**400}]]\nchunk_labels = ["ok"]\n',
-            "not TOML .an integer of more than 20 digits",
-        ),
-        (
-            "l.toml",
-            '[data]\nchunk_ranges = [[nan, true]]\nchunk_labels = ["ok"]\n',
-            "chunk 1: .* expected",
-        ),
-        (
-            "l.toml",
-            '[data]\nchunk_ranges = [[0, 5], [4, -1]]\nchunk_labels = ["ok", "impact"]\n',
-            "chunk 2: blocks overlap: 'impact' starts at 4 s, before 'ok' stops at 5 s",
-        ),
+        ("l.toml", toml(3, "[]"), "lacks chunk_ranges and"),
+        ("l.toml", toml([[0, 1]], ["ok", "ok"]), "lacks chunk_ranges and"),
+        ("l.toml", toml([[0, 1], [2]], ["ok", "ok"]), r"chunk 2: \[2\] with label 'ok', expected"),
+        ("l.toml", toml([[0, 10**400]], ["ok"]), "not TOML .an integer of more than 20 digits"),
+        ("l.toml", toml("[[nan, true]]", ["ok"]), "chunk 1: .* expected"),
+        ("l.toml", toml([[0, 5], [4, -1]], ["ok", "impact"]), "chunk 2: .* 'ok' stops at 5 s"),
     ],
 )
 def test_damaged_labels_are_refused_with_their_place(tmp_path, name, content, message):

@@ -64,7 +64,6 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60, help="random files per reader")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="folder for the files that were not handled")
-    parser.add_argument("--json", type=Path, help="file for all results, one line of JSON each")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     _imported()
@@ -76,8 +75,6 @@ def main() -> None:
                 found.append(result)
                 if result.outcome != "handled":
                     print(json.dumps(asdict(result)), file=sys.stderr, flush=True)
-    if options.json:
-        options.json.write_text("".join(json.dumps(asdict(each)) + "\n" for each in found))
     print(table(found))
     sys.exit(any(each.outcome != "handled" for each in found))
 
@@ -92,17 +89,7 @@ def table(found: list[Result]) -> str:
     for name, count in counts.items():
         if count:
             rows.append((name, str(count.total()), *(str(count[each]) for each in OUTCOMES)))
-    lines = ["| " + " | ".join(row) + " |" for row in rows]
-    slowest = max(found, key=lambda each: each.seconds)
-    largest = max(found, key=lambda each: each.megabytes)
-    return "\n".join(
-        [
-            *lines,
-            "",
-            f"Slowest: {slowest.seconds:.1f} s ({slowest.reader}, {slowest.case}); most memory:"
-            f" {largest.megabytes:.0f} MB ({largest.reader}, {largest.case}).",
-        ]
-    )
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
 def results(

@@ -121,13 +121,9 @@ def _check(paths: list[Path], target: Path, asked: Request) -> None:
     suffix, several = target.suffix.lower(), len(paths) > 1
     if suffix not in SUFFIXES:
         raise typer.BadParameter(f"{target}: name a .rrd, .png or .html file", param_hint="'-o'")
-    of_one = {
-        "--reference": asked.reference is not None,
-        suffix: suffix in (".png", ".html"),
-    }
-    for name, given in of_one.items():
-        if given and several:
-            raise typer.BadParameter(f"{name} takes one run")
+    of_one = "--reference" if asked.reference else suffix if suffix in (".png", ".html") else ""
+    if of_one and several:
+        raise typer.BadParameter(f"{of_one} takes one run")
     if asked.align and (not several or (asked.align == "auto" and len(paths) > 2)):
         raise typer.BadParameter("--align takes two runs or more, --align auto two")
     if suffix != ".png" and asked.at is not None:
