@@ -376,14 +376,7 @@ def test_joints_are_named_by_the_robot_if_they_are_all_there(tmp_path, library):
     joints = nm.Robot.load("panda").joint_names
     signals = motion(0.2, len(joints))
     path, _, _ = shown(tmp_path, signals, robot="panda", library=library)
-    styles = RrdReader(path).store().stream().filter(content="/joints/velocity/0")
-    names = [
-        name
-        for chunk in styles
-        for batch in [chunk.to_record_batch()]
-        if "SeriesLines:names" in batch.schema.names
-        for name in batch.column("SeriesLines:names").to_pylist()[0]
-    ]
+    _, (names,) = read(path, "/joints/velocity/0", "SeriesLines:names")
     assert tuple(names) == joints[:8]
     with (
         pytest.raises(

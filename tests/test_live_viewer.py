@@ -1,4 +1,4 @@
-import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -28,7 +28,14 @@ def test_a_viewer_follows_a_session_and_reports_no_error(monkeypatch):
             for first in range(0, 3000, 50):
                 piece = slice(first, first + 50)
                 session.push(time=time_[piece], velocity=swing[piece], position=swing[piece])
-        state = until(client, lambda state: any(recording_end(state) > 2.9) and following(state))
+
+        def caught_up():
+            with suppress(Exception):  # it responds late under load
+                state = client.get_state()
+                return any(recording_end(state) > 2.9) and following(state)
+
+        viewer.until(caught_up, 300.0, 0.3)
+        state = client.get_state()
         views = picture.final_state(client).views
         errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
     assert session.summary.warnings == {}
@@ -47,17 +54,3 @@ def recording_end(state):
 
 def following(state):
     return all(each.current_time / 1e9 > 2.9 for each in state.recordings)
-
-
-def until(client, holds, timeout=300.0):
-    """Ask for the viewer's state until something holds; it responds late under load."""
-    limit = time.monotonic() + timeout
-    while True:
-        try:
-            state = client.get_state()
-            if holds(state) or time.monotonic() > limit:
-                return state
-        except Exception:
-            if time.monotonic() > limit:
-                raise
-        time.sleep(0.3)

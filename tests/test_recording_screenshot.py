@@ -33,13 +33,12 @@ def test_a_viewer_that_ends_is_one_line(monkeypatch):
         pass
 
 
-@pytest.mark.parametrize("name", ["gone.npz", "gone.rrd"])
-def test_what_cannot_be_shot_is_one_line(name, tmp_path, monkeypatch):
+def test_what_cannot_be_shot_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr(viewer, "require_driver", lambda: None)
     monkeypatch.chdir(tmp_path)
-    status, _, err = call("view", name, "-o", "out.png")
+    status, _, err = call("view", "gone.npz", "-o", "out.png")
     assert (status, err.count("\n")) == (3, 1)
-    assert f"{name}: cannot be read" in err
+    assert "gone.npz: cannot be read" in err
     assert not list(tmp_path.iterdir())
 
 

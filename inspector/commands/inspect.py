@@ -41,7 +41,7 @@ SUFFIXES = ("", ".rrd", ".png", ".html")  # of what is written; without a suffix
 
 Shown = Annotated[
     list[Path] | None,
-    argument("Runs, logs, or a recording (.rrd) for a picture; else the demo."),
+    argument("Run files or logs; else the demo."),
 ]
 Target = Annotated[
     Path | None, option("Write a recording .rrd, a picture .png or a .html.", "--output", "-o")
@@ -136,20 +136,15 @@ def _picture(run: Path, output: Path, request: Request) -> None:
     from inspector.recording.run import write
 
     viewer.require_driver()
-    at = request.at
+    source, at = opened(run, request.reading), request.at
+    first, last = (float(source.run.time[place]) for place in (0, -1))
+    if at is not None and not first <= at <= last:
+        raise typer.BadParameter(f"--at {at:g}: the run lasts from {first:.2f} s to {last:.2f} s")
+    found, _, beside = _analysed(source, request)
+    seconds = sonification.worst_time(found) if at is None else at
     with TemporaryDirectory() as folder:
-        recording, seconds = run, at or 0.0
-        if run.suffix != ".rrd":
-            source = opened(run, request.reading)
-            first, last = (float(source.run.time[place]) for place in (0, -1))
-            if at is not None and not first <= at <= last:
-                raise typer.BadParameter(
-                    f"--at {at:g}: the run lasts from {first:.2f} s to {last:.2f} s"
-                )
-            found, _, beside = _analysed(source, request)
-            recording = Path(folder) / "run.rrd"
-            seconds = sonification.worst_time(found) if at is None else at
-            write(found, recording, beside=beside)
+        recording = Path(folder) / "run.rrd"
+        write(found, recording, beside=beside)
         viewer.shoot(recording, output, seconds, overwrite=request.overwrite)
     typer.echo(f"{output}: {run} at {seconds:.2f} s")
 

@@ -311,7 +311,6 @@ def free_port(wanted: int = 0, *, other: int = 0) -> int:
 
 DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 WINDOW = (1440, 900)  # of the picture, in points; beyond, a software driver takes minutes
-MAGIC = b"RRF2"  # what rerun's recordings begin with
 TIMEOUT = 120.0  # how long the viewer may take to draw everything, in [s]
 
 
@@ -339,23 +338,11 @@ def shoot(
 ) -> None:
     """Take a picture of a recording at a time, in [s]."""
     require_driver()
-    check_recording(recording)
     refuse_existing(output, overwrite=overwrite)
     with headless_viewer(size) as client:
         png = picture(client, recording, seconds)
     with replacing(output, overwrite=overwrite) as temporary:
         temporary.write_bytes(png)
-
-
-def check_recording(path: Path) -> None:
-    """Refuse a file that is no recording: the viewer would draw a picture of its welcome."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(len(MAGIC))
-    except OSError as error:
-        raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
-    if head != MAGIC:
-        raise InspectorError(f"{path}: not a recording; name an .rrd file, or a run file (.npz)")
 
 
 @contextmanager
