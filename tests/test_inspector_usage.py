@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 import noisemodel
 from inspector import cli
 from inspector.cli import app
-from inspector.commands.shared import Geometries, Kinds, say_assumed
-from noisemodel import surface
+from inspector.commands.shared import Kinds, say_assumed
 
 
 def test_the_version_is_that_of_the_distribution_and_0_without_one(monkeypatch):
@@ -30,14 +29,11 @@ def test_the_version_is_that_of_the_distribution_and_0_without_one(monkeypatch):
         assert (result.exit_code, result.output) == (0, f"inspector {shown}\n")
 
 
-def test_kinds_and_geometries_are_those_of_the_noise_model():
+def test_kinds_are_those_of_the_noise_model():
     assert set(get_args(Kinds)) == set(noisemodel.KINDS)
-    assert set(get_args(Geometries)) == set(surface.GEOMETRIES)
 
 
-@pytest.mark.parametrize(
-    "command", [["classify", "run.npz", "--format"], ["view", "--kind"], ["noise", "--geometry"]]
-)
+@pytest.mark.parametrize("command", [["classify", "run.npz", "--format"], ["view", "--kind"]])
 def test_a_choice_that_does_not_exist_is_answered_with_those_that_do(command):
     result = CliRunner().invoke(app, [*command, "xml"], env={"COLUMNS": "300"})
     assert result.exit_code == 2

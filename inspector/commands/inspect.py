@@ -264,8 +264,6 @@ Kinds = Annotated[
 Csv = Annotated[Path | None, option("Write the noise over time, or all numbers.")]
 Compare = Annotated[bool, option("Compare noise models on run files with positions.", "--compare")]
 Robots = Annotated[str, option("Compare them on robots that move: talos,go2 or all.")]
-Geometry = Annotated[shared.Geometries, option("Shapes of the links to compare them with.")]
-Seed = Annotated[int, option("Random seed of the generated motion.", min=0)]
 
 
 def noise(
@@ -275,8 +273,6 @@ def noise(
     csv: Csv = None,
     compare: Compare = False,
     robots: Robots = "",
-    geometry: Geometry = "auto",
-    seed: Seed = 0,
     jobs: shared.NumberOfJobs = 1,
     overwrite: shared.Overwrite = False,
 ) -> None:
@@ -301,8 +297,6 @@ def noise(
     found = nm.compare(
         sources,
         kinds=kinds or COMPARED,
-        surface=geometry,
-        seed=seed,
         jobs=jobs,
         progress=partial(progress, what="compare"),
     )

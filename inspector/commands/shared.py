@@ -21,7 +21,6 @@ Result = TypeVar("Result")
 
 # Names that the modules have as well, which would take too long to import here.
 Kinds = Literal["normal", "rms", "mean", "paper", "A", "B", "C"]
-Geometries = Literal["visual", "collision", "hull", "auto"]
 LIMITS = ("joints", "columns", "triangles", "bodies")
 
 ASSUMED = 100  # most characters of what was assumed of a log, unless all is asked for
