@@ -444,14 +444,11 @@ def load(path: str | Path) -> Model:
     Raises:
         FileError: If the file is missing, damaged, no model file, or of another version.
     """
-    manifest, arrays = modelfile.read(path)
+    manifest, arrays, profile, recipe = modelfile.read(path)
     classes, mean, scale = tuple(manifest["classes"]), arrays["mean"], arrays["scale"]
     known = *(manifest[name] for name in ("runs", "metrics", "versions")), modelfile.digest(path)
-    if "recipe" in manifest:
-        recipe = LogBands.of(manifest["recipe"])
-        trees = Detector.of(arrays, recipe.bound(HIGHEST))
-        return General(recipe, classes, trees, mean, scale, *known)
-    profile = Profile.of(manifest["profile"])
+    if recipe is not None:
+        return General(recipe, classes, Detector.of(arrays, profile), mean, scale, *known)
     estimator = ESTIMATORS[profile.estimator].of(arrays, profile)
     return Classifier(profile, classes, estimator, mean, scale, *known)
 

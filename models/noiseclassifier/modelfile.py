@@ -111,8 +111,13 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
             temporary.unlink(missing_ok=True)
 
 
-def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Manifest and arrays of a model file, which are finite and of the shapes that it asks for."""
+def read(
+    path: str | Path,
+) -> tuple[dict[str, Any], dict[str, Array], Profile, LogBands | None]:
+    """Manifest and finite arrays of a model file, with its profile and recipe, that they fit.
+
+    The recipe is None in a model of one rate.
+    """
     try:
         if not stat.S_ISREG(Path(path).stat().st_mode) and not Path(path).is_dir():
             raise FileError(path, "is no regular file")
@@ -130,8 +135,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
     for name, array in members.items():
         if not np.isfinite(array).all():
             raise FileError(path, f"array {name!r} holds values that are not finite")
-    check(path, manifest, members)
-    return manifest, members
+    return manifest, members, *check(path, manifest, members)
 
 
 def digest(path: str | Path) -> str:
@@ -230,12 +234,15 @@ _JSON_TYPES = {
 }
 
 
-def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
-    """Check a manifest, and the arrays against it."""
+def check(
+    path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Array]
+) -> tuple[Profile, LogBands | None]:
+    """Profile and recipe of a manifest, once it and the arrays are checked."""
     for name, kind in _JSON_TYPES.items():
         if not isinstance(manifest.get(name), kind):
             value = str(manifest.get(name))[:80]
             raise FileError(path, f"manifest has {name} = {value}, expected a {kind.__name__}")
+    recipe = None
     try:
         profile = Profile.of(manifest["profile"])
         count = feature_count(profile)
@@ -259,6 +266,7 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
             path, f"rate is {manifest['rate']} Hz, but {profile.rate} Hz in its profile"
         )
     _check_arrays(path, profile, count, len(classes), arrays)
+    return profile, recipe
 
 
 def _check_arrays(
