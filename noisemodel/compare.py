@@ -509,7 +509,7 @@ def compare(
             the `excitation`; or a ``Run``, or the path of a run file (a ``Path``, or text that ends
             in ``.npz``), for the robot that it names and the longest stretch without a gap.
         kinds: "simplified", or kinds of ``extended``.
-        surface: The geometry that surfaces are taken from: "visual", "collision", "hull" or "auto".
+        surface: The geometry that surfaces are taken from: "visual", "collision" or "auto".
         seed: Random seed of the excitation.
         jobs: How many robots to compare at once, or the address of a Dask scheduler.
         progress: Takes an iterable and its length ``total``, and yields the items, as ``tqdm``.

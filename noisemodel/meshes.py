@@ -39,16 +39,17 @@ def read(path: Path) -> Array:
 
     They are in the file's own numbers: its unit and its upward axis are ignored.
     """
-    data = _content(path)
-    if path.suffix.lower() == ".stl":  # as fast as what would be kept of it
+    data, kind = _content(path), path.suffix.lower()
+    if kind == ".stl":  # as fast as what would be kept of it
         points, faces = _parsed(path, data)
         return points[faces]
-    return _kept("mesh", path, data, lambda: _parsed(path, data))
 
+    def arrays() -> Arrays:
+        points, faces = _parsed(path, data)
+        return {"points": points, "faces": faces.astype(np.int32)}
 
-def hull(path: Path) -> Array:
-    """Wrap a mesh in its convex hull, shape (triangles, 3 corners, 3)."""
-    return _kept("hull", path, _content(path), lambda: _wrapped(path, read(path)))
+    kept = cached(f"mesh-{VERSION}-{kind[1:]}-{hashlib.sha256(data).hexdigest()}", arrays)
+    return np.asarray(kept["points"][kept["faces"]])
 
 
 def check_whole(path: Path) -> None:
@@ -89,17 +90,6 @@ def _content(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _kept(what: str, path: Path, data: bytes, make: Callable[[], Mesh]) -> Array:
-    content = hashlib.sha256(data).hexdigest()
-
-    def arrays() -> Arrays:
-        points, faces = make()
-        return {"points": points, "faces": faces.astype(np.int32)}
-
-    kept = cached(f"{what}-{VERSION}-{path.suffix.lower()[1:]}-{content}", arrays)
-    return np.asarray(kept["points"][kept["faces"]])
-
-
 def _parsed(path: Path, data: bytes) -> Mesh:
     try:
         points, faces = READERS[path.suffix.lower()](data)
@@ -113,18 +103,6 @@ def _parsed(path: Path, data: bytes) -> Mesh:
     if not np.isfinite(points[faces]).all():
         raise MeshError(path, "has corners that are not finite (NaN or infinity)")
     return points, faces
-
-
-def _wrapped(path: Path, triangles: Array) -> Mesh:
-    from scipy.spatial import ConvexHull, QhullError
-
-    points = triangles.reshape(-1, 3)
-    try:
-        corners = ConvexHull(points).simplices
-    except QhullError as error:
-        raise MeshError(path, "is flat, it has no convex hull") from error
-    used, faces = np.unique(corners, return_inverse=True)
-    return points[used], faces.reshape(-1, 3)
 
 
 def _fans(counts: Indices) -> Indices:

@@ -21,7 +21,6 @@ GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "visual": ("visual",),
         "collision": ("collision",),
-        "hull": ("visual",),
         "auto": ("visual", "collision"),
     }
 )
@@ -66,9 +65,8 @@ def pieces(
         has it; and its triangles in the joint's axes, shape (triangles, 3 corners, 3), in [m].
     """
     places, names = _links(robot)
-    read = meshes.hull if geometry == "hull" else meshes.read
     mesh = cache(  # left and right often share one
-        lambda address: read(find_mesh(address, robot.path, robot.package_roots))
+        lambda address: meshes.read(find_mesh(address, robot.path, robot.package_roots))
     )
     waiting = set(range(0 if world else 1, len(names) + 1))
     count = 0
@@ -389,8 +387,8 @@ class Surface:
     def of(cls, robot: Robot, geometry: str = "visual") -> Self:
         """Integrate over the links of a robot; what takes long is kept for the next time.
 
-        ``geometry`` is "visual", "collision", "hull" (of each visual), or "auto": the visual, or
-        else the collision. A shape or mesh that cannot be read is a GeometryError.
+        ``geometry`` is "visual", "collision", or "auto": the visual, or else the collision. A shape
+        or mesh that cannot be read is a GeometryError.
         """
         axes = [joint.turning_axis for joint in robot.joints]
         links = tuple(map(LinkSurface.of, triangles(robot, geometry), axes))

@@ -184,14 +184,6 @@ def test_a_pentagon_has_the_same_area_however_it_is_cut(tmp_path, part):
     assert area(triangles) == 5.0
 
 
-def test_the_hull_of_a_dented_brick_is_the_brick(tmp_path):
-    dent = np.array([[[-0.5, 0, 1.5], [0.5, 0, 1.5], [0, 0, 0]]])
-    (tmp_path / "dented.stl").write_bytes(stl(np.concatenate((BRICK, dent))))
-    hull = meshes.hull(tmp_path / "dented.stl")
-    assert area(meshes.read(tmp_path / "dented.stl")) == 22.75
-    assert np.isclose(area(hull), 22.0, rtol=1e-12)
-
-
 ASCII = ascii_stl(BRICK)
 NEGATIVE = "<vcount>4 -1</vcount><p>9 0 9 1 9 2</p>"
 BAD_NODE = '<node id="n"><instance_node url="#n"/></node>'
@@ -266,12 +258,9 @@ def test_a_file_that_is_no_mesh_is_named_in_one_line(tmp_path, cache, name, cont
     assert not list(cache.glob("*"))
 
 
-def test_a_file_that_cannot_be_opened_is_named_and_a_flat_mesh_has_no_hull(tmp_path):
+def test_a_file_that_cannot_be_opened_is_named(tmp_path):
     with pytest.raises(MeshError, match=r"gone.stl: cannot be read \(No such file or directory\)"):
         meshes.read(tmp_path / "gone.stl")
-    (tmp_path / "flat.stl").write_bytes(stl(BRICK[:2]))
-    with pytest.raises(MeshError, match="flat.stl: is flat, it has no convex hull"):
-        meshes.hull(tmp_path / "flat.stl")
 
 
 def test_a_dae_is_turned_as_scipy_turns_it(tmp_path):

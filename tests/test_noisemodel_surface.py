@@ -95,17 +95,6 @@ def test_what_is_fixed_to_a_link_belongs_to_it_and_links_without_geometry_have_n
     assert corners(links[0]) == tool | corners(urdf.box(1, 2, 3))
 
 
-def test_a_mesh_is_drawn_as_it_is_and_not_as_its_hull(tmp_path):
-    outer = np.array([[[0, 0, 0], [9, 0, 0], [0, 9, 0]], [[0, 0, 0], [9, 0, 0], [0, 0, 9]]])
-    inner = np.array([[[1, 1, 1], [2, 1, 1], [1, 2, 1]]])
-    mesh = mesh_of(np.concatenate((outer, inner)), tmp_path)
-    built = robot(tmp_path, arm=visual(MESH.format(mesh, "")))
-    ((_, _, drawn),) = pieces(built)
-    assert {(1.0, 1.0, 1.0), (2.0, 1.0, 1.0), (1.0, 2.0, 1.0)} <= corners(drawn)
-    hull = triangles(built, "hull")[0]
-    assert corners(hull) == corners(outer)
-
-
 @pytest.mark.parametrize(
     ("scale", "expected"),
     [
@@ -122,7 +111,7 @@ def test_scales_stretch_and_mirror_a_mesh(tmp_path, scale, expected):
     assert np.isclose(area(links[0]), expected, rtol=1e-14)
 
 
-def test_visual_collision_hull_and_auto_take_their_own_geometry(tmp_path):
+def test_visual_collision_and_auto_take_their_own_geometry(tmp_path):
     open_box = mesh_of(urdf.box(1, 2, 3)[:10], tmp_path)  # without its upper side
     built = robot(
         tmp_path,
@@ -133,7 +122,6 @@ def test_visual_collision_hull_and_auto_take_their_own_geometry(tmp_path):
     for geometry, expected in (
         ("visual", [20.0, 0.0]),
         ("collision", [6.0, ball]),
-        ("hull", [22.0, 0.0]),
         ("auto", [20.0, ball]),
     ):
         links = triangles(built, geometry)
@@ -197,17 +185,17 @@ def test_what_is_fixed_to_the_world_is_a_piece_and_collision_fills_in(tmp_path):
     ]
 
 
-# Area of the visuals, their hulls and the collision shapes, base included, by another reader.
+# Area of the visuals and the collision shapes, base included, by another reader.
 AREAS = {
-    "talos": (8.115, 4.594, 4.620),
-    "anymal": (4.571, 2.115, 2.733),
-    "go2": (1.346, 0.869, 0.766),
-    "baxter": (8.765, 7.139, 7.211),
-    "hextilt": (0.735, 1.374, 0.735),
-    "panda": (0.922, 0.847, 0.847),
-    "ur5": (0.735, 0.648, 0.733),
-    "simple_humanoid": (0.0, 0.0, 18.554),
-    "human": (2.299, 2.238, 0.0),
+    "talos": (8.115, 4.620),
+    "anymal": (4.571, 2.733),
+    "go2": (1.346, 0.766),
+    "baxter": (8.765, 7.211),
+    "hextilt": (0.735, 0.735),
+    "panda": (0.922, 0.847),
+    "ur5": (0.735, 0.733),
+    "simple_humanoid": (0.0, 18.554),
+    "human": (2.299, 0.0),
 }
 
 
@@ -215,7 +203,7 @@ AREAS = {
 @pytest.mark.parametrize("name", AREAS)
 def test_areas_of_known_robots(name):
     built = Robot.load(name, floating_base=True)
-    found = [sum(areas(triangles(built, kind))) for kind in ("visual", "hull", "collision")]
+    found = [sum(areas(triangles(built, kind))) for kind in ("visual", "collision")]
     assert np.allclose(found, AREAS[name], rtol=0, atol=5.1e-4)
 
 
@@ -243,7 +231,7 @@ def test_a_mesh_that_is_missing_is_named():
 
 
 def test_an_unknown_geometry_is_named(tmp_path):
-    message = "geometry 'visuals' is not known, expected one of visual, collision, hull"
+    message = "geometry 'visuals' is not known, expected one of visual, collision, auto"
     with pytest.raises(GeometryError, match=message):
         triangles(robot(tmp_path), "visuals")
 

@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from functools import cache
@@ -371,8 +370,6 @@ def _read_robot(path: Path) -> None:
 
 def _read_mesh(path: Path) -> None:
     meshes.read(path)
-    with suppress(nm.MeshError):
-        meshes.hull(path)
 
 
 def _read_rows(path: Path) -> None:
