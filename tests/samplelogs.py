@@ -25,27 +25,14 @@ def motion(time, joints=3, seed=0):
     return (size * np.sin(angle)).sum(axis=1), (slope * np.cos(angle)).sum(axis=1)
 
 
-def types(*, ros1=False):
-    """All message types, ROS 2 Humble's or ROS 1 Noetic's, with a controller's state."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-    point = "trajectory_msgs/JointTrajectoryPoint"
-    head = "std_msgs/Header header\nstring[] joint_names\n"
-    for name, stages in (
-        ("JointTrajectoryControllerState", ("desired", "actual", "error")),
-        ("New", ("reference", "feedback", "error", "output")),
-    ):
-        text = head + "\n".join(f"{point} {stage}" for stage in stages)
-        store.register(get_types_from_msg(text, f"control_msgs/msg/{name}"))
-    return store
-
-
 class Talk:
     """Makes messages by name, and serialises them as one generation of ROS does it."""
 
     def __init__(self, *, ros1=False):
-        self.store, self.ros1 = types(ros1=ros1), ros1
+        from rosbags.typesys import Stores, get_typestore
+
+        self.store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+        self.ros1 = ros1
 
     def make(self, kind, /, **parts):
         package, _, name = kind.partition("/")

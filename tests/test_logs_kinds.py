@@ -151,7 +151,7 @@ def mat(folder, *, struct=False, seven=False):
     from scipy.io import savemat
 
     turned = {name: each.T for name, each in variables.items()}
-    savemat(folder / "log.mat", {"run": turned} if struct else variables)
+    savemat(folder / "log.mat", {"run": turned} if struct else variables, do_compression=struct)
     return folder / "log.mat"
 
 

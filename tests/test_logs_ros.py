@@ -1,7 +1,6 @@
 """ROS bags, written by rosbags."""
 
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.bags import STATE, STATES, Topic, decoder
+from inspector.logs.bags import STATE, STATES
 from noisemodel import Robot
 
 TALK, OLD = Talk(), Talk(ros1=True)
@@ -144,25 +143,41 @@ def test_the_signal_of_a_topic_can_be_mapped(tmp_path):
     assert np.array_equal(run.position, POSITION)
 
 
-def controller_states(talk, kind, stages):
+MEASURED, WANTED = ("feedback", "actual"), ("reference", "desired")
+OLD_STATE = STATES[3]  # the only one of ROS 1
+
+
+def controller_states(talk, version):
+    """Messages of a version of a controller's state, by its definition."""
+    talk.store = get_typestore(Stores.ROS1_NOETIC if talk.ros1 else Stores.ROS2_HUMBLE)
+    talk.store.register(get_types_from_msg(version, STATE))
+    many = talk.store.types["trajectory_msgs/msg/MultiDOFJointTrajectoryPoint"]
     messages = []
     for n, at in enumerate(TIMES):
-        points = {stage: talk.point() for stage in stages}
-        points[stages[0]] = talk.point(VELOCITY[n], POSITION[n])
-        points[stages[1]] = talk.point(POSITION[n], VELOCITY[n], EFFORT[n])
-        header = talk.header(int(at))
-        message = talk.make(
-            f"control_msgs/{kind}", header=header, joint_names=list(JOINTS), **points
-        )
-        messages.append((at, message))
+        others = {
+            "std_msgs/Header": talk.header(int(at)),
+            "string[]": [],
+            "trajectory_msgs/JointTrajectoryPoint": talk.point(),
+            "trajectory_msgs/MultiDOFJointTrajectoryPoint": many([], [], [], talk.duration(0.0)),
+            "float64": 0.5,
+        }
+        known = {
+            "joint_names": list(JOINTS),
+            **dict.fromkeys(MEASURED, talk.point(POSITION[n], VELOCITY[n], EFFORT[n])),
+            **dict.fromkeys(WANTED, talk.point(VELOCITY[n], POSITION[n])),
+        }
+        fields = map(str.split, version.strip().splitlines())
+        parts = {name: known.get(name, others[kind]) for kind, name in fields}
+        messages.append((at, talk.store.types[STATE](**parts)))
     return messages
 
 
-@pytest.mark.parametrize("talk", [TALK, OLD])
-def test_a_controllers_state_holds_measured_and_desired_motion_under_its_old_names(tmp_path, talk):
-    stages = ("desired", "actual", "error")
-    messages = controller_states(talk, "JointTrajectoryControllerState", stages)
-    run = read_log(bag(tmp_path, {"/arm/state": messages}, talk=talk)).run
+@pytest.mark.parametrize(("ros1", "version"), [(True, OLD_STATE), *((False, v) for v in STATES)])
+def test_every_version_of_a_controllers_state_has_measured_and_desired_motion(
+    tmp_path, ros1, version
+):
+    talk = Talk(ros1=ros1)
+    run = read_log(bag(tmp_path, {"/arm/state": controller_states(talk, version)}, talk=talk)).run
     assert np.array_equal(run.position, POSITION)
     assert np.array_equal(run.velocity, VELOCITY)
     assert np.array_equal(run.effort, EFFORT)
@@ -170,30 +185,11 @@ def test_a_controllers_state_holds_measured_and_desired_motion_under_its_old_nam
     assert np.array_equal(run.velocity_desired, POSITION)
 
 
-@pytest.mark.parametrize("version", STATES)
-def test_the_version_of_a_controllers_state_is_told_by_its_messages(version):
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    store.register(get_types_from_msg(version, STATE))
-    many = store.types["trajectory_msgs/msg/MultiDOFJointTrajectoryPoint"]
-    made = {
-        "std_msgs/Header": TALK.header(EPOCH),
-        "string[]": [],
-        "trajectory_msgs/JointTrajectoryPoint": TALK.point(POSITION[0], VELOCITY[0]),
-        "trajectory_msgs/MultiDOFJointTrajectoryPoint": many([], [], [], TALK.duration(0.0)),
-        "float64": 0.5,
-    }
-    parts = {name: made[kind] for kind, name in map(str.split, version.strip().splitlines())}
-    message = store.types[STATE](**parts | {"joint_names": list(JOINTS)})
-    decode = decoder(Path("bag"), Topic("/state", STATE))
-    found = vars(decode(bytes(store.serialize_cdr(message, STATE))))
-    assert {*found} - {"__msgtype__"} == {*parts}
-
-
 def test_joint_states_take_precedence_over_a_controllers_feedback(tmp_path):
-    stages = ("desired", "actual", "error")
-    state = controller_states(TALK, "JointTrajectoryControllerState", stages)
-    own = joint_states(TALK, position=EFFORT, velocity=EFFORT)
-    imported = read_log(bag(tmp_path, {"/joint_states": own, "/arm/state": state}))
+    talk = Talk()
+    state = controller_states(talk, OLD_STATE)
+    own = joint_states(talk, position=EFFORT, velocity=EFFORT)
+    imported = read_log(bag(tmp_path, {"/joint_states": own, "/arm/state": state}, talk=talk))
     assert np.array_equal(imported.run.position, EFFORT)
     assert np.array_equal(imported.run.position_desired, VELOCITY)
     assert any("not read: /arm/state/actual/positions" in each for each in imported.remarks)
