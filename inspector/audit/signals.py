@@ -1,13 +1,13 @@
 """What signals of a log tell about how they were made: rates, filters, steps, units, copies."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from inspector.logs.clocks import hold_length
-from inspector.logs.plausibility import contradictions
+from inspector.logs.plausibility import contradictions, derived
 from noiseclassifier import LogBands
 from noisemodel import Run
 from noisemodel.run import ORDER, WINDOW, stretches
@@ -125,12 +125,6 @@ BACKWARD = Differentiator("difference to the sample before", (-1.0, 1.0))
 FORWARD = Differentiator("difference to the sample after", (-1.0, 1.0))
 CENTRAL = Differentiator("difference of the samples before and after", (-0.5, 0.0, 0.5))
 SMOOTH = Differentiator(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", _savitzky_golay())
-
-
-def derived(run: Run, signal: str) -> bool:
-    """Whether a run's ``meta`` states that a signal was differentiated at import."""
-    differentiated = run.meta.get("differentiated")
-    return isinstance(differentiated, Mapping) and signal in differentiated
 
 
 def differentiator_of(run: Run) -> Differentiator | None:

@@ -162,11 +162,15 @@ WAY = 0.02
 ENOUGH = 5  # fewest stretches
 
 
+def derived(run: Run, signal: str) -> bool:
+    """Whether a run's ``meta`` states that a signal was differentiated at import."""
+    differentiated = run.meta.get("differentiated")
+    return isinstance(differentiated, Mapping) and signal in differentiated
+
+
 def contradictions(run: Run) -> Iterator[str]:
     """Clauses on velocities that are not the slopes of their positions."""
-    differentiated = run.meta.get("differentiated")
-    by_import = isinstance(differentiated, Mapping) and "velocity" in differentiated
-    ways = None if run.position is None or by_import else _ways(run)
+    ways = None if run.position is None or derived(run, "velocity") else _ways(run)
     if ways is None:
         return
     way, summed = ways
