@@ -128,7 +128,38 @@ UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.E
 # --- commands
 
 
-class _Command(TyperCommand):
+class _Plain:
+    """Takes defaults and paths as they are: to check them, typer imports pydantic for 0.1 s."""
+
+    def __init__(self, checked: Callable[[], Any]) -> None:
+        self._checked = checked
+
+    def __call__(self) -> "_Plain":
+        return self
+
+    def coerce(self, value: Any, *, param: Any, ctx: Any) -> Any:
+        many = param.multiple or param.nargs == -1
+        if value is None or value is param.default:
+            return () if value is None and many else value
+        paths = many and param.type_descriptor.annotation == list[Path]
+        if paths and all(isinstance(each, str) and os.access(each, os.R_OK) for each in value):
+            return list(map(Path, value))
+        return self._checked().coerce(value, param=param, ctx=ctx)
+
+
+class _Taking:
+    """A command or group that checks what was typed alone."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        found: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        for each in found:
+            checked = getattr(each, "get_runtime_param", None)  # of typer's latest versions
+            if checked is not None and not isinstance(checked, _Plain):
+                each.get_runtime_param = _Plain(checked)
+        return found
+
+
+class _Command(_Taking, TyperCommand):
     """A command that replaces nothing that it reads; one that opens logs has a Reading (obj)."""
 
     def __init__(self, *args: Any, params: list[Any], help: str, **settings: Any) -> None:  # noqa: A002
@@ -148,6 +179,7 @@ class _Command(TyperCommand):
         """Run the command; no output in `OUTPUTS` may be one of its other files."""
         from noisemodel.files import reading, refuse_read
 
+        _keep_memory()
         files: dict[bool, list[Path]] = {True: [], False: []}
         for name, value in ctx.params.items():
             paths = value if isinstance(value, list) else [value]
@@ -160,6 +192,16 @@ class _Command(TyperCommand):
             for path in files[True]:
                 refuse_read(path)
             return super().invoke(ctx)
+
+
+def _keep_memory() -> None:
+    """Have freed memory wait for the next arrays: to return it and get it anew takes a tenth."""
+    import ctypes
+
+    for number, name, size in ((-3, "MMAP", 2**25), (-1, "TRIM", 2**27)):  # see mallopt(3)
+        os.environ.setdefault(f"MALLOC_{name}_THRESHOLD_", str(size))  # of processes to come
+        with suppress(OSError, AttributeError):  # where the C library is another one
+            ctypes.CDLL(None).mallopt(number, size)
 
 
 def _converted(function: Callable[..., Any], name: str, **settings: Any) -> Any:
@@ -197,7 +239,7 @@ class _Commands(Mapping[str, Any]):
         return len(MODULES)
 
 
-class _Group(TyperGroup):
+class _Group(_Taking, TyperGroup):
     """`inspector` itself: its help imports no command."""
 
     def __init__(self, **settings: Any) -> None:
