@@ -20,10 +20,11 @@ from noiseclassifier.estimators import (
     calibrated,
     choose,
 )
+from noiseclassifier.profile import INPUTS
 
 RANDOM = np.random.default_rng(3)
 CENTRES = RANDOM.standard_normal((4, 20))
-PROFILE = nc.ANY.bound(1000.0)
+PROFILE = nc.ANY.at(1000.0, INPUTS[0])
 ONE = np.array(["one"])
 
 

@@ -47,7 +47,7 @@ def test_a_bound_model_decides_as_the_full_one_without_the_missing_features(rate
 def test_a_feature_has_one_name_at_any_rate(names):
     fewer = ()
     for rate in (LOWEST, 99.7, 125.0, 149.0, 160.0, 250.0, 512.0, 1000.0, 4000.0, HIGHEST):
-        profile = RECIPE.bound(rate, names)
+        profile = RECIPE.at(rate, names)
         found = columns(profile)
         rows = profile.norms + 2 * (len(profile.signals) - profile.norms)
         frame = np.zeros((1, rows, profile.length) if rows > 1 else (1, profile.length))
@@ -64,7 +64,7 @@ def test_a_tone_is_in_features_of_one_name_at_any_rate(frequency):
     loudest = set()
     for rate in RATES:
         tone = 0.1 * np.sin(2 * np.pi * frequency * np.arange(round(2 * rate)) / rate)
-        profile = RECIPE.bound(rate, ("measured",))
+        profile = RECIPE.at(rate, ("measured",))
         names = columns(profile)
         _, features = frame_features({"measured": tone}, profile)
         means = [n for n, name in enumerate(names) if name.startswith("measured long mean")]
@@ -122,7 +122,7 @@ def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_fe
     feeding = [names for names in TAKEN if set(names) <= {*one.signal, NOISE}]
     assert len(parts) == len(feeding)
     for names, part in zip(feeding, parts, strict=True):
-        profile = RECIPE.bound(500.0, names)
+        profile = RECIPE.at(500.0, names)
         _, features = frame_features(one.signal, profile)
         features = features if names is feeding[0] else features[::2]
         assert part.features.shape == (len(features), len(RECIPE.columns))

@@ -8,7 +8,7 @@ import pytest
 from addedfaults import with_fault
 
 import noiseclassifier as nc
-from noiseclassifier.profile import HIGHEST, LOWEST, columns
+from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, columns
 from noiseclassifier.signals import JOINTS, MOTION
 
 GENERAL = Path(__file__).parents[1] / "models" / "general.npz"
@@ -88,7 +88,7 @@ def test_the_kernel_parameter_goes_with_the_number_of_features():
 
 
 def test_features_that_rise_with_a_fault_never_fall_as_it_gets_louder():
-    profile = nc.ANY.bound(1000.0, (*MOTION, *JOINTS))
+    profile = nc.ANY.at(1000.0, (*MOTION, *JOINTS))
     time = np.arange(profile.length) / profile.rate
     joints = np.stack([0.5 * np.cos(2 * np.pi * f * time) for f in (0.3, 0.7)])
     measured = joints + 1e-3 * np.random.default_rng(0).normal(size=joints.shape)
@@ -129,9 +129,9 @@ def test_a_rate_that_leaves_no_bands_is_refused():
 
 def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
     assert (LOWEST, HIGHEST) == (80.0, 10_000.0)  # as docs/classifier.md promises
-    recipe = nc.ANY.bound(LOWEST)
+    recipe = nc.ANY.at(LOWEST, INPUTS[0])
     assert recipe.edges[-1] <= LOWEST / 2
-    assert nc.ANY.bound(HIGHEST).edges[-1] <= 5000.0
+    assert nc.ANY.at(HIGHEST, INPUTS[0]).edges[-1] <= 5000.0
     assert nc.LogBands.of(asdict(nc.ANY) | {"highest": HIGHEST}).highest == HIGHEST
 
 

@@ -103,7 +103,7 @@ def test_a_lasting_change_becomes_the_reference():
 
 @pytest.mark.parametrize("rate", RATES)
 def test_relative_features_do_not_change_with_the_scale_of_all_amplitudes(rate):
-    profile = replace(RECIPE, floor=1e-9).bound(rate, ("measured",))
+    profile = replace(RECIPE, floor=1e-9).at(rate, ("measured",))
     plain, *louder = (
         frame_features({"measured": scale * signal(rate)}, profile)[1]
         for scale in (1.0, 30.0, 1000.0)

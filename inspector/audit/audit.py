@@ -164,7 +164,7 @@ def _rate_for(frequency: float, library: Library) -> float:
     reaching = []
     for model in library.values():
         if isinstance(model, nc.General):
-            edges = band_edges(model.recipe.bound(HIGHEST))
+            edges = band_edges(model.recipe.at(HIGHEST))
             # A band is there from twice its upper edge on.
             above = edges[edges >= frequency]
             reaching += [max(LOWEST, float(np.ceil(2 * each))) for each in above[:1]]

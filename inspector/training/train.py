@@ -215,7 +215,7 @@ def train(
     if general and rate is not None:
         raise OptionError(f"profile {profile} is for any rate; leave out --rate {rate:g}")
     rate = None if general else RATE if rate is None else rate
-    chosen = nc.ANY.bound(LOWEST, (nc.NOISE,)) if rate is None else profile_at(profile, rate)
+    chosen = nc.ANY.at(LOWEST, (nc.NOISE,)) if rate is None else profile_at(profile, rate)
     refuse_existing(output, overwrite=overwrite)
     left_out = LeftOut()
     read = progress(classified(inputs, rate, part, bare_too=True), "read", total=count(inputs))

@@ -345,7 +345,7 @@ class General:
         # A feature that no frame has tells nothing, wherever its frames would be.
         unknown = np.isnan(frames.features).all(axis=0)
         features = np.where(unknown, 0.0, frames.features)
-        profile = recipe.bound(HIGHEST)
+        profile = recipe.at(HIGHEST, INPUTS[0])
         mean, scale = standard(features, profile)
         scaled = (features - mean) / scale
         trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising)
@@ -386,14 +386,14 @@ class General:
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, as `Classifier.save` does."""
-        profile = self.recipe.bound(HIGHEST).as_dict()
+        profile = self.recipe.at(HIGHEST, INPUTS[0]).as_dict()
         settings = {"recipe": asdict(self.recipe), "profile": profile, "rate": HIGHEST}
         modelfile.write(path, self, settings, overwrite=overwrite)
 
 
 @lru_cache(maxsize=4)  # many logs have one rate and the same signals
 def _bound(model: General, rate: float, signals: Sequence[str]) -> Classifier:
-    profile = model.recipe.bound(rate, signals)
+    profile = model.recipe.at(rate, signals)
     there = model.recipe.places(profile)
     estimator, mean, scale = model.estimator.at(there), model.mean[there], model.scale[there]
     known = (model.runs, model.metrics, model.versions, model.sha256)
@@ -419,7 +419,7 @@ def frames_of(
     for recording in recordings:
         fed = [names for names in TAKEN if feeds(named(recording.signal), names)]
         for number, names in enumerate(fed):
-            profile = recipe.bound(recording.rate, names)
+            profile = recipe.at(recording.rate, names)
             starts, features = frame_features(recording.signal, profile, recording.valid)
             begin, step = recording.start + starts / recording.rate, 1.0 / recording.rate
             truth = truth_of(begin, begin + profile.duration, within(recording), step=step)

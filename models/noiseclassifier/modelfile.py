@@ -29,7 +29,7 @@ from noiseclassifier.errors import FileError, OutputError, ProfileError
 from noiseclassifier.estimators import ESTIMATORS, Trees
 from noiseclassifier.features import feature_count
 from noiseclassifier.jsontext import from_json
-from noiseclassifier.profile import HIGHEST, LogBands, Profile
+from noiseclassifier.profile import HIGHEST, INPUTS, LogBands, Profile
 from noiseclassifier.signals import Array
 
 FORMAT = "noise-model/7"
@@ -253,7 +253,7 @@ def check(
                     f"a recipe for any rate has trees and a reference, not {recipe.estimator} and"
                     f" reference {recipe.reference}"
                 )
-            count, profile = len(recipe.columns), recipe.bound(HIGHEST)
+            count, profile = len(recipe.columns), recipe.at(HIGHEST, INPUTS[0])
     except ProfileError as error:
         raise FileError(path, f"manifest has a wrong profile: {error}") from error
     classes = manifest["classes"]

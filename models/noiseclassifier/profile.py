@@ -361,8 +361,11 @@ class LogBands:
     #: the class of the nearest training frames.
     softness: float = 0.5
 
-    def at(self, rate: float) -> Profile:
+    def at(self, rate: float, signals: Sequence[str] = ()) -> Profile:
         """Profile for a sample rate, in [Hz], durations rounded to the nearest sample, windows up.
+
+        Args:
+            signals: Those to take, in place of the recipe's.
 
         Raises:
             ProfileError: If fewer than ``FEWEST`` bands lie below half the rate.
@@ -384,9 +387,16 @@ class LogBands:
                 f" expected {FEWEST} or more: take a rate of {ceil(2 * least)} Hz at least"
             )
         shared = {field.name for field in fields(Profile)} & {field.name for field in fields(self)}
-        shared -= {"hop", "window", "stride", "quick_stride"}  # in samples there, in seconds here
+        shared -= {
+            "signals",
+            "hop",
+            "window",
+            "stride",
+            "quick_stride",
+        }  # in samples there, in seconds here
         return Profile(
             **{name: getattr(self, name) for name in shared},
+            signals=tuple(signals) or self.signals,
             rate=rate,
             length=round(self.frame * rate),
             hop=round(self.hop * rate),
@@ -425,19 +435,15 @@ class LogBands:
         try:
             recipe = cls(**{**settings, **lists})
             for rate in (LOWEST, HIGHEST):
-                recipe.bound(rate)
+                recipe.at(rate, INPUTS[0])
         except (TypeError, ValueError, ArithmeticError) as error:
             raise ProfileError(f"a setting of the recipe is wrong ({error})") from error
         return recipe
 
-    def bound(self, rate: float, signals: Sequence[str] = INPUTS[0]) -> Profile:
-        """Profile for a sample rate and signals."""
-        return replace(self, signals=tuple(signals)).at(rate)
-
     @cached_property
     def columns(self) -> tuple[str, ...]:
         """Names of all features of a general model, of all inputs at the highest rate."""
-        every = (columns(self.bound(HIGHEST, names)) for names in INPUTS)
+        every = (columns(self.at(HIGHEST, names)) for names in INPUTS)
         return tuple(dict.fromkeys(name for names in every for name in names))
 
     def places(self, profile: Profile) -> Index:
