@@ -330,15 +330,12 @@ class LinkNoise:
         return [int(i) for i in np.argsort(-self.vibration.max(axis=0), kind="stable")]
 
 
-def link_noise(run: Run, kind: str = "normal", *, geometry: str = "auto") -> LinkNoise:
-    """The extended noise of a run of a known robot, with positions, in bins.
-
-    ``kind`` is one of ``KINDS``, ``geometry`` as in `Surface.of`.
-    """
+def link_noise(run: Run, kind: str = "normal") -> LinkNoise:
+    """The extended noise of a run with a robot and positions, in bins, by one of ``KINDS``."""
     assert run.robot is not None
     floating = True if run.base_pose is not None else None
     robot = Robot.load(run.robot, floating_base=floating)
-    surface = Surface.of(robot, geometry)
+    surface = Surface.of(robot, "auto")
     samples = len(run.time)
     size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
     bins = np.append(np.arange(0, samples, size), samples)  # two or more

@@ -1,6 +1,5 @@
 """Efforts of wide domains: drives show the torques that physics asks for, and pushes of hands."""
 
-import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -11,14 +10,12 @@ import pytest
 from simulated import PLAIN, simulated
 
 from noiseclassifier import scenarios
-from noiseclassifier.scenarios.dataset import Folder, Task
 from noiseclassifier.scenarios.faults import Imperfections
 from noiseclassifier.scenarios.logs import logged, visible
-from noiseclassifier.scenarios.motions import PUSH, DatasetError
+from noiseclassifier.scenarios.motions import PUSH
 from noiseclassifier.scenarios.robots import WIDE
-from noiseclassifier.scenarios.simulation import FAULTS, GOOD, WIDE_RECIPE, Start, _setup
+from noiseclassifier.scenarios.simulation import FAULTS, GOOD, Start, _setup
 from noiseclassifier.scenarios.world import configuration, real_model, reduced_model
-from noisemodel import Run
 
 SECONDS = 1.5
 STANDS = 10_004  # a seed of which the Panda stands for so long, on elastic gears
@@ -178,18 +175,3 @@ def test_a_slow_change_is_visible_beside_a_weight_only_where_means_are_left_out(
     assert seen[(starts > 0.45) & (starts < 1.05)].all()
     assert not seen[starts < 0.05].any()
     assert not seen[starts > 1.55].any()  # a force that does not change
-
-
-def test_folders_of_older_recipes_are_read_and_not_added_to(tmp_path, twin):
-    folder = Folder.opened(tmp_path / "data", wide=True)
-    (folder.path / "panda").mkdir()
-    replace(twin, effort=None).save(folder.file(Task("panda", GOOD, STANDS)))
-    manifest = folder.path / "dataset.json"
-    settings = json.loads(manifest.read_text())
-    assert settings["recipe"] == WIDE_RECIPE
-    manifest.write_text(json.dumps({**settings, "recipe": 1}))
-    with pytest.raises(DatasetError, match=f"made with recipe 1, now it is {WIDE_RECIPE}"):
-        Folder.opened(folder.path, wide=True)
-    old = Folder.opened(folder.path, wide=True, any_recipe=True)
-    (task,) = old.kept()
-    assert Run.load(old.file(task)).effort is None

@@ -132,7 +132,6 @@ class Folder:
         wide: bool = False,
         duration: float | None = None,
         rate: float = RATE,
-        any_recipe: bool = False,
     ) -> Self:
         """Open a folder, or create it."""
         path = Path(path)
@@ -143,7 +142,7 @@ class Folder:
             if (path / MANIFEST).exists():
                 made = _made(path / MANIFEST)
                 # The latest recipe of wide domains only adds to those before.
-                if any_recipe or (wide and made.get("recipe") in range(2, recipe)):
+                if wide and made.get("recipe") in range(2, recipe):
                     settings["recipe"] = made.get("recipe")
                 for key, wanted in settings.items():
                     if (found := made.get(key)) != wanted:
