@@ -33,6 +33,7 @@ from inspector.report import findings, html
 from inspector.report.picture import require
 from inspector.text import progress
 from inspector.verdict import EXPECTED, Verdict
+from noisemodel.compare import COMPARED
 from noisemodel.files import refuse_existing, write_whole
 
 # --- view
@@ -254,8 +255,6 @@ def _show(target: Path, *, web: bool, port: int, saved: bool) -> None:
 
 
 # --- noise
-
-COMPARED = ("simplified", "C", "paper", "mean", "rms", "normal")
 
 NoiseRuns = Annotated[list[Path] | None, argument("A run file or log; with --compare several.")]
 Kinds = Annotated[
