@@ -1,13 +1,10 @@
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 from commandline import call
 
 from inspector.library import demo_run
-
-PANDA = Path(__file__).parents[2] / "shared" / "data" / "panda"
 
 
 @pytest.fixture
@@ -74,17 +71,3 @@ def test_view_prints_a_summary_of_the_audit(episode, tmp_path):
     assert out.count("logged at 30 Hz") == 2  # in the headline, and why there are no labels
     assert "cannot be observed" not in out
     assert "Warnings: positions look like degrees" in out
-
-
-@pytest.mark.skipif(not PANDA.is_dir(), reason="needs ../shared/data/panda")
-def test_the_log_of_a_real_panda(tmp_path):
-    logs = [PANDA / "measured.csv", "--desired", PANDA / "desired.csv", "--robot", "panda"]
-    status, _, err = call("import", *logs, "-o", tmp_path / "panda.npz")
-    assert status == 0, err
-    status, out, _ = call("audit", tmp_path / "panda.npz")
-    assert status == 0
-    assert "stamps were off by 0.165 ms rms" in out
-    assert "missing: 4 gaps" in out
-    assert "impact: observable" in out
-    assert "oscillations: partly, 20 to 440 Hz" in out
-    assert "warning" not in out

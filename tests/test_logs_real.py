@@ -17,7 +17,7 @@ DATA = Path(__file__).parents[2] / "shared" / "data" / "panda"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data/panda")
 
 
-def test_a_real_robots_log_is_imported_viewed_and_classified(tmp_path, monkeypatch):
+def test_a_real_robots_log_is_imported_audited_viewed_and_classified(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     logs = [DATA / "measured.csv", "--desired", DATA / "desired.csv"]
     status, out, err = call("import", *logs, "--robot", "panda", "-o", "run.npz")
@@ -27,6 +27,14 @@ def test_a_real_robots_log_is_imported_viewed_and_classified(tmp_path, monkeypat
     run = Run.load(tmp_path / "run.npz")
     assert (run.rate, len(run.joint_names), run.robot) == (1000.0, 7, "panda")
     assert run.duration == pytest.approx(21.0, abs=0.01)
+
+    status, out, _ = call("audit", "run.npz")
+    assert status == 0
+    assert "stamps were off by 0.165 ms rms" in out
+    assert "missing: 4 gaps" in out
+    assert "impact: observable" in out
+    assert "oscillations: partly, 20 to 440 Hz" in out
+    assert "warning" not in out
 
     status, _, err = call("view", "run.npz", "-o", "run.rrd")
     assert status == 0, err
