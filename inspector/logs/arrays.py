@@ -102,7 +102,6 @@ def log_of(
     arrays: Arrays,
     options: ReadOptions,
     *,
-    episode: str = "",
     stated: tuple[str, float | None] = ("", None),
     joints: Mapping[str, tuple[str, ...]] | None = None,
     stamps: Stamps | None = None,
@@ -118,12 +117,7 @@ def log_of(
     """
     every, arrays = arrays, _tables(arrays)
     options = options.for_columns(path, [*arrays])
-    mapped = {
-        name
-        for entry in options.entries
-        if entry.signal != "time"
-        for name in (entry.source, entry.part()[0])
-    }
+    mapped = options.mapped
     naming = Naming.of((n for n, e in arrays.items() if e.ndim == 1), options.known_joints)
     columns = {  # that say in their names what they hold
         n
@@ -133,16 +127,11 @@ def log_of(
     roles = _roles(arrays, mapped, naming)
     motion = [name for name, what in roles.items() if what in MOTION or name in mapped]
     if not motion:
-        raise _nothing(path, episode, every, not_read)
-    if stamps:
-        time, samples = stamps.name, len(stamps.time)
-    else:
-        time, arrays = _time(arrays, options)
-        arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
-        samples = len(arrays[motion[0]])
-        stamps = Stamps.counted(samples, stated)
-        if time:
-            stamps = replace(stamps_of(path, time, arrays[time], options.rate), stated=stated)
+        raise _nothing(path, every, not_read)
+    if not stamps:
+        stamps, arrays = _stamped(path, arrays, options, motion, roles)
+        stamps = replace(stamps, stated=stated)
+    time, samples = stamps.name, len(stamps.time)
     named = {**(joints or {}), **_arms(arrays, roles)}
     fields = [
         Field(
@@ -273,6 +262,21 @@ def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
     }
 
 
+def _stamped(
+    path: Path,
+    arrays: Arrays,
+    options: ReadOptions,
+    motion: Sequence[str],
+    roles: Mapping[str, str],
+) -> tuple[Stamps, Arrays]:
+    """Stamps, counted where no array has them, and arrays of as many samples."""
+    time, arrays = _time(arrays, options)
+    arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
+    if time:
+        return stamps_of(path, time, arrays[time], options.rate), arrays
+    return Stamps.counted(len(arrays[motion[0]])), arrays
+
+
 def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
     """Name of the array with the stamps, empty without; a part of one is an array then."""
     source = options.time
@@ -354,7 +358,7 @@ def _floating(qpos: Real, count: int) -> list[int]:
 NO_ARRAYS = "no numbers; of a timeseries of MATLAB or Simulink, save ts.Time and ts.Data"
 
 
-def _nothing(path: Path, episode: str, arrays: Arrays, not_read: Sequence[str]) -> LogError:
+def _nothing(path: Path, arrays: Arrays, not_read: Sequence[str]) -> LogError:
     """Error of a file that is not known to hold motion: what it holds, and what to type."""
     if arrays and all(each.ndim == 1 for each in arrays.values()):
         return no_motion(path, [*arrays, *not_read])
@@ -367,7 +371,7 @@ def _nothing(path: Path, episode: str, arrays: Arrays, not_read: Sequence[str]) 
     shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])
     return LogError(
         path,
-        f"{episode or 'the file'} holds no known joint positions or velocities; name them, such as"
+        "the file holds no known joint positions or velocities; name them, such as"
         f" {example}; it has {shapes or NO_ARRAYS}",
     )
 
@@ -452,7 +456,7 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
         for name in numbers
     }
     stated = stated_rate(arrays)
-    return log_of(path, numbers, options, episode=episode, stated=stated, joints=joints)
+    return log_of(path, numbers, options, stated=stated, joints=joints)
 
 
 # MATLAB's files of version 5

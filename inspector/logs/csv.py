@@ -245,7 +245,7 @@ def _wanted(
     if odd := next((name for name in header if not name.isprintable()), ""):
         problem = f"the name {odd[:40]!r} cannot be printed; is a quotation mark not closed?"
         raise LogError(path, problem, row)
-    mapped = {entry.source for entry in options.entries}
+    mapped = options.mapped
     naming = Naming.of(header, options.known_joints)
     wanted = [
         place

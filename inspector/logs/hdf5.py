@@ -101,7 +101,6 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str, *, is_matla
         path,
         {name: each for name, each in arrays.items() if each.dtype.kind in "iuf"},
         options,
-        episode=episode,
         stated=stated_rate({**attributes, **arrays}),
         not_read=left_out,
     )

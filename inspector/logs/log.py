@@ -62,9 +62,9 @@ class Stamps:
         return cls(Decimal(first).scaleb(-9), np.multiply(stamps - first, 1e-9), remark=remark)
 
     @classmethod
-    def counted(cls, samples: int, stated: tuple[str, float | None] = ("", None)) -> "Stamps":
+    def counted(cls, samples: int) -> "Stamps":
         """Stamps of a log that has none, until its rate is known."""
-        return cls(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES, stated=stated)
+        return cls(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES)
 
     @cached_property
     def clock(self) -> Clock:

@@ -86,6 +86,12 @@ class ReadOptions:
         return next((entry.source for entry in self.entries if entry.signal == "time"), "")
 
     @property
+    def mapped(self) -> set[str]:
+        """Names of the columns and arrays that are mapped, but for the stamps."""
+        known = [entry for entry in self.entries if entry.signal != "time"]
+        return {name for entry in known for name in (entry.source, entry.part()[0])}
+
+    @property
     def known_joints(self) -> tuple[str, ...]:
         """Names that a log's joints may have: the robot's."""
         return tuple(known_limits(self.robot or None)[0])

@@ -137,8 +137,7 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     schema = _schema(path)
     time = options.time or time_column(schema.names)
     names = [name for name in schema.names if name not in (time, EPISODE)]
-    entries = options.for_columns(path, names).entries
-    mapped = {name for entry in entries for name in (entry.source, entry.part()[0])}
+    mapped = options.for_columns(path, names).mapped
     naming = Naming.of(names, options.known_joints)
     wanted = [
         name
@@ -161,7 +160,7 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     if time in schema.names and time not in arrays:
         raise LogError(path, f"column {time!r} holds no stamps but {table.column(time).type}")
     not_read = [name for name in schema.names if name not in (*arrays, EPISODE)]
-    return log_of(path, arrays, options, episode=episode, not_read=not_read)
+    return log_of(path, arrays, options, not_read=not_read)
 
 
 # What columns unpack to
@@ -331,7 +330,7 @@ def _episode(
     path: Path, info: dict[str, Any], files: Sequence[Path], episode: str, options: ReadOptions
 ) -> Log:
     features, present = info["features"], _schema(files[0]).names
-    mapped = {entry.part()[0] for entry in options.entries}
+    mapped = options.mapped
     wanted = [name for name in present if name in {*FEATURES, *mapped, STAMP}]
     table = _table(files, wanted, episode)
     arrays = {n: v for n in wanted if n != STAMP and (v := _values(path, table, n)) is not None}
