@@ -13,27 +13,33 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inspector.analysis import (
+    LOUDEST,
+    SHOWN,
     Analysis,
     Estimate,
     analyse,
     analyse_file,
+    chosen,
     default_kinds,
     estimate,
     extents,
+    gaps,
     noise_level,
     with_links,
+    worst,
     write_csv,
 )
 from inspector.audit.audit import audit
 from inspector.audit.signals import without_placeholder
 from inspector.errors import InspectorError, Status, Unknown
+from inspector.levels import STEP
 from inspector.library import demo_run, load_library, model_files
 from inspector.report import findings, html
 from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
 from inspector.verdict import Verdict, classify_file, exit_status, work_of
 from noiseclassifier import Event, Labels
-from noisemodel import NoiseModelError, Robot, Run
+from noisemodel import Block, NoiseModelError, Robot, Run
 from noisemodel.run import METHOD, joint_velocity
 
 LIBRARY = load_library(model_files())
@@ -455,3 +461,109 @@ def test_samples_cut_from_the_end_move_no_earlier_finding(rate):
         assert [event.label for event in found] == [event.label for event in whole]
         for one, other in zip(found, whole, strict=True):
             assert (one.start, one.stop) == pytest.approx((other.start, other.stop), abs=1 / rate)
+
+
+# The worst moments, and the rows of pictures.
+
+STEPS = np.arange(100) * STEP
+
+
+def inspected(tmp_path, *, blocks=(), events=(), **changes):
+    """A quiet run with a short knock at 1 s and a loud rattle from 2 s to 3 s."""
+    time = np.arange(4000) / 1000
+    velocity = 0.2 * np.cos(time) + 1.0 * ((time >= 1.0) & (time < 1.003))
+    velocity += 2.0 * np.sin(2 * np.pi * 80 * time) * ((time >= 2.0) & (time < 3.0))
+    fields = {"time": time, "velocity": velocity[:, None], "joint_names": ("a",), "blocks": blocks}
+    path = tmp_path / "run.npz"
+    tmp_path.mkdir(exist_ok=True)
+    Run(**(fields | changes)).save(path)
+    return replace(analyse_file(path, {}), findings=tuple(events), spans=tuple(events))
+
+
+KNOCK, RATTLE = Event("impact", 0.9, 1.2, 3.0), Event("oscillations", 2.0, 3.0, 1.0)
+
+
+def test_the_loudest_finding_comes_first_whatever_its_score(tmp_path):
+    first, second = worst(inspected(tmp_path, events=(KNOCK, RATTLE)))
+    assert (first.label, second.label) == ("oscillations", "impact")
+    assert 2.0 <= first.peak <= 3.0
+    assert second.peak == pytest.approx(1.0, abs=0.05)
+    assert (first.start, first.stop) == (2.0, 3.0)
+
+
+def test_annotations_count_where_nothing_was_found(tmp_path):
+    blocks = (Block(0.0, 0.5, "ok"), Block(0.9, 1.2, "impact"))
+    (only,) = worst(inspected(tmp_path, blocks=blocks))
+    assert only.label == "impact"
+
+
+def test_without_any_failure_it_is_the_loudest_moment(tmp_path):
+    (only,) = worst(inspected(tmp_path))
+    assert only.label == LOUDEST
+    assert 2.0 <= only.peak <= 3.0
+    assert (only.start, only.stop) == (0.0, 3.999)
+
+
+def test_at_most_three_are_picked(tmp_path):
+    events = [Event("impact", start, start + 0.1, 1.0) for start in np.arange(5) * 0.5]
+    assert len(worst(inspected(tmp_path, events=events))) == 3
+
+
+def test_gaps_last_from_their_first_sample_to_the_next_valid_one():
+    fields = {"time": 5.0 + np.arange(8) / 1000, "velocity": np.ones((8, 1)), "joint_names": ("a",)}
+    lost = Run(**fields, valid=~np.isin(np.arange(8), [0, 3, 4, 7]))
+    found = [(start - 5.0, stop - 5.0) for start, stop in gaps(lost)]
+    assert np.round(1000 * np.array(found), 6).tolist() == [[0.0, 1.0], [3.0, 5.0], [7.0, 7.0]]
+    assert gaps(Run(**fields)) == []
+
+
+def test_a_moment_ends_with_the_run_and_peaks_within_half_a_step(tmp_path):
+    late = Event("impact", 3.5, 9.0, 1.0)
+    early = Event("oscillations", -1.0, 0.5, 1.0)
+    gone = Event("oscillations", 7.0, 8.0, 1.0)
+    found = {each.label: each for each in worst(inspected(tmp_path, events=(late, early, gone)))}
+    assert set(found) == {"impact", "oscillations"}
+    assert (found["impact"].start, found["impact"].stop) == (3.5, 3.999)
+    assert (found["oscillations"].start, found["oscillations"].stop) == (0.0, 0.5)
+    short = Event("impact", 1.001, 1.002, 1.0)  # within one step of 50 ms, from 1.0 s
+    (only,) = worst(inspected(tmp_path / "other", events=(short,)))
+    assert only.peak == pytest.approx(1.025)
+
+
+def test_rows_are_the_loudest_during_findings_in_the_order_of_the_robot():
+    level = np.full((100, 20), -60.0)
+    level[10, :10] = 20.0  # loud while nothing is wrong
+    level[60, [17, 12]] = -10.0
+    found = chosen(analysed("....", findings=(Event("impact", 3.0, 3.1, 0.9),)), STEPS, level)
+    assert len(found) == SHOWN == len(set(found))
+    assert found == sorted(found)
+    assert {12, 17} <= set(found)
+
+
+def test_rows_of_a_run_without_findings_are_the_loudest_at_any_time():
+    level = np.full((100, 20), -60.0)
+    level[10, 5:9] = 20.0
+    level[20] = np.nan  # a gap
+    assert set(range(5, 9)) <= set(chosen(analysed("...."), STEPS, level))
+
+
+def test_steps_that_a_finding_only_touches_do_not_count():
+    finding = Event("impact", 3.0, 3.5, 0.9)
+    time = np.array([3.0 - STEP, 3.0 - STEP + 1e-6, 3.5 - 1e-6, 3.5])
+    level = np.full((4, 12), -60.0)
+    level[0, :2] = level[3, 2:4] = 20.0  # loud just before and just after
+    level[1, 4:8] = level[2, 8:] = 0.0
+    assert chosen(analysed("....", findings=(finding,)), time, level) == list(range(4, 12))
+    again = Event("impact", 9.0, 9.5, 0.9)  # in no step: any other finding counts
+    assert chosen(analysed("....", findings=(again, finding)), time, level) == list(range(4, 12))
+
+
+def test_a_joint_without_a_level_is_the_quietest():
+    level = np.full((100, 12), -60.0)
+    level[:, :4] = np.nan
+    assert chosen(analysed("...."), STEPS, level) == list(range(4, 12))
+    assert chosen(analysed("...."), STEPS[:0], level[:0]) == list(range(8))
+
+
+def test_a_robot_of_few_joints_has_a_row_for_each():
+    assert chosen(analysed("...."), STEPS, np.full((100, 3), -np.inf)) == [0, 1, 2]
