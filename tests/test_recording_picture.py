@@ -41,7 +41,7 @@ def test_the_viewer_draws_the_demo_alone_and_beside_itself_and_reports_no_error(
 @pytest.mark.slow
 def test_a_picture_is_taken_without_a_display(tmp_path):
     write(analyse_file(demo_run(), {}), tmp_path / "demo.rrd")
-    viewer.shoot(tmp_path / "demo.rrd", tmp_path / "out.png", 2.0, size=(800, 500))
+    viewer.shoot(tmp_path / "demo.rrd", tmp_path / "out.png", 2.0)
     png = (tmp_path / "out.png").read_bytes()
-    assert struct.unpack(">II", png[16:24]) == (800, 500)
+    assert struct.unpack(">II", png[16:24]) == viewer.WINDOW
     assert len(png) > 10_000  # an empty window is 5 kB

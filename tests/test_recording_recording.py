@@ -36,8 +36,6 @@ from inspector.reference.levels import levels as levels_of
 from noiseclassifier import Event
 from noisemodel import Block, Run
 
-SOUND = b"RIFF....WAVE, as far as a recording is concerned"
-
 
 @pytest.fixture(autouse=True)
 def strict():
@@ -88,7 +86,7 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     run = panda_run()
     found = inspected(run, folder, LABELLED, kind="paper")
-    write(found, folder / "out.rrd", sound=SOUND)
+    write(found, folder / "out.rrd")
     return folder / "out.rrd", run
 
 
@@ -112,7 +110,6 @@ COLUMNS = {
     r"/axis/(spectrogram|joints|links|key)/right/scale": STRIP,
     r"/verdict/band": STRIP,
     r"/verdict/words": LABELS,
-    r"/sound": {"AssetAudio:blob", "AssetAudio:media_type"},
     r"/robot/motion/panda_joint\d": MOTION,
     r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
     r"/report": {"TextDocument:text", "TextDocument:media_type"},
@@ -367,13 +364,6 @@ def test_details_hold_raw_samples_around_the_worst_moment(whole):
     _, (names,) = read(path, "/detail/0/velocity", "SeriesLines:names")
     columns = [run.joint_names.index(name) for name in names]
     np.testing.assert_allclose(velocity, run.velocity[inside][:, columns], rtol=1e-12)
-
-
-def test_the_sound_starts_with_the_run(whole):
-    path, _ = whole
-    time, blob = read(path, "/sound", "AssetAudio:blob")
-    assert time.tolist() == [0.0]
-    assert bytes(blob[0][0]) == SOUND
 
 
 def test_the_time_selection_rests_on_the_worst_event_and_loops_it(whole):

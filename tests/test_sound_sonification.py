@@ -196,9 +196,6 @@ def test_a_clip_has_the_whole_run_or_the_part_around_its_worst_moment(monkeypatc
     assert (part.start, part.stop) == (1.25, 1.75)
     samples, rate = read(part.data)
     assert (len(samples), rate) == (8000, 16_000)
-    led, _ = read(clip(run, around=1.5, lead=True).data)
-    assert not led[:20_000].any()  # so that it starts with the run
-    np.testing.assert_array_equal(led[20_000:], samples)
 
 
 def test_sounds_need_no_library_that_is_slow_to_import():

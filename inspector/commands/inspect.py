@@ -198,8 +198,7 @@ def _one(runs: list[Opened], target: Path, request: Request) -> None:
 
     (run,) = runs
     found, verdict, beside = _analysed(run, request)
-    sound = sonification.of_recording(found)
-    write(found, target, overwrite=request.overwrite, sound=sound, beside=beside)
+    write(found, target, overwrite=request.overwrite, beside=beside)
     typer.echo(f"{run.source.shown}: {found.headline}")
     if verdict is None:
         lines = [findings.sentence(found, event) for event in found.findings]

@@ -81,16 +81,9 @@ class Sound:
         state = f"; silent: nothing reaches {SILENCE:g} rad/s" if self.silent else ""
         return f"{seconds:.2f} s, {scale}{state}"
 
-    def file(self, gain: float, *, lead: float = 0.0) -> bytes:
-        """WAV file of one channel of 16 bits.
-
-        Args:
-            gain: In [dB], at most `common_gain`: at 0, full scale is 1 rad/s.
-            lead: Duration of silence before it, in [s].
-        """
-        scaled = self.played * _factor(gain) * FULL_SCALE
-        silence = np.zeros(round(lead * self.playing))
-        samples = np.round(np.concatenate((silence, scaled))).astype("<i2")
+    def file(self, gain: float) -> bytes:
+        """WAV file of one channel of 16 bits; at a gain of 0 dB, full scale is 1 rad/s."""
+        samples = np.round(self.played * _factor(gain) * FULL_SCALE).astype("<i2")
         stream = io.BytesIO()
         with wave.open(stream, "wb") as file:
             file.setnchannels(1)
@@ -150,24 +143,17 @@ def output_paths(path: Path, count: int, *, overwrite: bool = False) -> tuple[Pa
     return paths
 
 
-def of_recording(analysis: Analysis) -> bytes:
-    """Sound for a recording, that starts with the run; empty if nothing is audible."""
-    found = clip(analysis.run, around=worst_time(analysis), lead=True)
-    return b"" if found is None else found.data
-
-
 def worst_time(analysis: Analysis) -> float:
     """Time of the worst moment of a run, in [s]; 0 if the run has no valid samples."""
     moments = worst(analysis)
     return moments[0].peak if moments else 0.0
 
 
-def clip(run: nm.Run, *, around: float = 0.0, lead: bool = False) -> Clip | None:
+def clip(run: nm.Run, *, around: float = 0.0) -> Clip | None:
     """Sound of a run's simplified noise; None if nothing in the run is audible.
 
     Args:
         around: Middle of the part that is used if the run is too long, in [s].
-        lead: Whether silence replaces what is left out before.
     """
     width = run.motion.shape[1]
     width += 0 if run.velocity_desired is None else run.velocity_desired.shape[1]
@@ -180,7 +166,7 @@ def clip(run: nm.Run, *, around: float = 0.0, lead: bool = False) -> Clip | None
         return None
     gain = common_gain([sound])
     return Clip(
-        data=sound.file(gain, lead=first / run.rate if lead else 0.0),
+        data=sound.file(gain),
         start=sound.start,
         stop=sound.start + len(sound.signal) / sound.rate,
         description=f"{sound.what}, {sound.description(gain)}",

@@ -85,7 +85,6 @@ def write(
     path: Path,
     *,
     overwrite: bool = False,
-    sound: bytes = b"",
     beside: Comparison | None = None,
 ) -> None:
     """Write the recording of an inspected run, whole or not at all.
@@ -93,7 +92,6 @@ def write(
     The same input makes a recording of the same id: opened again, it replaces itself.
 
     Args:
-        sound: The run made audible, a WAV file that starts with the run; none if empty.
         beside: The run beside its reference; None without one.
     """
     run, moments = analysis.run, worst(analysis)
@@ -111,7 +109,7 @@ def write(
         over_time = [
             *panels.log_classes(recording, analysis),
             *panels.log_curves(recording, analysis, beside),
-            (_log_spectra(recording, analysis, sound), panels.HEIGHT + TITLES),
+            (_log_spectra(recording, analysis), panels.HEIGHT + TITLES),
             _log_strips(recording, analysis, tree, beside),
         ]
         _log_text(recording, analysis)
@@ -139,8 +137,8 @@ def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tup
     return parts
 
 
-def _log_spectra(recording: rr.RecordingStream, analysis: Analysis, sound: bytes) -> Part:
-    """Log the spectrograms of the worst joint and the sound; they, and sound powers."""
+def _log_spectra(recording: rr.RecordingStream, analysis: Analysis) -> Part:
+    """Log the spectrogram of the worst joint; it, and the sound power."""
     run, links, joint = analysis.run, analysis.links, worst_joint(analysis)
     fast = worst_signal(analysis, joint)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
@@ -153,9 +151,6 @@ def _log_spectra(recording: rr.RecordingStream, analysis: Analysis, sound: bytes
     parts = [part]
     if links is not None:
         parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", axes.ALL))
-    if sound:
-        unstable.log_audio(recording, "/sound", sound, float(run.time[0]))
-        parts.append(unstable.audio("Listen", "/sound"))
     return unstable.tabs(*parts)
 
 

@@ -1,10 +1,9 @@
-"""Every API of rerun that is marked unstable: views, their arrangement, panels, audio, bands.
+"""Every API of rerun that is marked unstable: views, their arrangement, panels, bands.
 
 As of 0.41, these change between versions: ``rerun.blueprint`` and the defaults of its views, all
-explicit here; ``AudioView`` and ``AssetAudio``, which has to lie on a timeline to be played;
-``ViewCoordinates``; ``Measurements``, whose band shades findings; ``rerun.experimental``; the end
-of a recording's file, and what rerun waits for if it cannot be written. When rerun moves on, this
-module follows and no other.
+explicit here; ``ViewCoordinates``; ``Measurements``, whose band shades findings;
+``rerun.experimental``; the end of a recording's file, and what rerun waits for if it cannot be
+written. When rerun moves on, this module follows and no other.
 """
 
 import ctypes
@@ -134,11 +133,6 @@ def events(name: str, origin: str) -> Part:
     return rrb.TextLogView(origin=origin, name=name, columns=columns)
 
 
-def audio(name: str, origin: str) -> Part:
-    """Draw a sound, and play it while time plays."""
-    return rrb.AudioView(origin=origin, name=name)
-
-
 def tabs(*parts: Part, name: str | None = None) -> Part:
     """Put parts behind each other as tabs; the first is shown."""
     return rrb.Tabs(*parts, active_tab=0, name=name)
@@ -176,16 +170,6 @@ def blueprint(
         time,
         auto_views=False,
         auto_layout=False,
-    )
-
-
-def log_audio(recording: rr.RecordingStream, path: str, sound: bytes, start: float) -> None:
-    """Log a sound that is played from a time on, in [s]."""
-    instant = np.array([_nanoseconds(start)], dtype="timedelta64[ns]")
-    recording.send_columns(
-        path,
-        indexes=[rr.TimeColumn(TIMELINE, duration=instant)],
-        columns=rr.AssetAudio.columns(blob=[sound], media_type=["audio/wav"]),
     )
 
 

@@ -328,31 +328,24 @@ def require_driver() -> None:
         )
 
 
-def shoot(
-    recording: Path,
-    output: Path,
-    seconds: float,
-    *,
-    size: tuple[int, int] = WINDOW,
-    overwrite: bool = False,
-) -> None:
+def shoot(recording: Path, output: Path, seconds: float, *, overwrite: bool = False) -> None:
     """Take a picture of a recording at a time, in [s]."""
     require_driver()
     refuse_existing(output, overwrite=overwrite)
-    with headless_viewer(size) as client:
+    with headless_viewer() as client:
         png = picture(client, recording, seconds)
     with replacing(output, overwrite=overwrite) as temporary:
         temporary.write_bytes(png)
 
 
 @contextmanager
-def headless_viewer(size: tuple[int, int] = WINDOW) -> "Iterator[ViewerClient]":
+def headless_viewer() -> "Iterator[ViewerClient]":
     """Run rerun's viewer without a window, on loopback, and end it with all its children."""
     from inspector.recording import unstable
 
     port = free_port()
     start = ("--headless", "--port", str(port), "--hide-welcome-screen")
-    window = ("--window-size", f"{size[0]}x{size[1]}")
+    window = ("--window-size", f"{WINDOW[0]}x{WINDOW[1]}")
     with (
         tempfile.TemporaryDirectory() as folder,
         started(*start, *window, env=_environment(folder)) as process,
