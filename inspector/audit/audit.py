@@ -304,13 +304,8 @@ def excerpt(run: Run) -> Run:
         if speed.max() > highest:
             fastest, highest = rows.start + int(speed.argmax()), float(speed.max())
     start = min(max(0, fastest - LONGEST // 2), len(run.time) - LONGEST)
-    motion_alone: dict[str, Any] = {
-        "effort": None,
-        "base_pose": None,
-        "base_velocity": None,
-        "stages": {},
-    }
-    return part(run, start, start + LONGEST, **motion_alone)
+    nothing: dict[str, Any] = dict.fromkeys(("effort", "base_pose", "base_velocity"))
+    return part(run, start, start + LONGEST, **nothing, stages={})
 
 
 # As text and JSON

@@ -117,11 +117,10 @@ class LimitWatch:
     def _note(self, name: str, values: Real, beyond: Mask) -> None:
         self._counts[name] += np.count_nonzero(beyond, axis=0)
         if beyond.any():
-            outside = np.where(beyond, values, 0.0)
-            farthest = self._farthest[name]
-            for each in (outside.max(axis=0), outside.min(axis=0)):
-                farthest = np.where(np.abs(each) > np.abs(farthest), each, farthest)
-            self._farthest[name] = np.abs(farthest) if name == "velocity" else farthest
+            outside = np.vstack((self._farthest[name], np.where(beyond, values, 0.0)))
+            outside = np.abs(outside) if name == "velocity" else outside
+            farthest = np.abs(outside).argmax(axis=0)[None]
+            self._farthest[name] = np.take_along_axis(outside, farthest, axis=0)[0]
 
     def warnings(self, samples: float) -> Iterator[str]:
         """Clauses on the joints that were beyond a limit for so many samples."""
