@@ -211,6 +211,13 @@ def _parquet(folder: Path) -> Path:
     return folder / "log.parquet"
 
 
+def _matlab(folder: Path) -> Path:
+    from scipy.io import savemat
+
+    savemat(folder / "log.mat", {"t": TIME, "arm": {"q": POSITION, "dq": VELOCITY}})
+    return folder / "log.mat"
+
+
 def _lerobot(folder: Path) -> Path:
     from samplelogs import write_lerobot
 
@@ -577,6 +584,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         ),
         "Parquet": Reader("bytes", _parquet, _read_log),
         "HDF5": Reader("bytes", _hdf5, _read_log),
+        "MATLAB": Reader("bytes", _matlab, _read_log),
         "LeRobot info": Reader(
             "text",
             lambda folder: _lerobot(folder) / "meta" / "info.json",
