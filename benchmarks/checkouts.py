@@ -196,33 +196,19 @@ def _scores(nm: Any, nc: Any, run: Any, model: Any) -> dict[str, Any]:
 # --- two folders of results
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """One result of both checkouts."""
-
-    item: str
-    contents: str
-    differences: tuple[str, ...] = ()
-
-    def __str__(self) -> str:
-        word = "different" if self.differences else "same"
-        return f"{word:9}  {self.item}: {'; '.join(self.differences) or self.contents}"
-
-
-def compare(before: Path, after: Path) -> list[Comparison]:
-    """Compare two folders of results, file by file."""
+def compare(before: Path, after: Path) -> list[str]:
+    """A line for each file of two folders of results: "same" or "different", and in what."""
     found = {path.relative_to(side) for side in (before, after) for path in side.rglob("*.npz")}
     return [_compare_files(path, before / path, after / path) for path in sorted(found)]
 
 
-def _compare_files(path: Path, before: Path, after: Path) -> Comparison:
+def _compare_files(path: Path, before: Path, after: Path) -> str:
     item = f"{path.parent}, {path.stem}"
     for side, there in (("before", before), ("after", after)):
         if not there.exists():
-            return Comparison(item, "", (f"not computed by the checkout {side}",))
+            return f"different  {item}: not computed by the checkout {side}"
     with np.load(before, allow_pickle=False) as old, np.load(after, allow_pickle=False) as new:
         one, other = dict(old), dict(new)
-    contents = ", ".join(f"{name} {array.shape}" for name, array in other.items())
     differences = [
         f"array {name} is in one of them only" for name in sorted(one.keys() ^ other.keys())
     ]
@@ -230,7 +216,10 @@ def _compare_files(path: Path, before: Path, after: Path) -> Comparison:
     differences += [f"{name}: {text}" for name, text in both.items() if text]
     if not differences and not filecmp.cmp(before, after, shallow=False):
         differences.append("all arrays are the same, the files are not")
-    return Comparison(item, contents, tuple(differences))
+    if differences:
+        return f"different  {item}: {'; '.join(differences)}"
+    contents = ", ".join(f"{name} {array.shape}" for name, array in other.items())
+    return f"same       {item}: {contents}"
 
 
 def difference(before: NDArray[np.generic], after: NDArray[np.generic]) -> str:
@@ -248,9 +237,9 @@ def difference(before: NDArray[np.generic], after: NDArray[np.generic]) -> str:
     return f"{count} of {before.size} values differ, by at most {largest:.3g}"
 
 
-def closing(found: Sequence[Comparison]) -> tuple[str, int]:
+def closing(found: Sequence[str]) -> tuple[str, int]:
     """Closing line and exit status: 0 only if something was compared and nothing differs."""
-    different = sum(bool(each.differences) for each in found)
+    different = sum(line.startswith("different") for line in found)
     if not found:
         return "nothing was compared", 1
     same = len(found) - different
@@ -259,7 +248,7 @@ def closing(found: Sequence[Comparison]) -> tuple[str, int]:
 
 def compare_checkouts(
     before: Checkout, after: Checkout, folder: Path, wanted: Sequence[str]
-) -> list[Comparison]:
+) -> list[str]:
     """Compute everything in both checkouts, and compare it."""
     runs = {Path(name).stem: Path(name).resolve() for name in wanted if name not in SHIPPED}
     runs |= {"demo": DEMO} if "demo" in wanted else {}

@@ -13,11 +13,12 @@ commanded oscillations: correct if they overlap.
 import argparse
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import noisemodel as nm
-from inspector.localisation.localise import Localisation, fault_links, localise
+from inspector.localisation.localise import fault_links, localise
 from noiseclassifier.scenarios import ROBOTS, ScenarioError, SimulationError, simulate
 from noisemodel.noise import LinkNoise, link_noise
 
@@ -93,8 +94,8 @@ def links_of(robot: str, joints: tuple[str, ...]) -> set[str]:
     return {name for name, index in carried if known.joints[index - 1].name in joints}
 
 
-def check(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Localisation, dict[str, bool]]]:
-    """For each event: cause, localisation, and whether stage, limb and band are correct."""
+def check(run: nm.Run, links: LinkNoise) -> Iterator[dict[str, bool]]:
+    """For each event whether stage, limb, joints and band are correct."""
     robot, known = str(run.robot), localise(run, ())
     for event, block in labelled(run):
         found = known[block]
@@ -109,7 +110,7 @@ def check(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Localisation, di
             marks["band"] = found.band is not None and (
                 found.band[0] <= high and found.band[1] >= low
             )
-        yield event["cause"], found, marks
+        yield marks
 
 
 def main() -> None:
@@ -119,7 +120,6 @@ def main() -> None:
     arguments.add_argument("--robots", default="talos,go2,panda")
     arguments.add_argument("--seeds", default="3,4")
     arguments.add_argument("--seconds", type=float, default=6.0)
-    arguments.add_argument("--each", action="store_true", help="print each event")
     options = arguments.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     right: dict[tuple[str, str, str], list[bool]] = defaultdict(list)
@@ -130,18 +130,9 @@ def main() -> None:
                 run = run_of(options.folder, robot, scenario, int(seed), options.seconds)
                 if run is None:
                     continue
-                for cause, found, marks in check(run, link_noise(run)):
-                    if options.each:
-                        print(
-                            f"{robot}-{scenario}-{seed} {cause}: {found.stage} {found.band}", marks
-                        )
+                for marks in check(run, link_noise(run)):
                     for column, mark in marks.items():
-                        for row in (
-                            (scenario, robot),
-                            (scenario, "all"),
-                            ("all", robot),
-                            ("all", "all"),
-                        ):
+                        for row in product((scenario, "all"), (robot, "all")):
                             right[(column, *row)].append(mark)
     robots = [*options.robots.split(","), "all"]
     for column in ("stage", "limb", "joints", "band"):

@@ -145,9 +145,9 @@ def test_a_result_or_an_array_that_one_checkout_lacks_is_a_difference(tmp_path):
         np.savez(side / "demo" / "equal.npz", scores=[1.0])
     np.savez(before / "demo" / "noise.npz", noise=[1.0])
     equal, model, noise = checkouts.compare(before, after)
-    assert str(equal) == "same       demo, equal: scores (1,)"
-    assert str(model) == "different  demo, model: array more is in one of them only"
-    assert str(noise) == "different  demo, noise: not computed by the checkout after"
+    assert equal == "same       demo, equal: scores (1,)"
+    assert model == "different  demo, model: array more is in one of them only"
+    assert noise == "different  demo, noise: not computed by the checkout after"
     assert checkouts.closing([equal, model]) == ("2 compared: 1 the same, 1 different", 1)
     assert checkouts.closing([equal]) == ("1 compared: 1 the same, 0 different", 0)
     assert checkouts.closing([]) == ("nothing was compared", 1)
