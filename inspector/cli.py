@@ -115,9 +115,7 @@ Options
 `inspector COMMAND -h` explains a command, `inspector help logs` reading logs."""
 LOGS = "How logs are read (--robot, --rate, --map, ...): `inspector help logs`."
 # Names of options that are written; all other paths are read.
-OUTPUTS = frozenset(
-    ("output", "save", "csv", "picture", "report", "save_mapping", "resume", "train")
-)
+OUTPUTS = frozenset(("output", "save", "csv", "report", "save_mapping", "resume", "train"))
 # Names of parameters that no file of settings sets.
 UNSET = OUTPUTS | {"overwrite", "write", "in_ci", "help"}
 INTERRUPTED = 130  # exit status after Ctrl-C, as of a shell
