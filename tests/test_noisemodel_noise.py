@@ -374,9 +374,10 @@ def arm_run(rattling=None, *, rate=1000.0, seconds=4.0, **changes):
 
 
 def test_desired_velocities_without_positions_are_taken_where_the_robot_is():
-    run = arm_run(seconds=0.2)
+    run = arm_run(seconds=0.203)  # the last bin is shorter
     once = link_noise(run)
-    both = link_noise(arm_run(seconds=0.2, velocity_desired=2 * run.velocity))
+    assert once.time[-2:] == pytest.approx([0.195, 0.2015])
+    both = link_noise(arm_run(seconds=0.203, velocity_desired=2 * run.velocity))
     np.testing.assert_allclose(both.power, 5 * once.power, rtol=1e-9)
     np.testing.assert_allclose(both.vibration, once.vibration, rtol=1e-12)
 

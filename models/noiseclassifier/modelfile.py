@@ -65,9 +65,7 @@ def versions() -> dict[str, str]:
     return {"noise-inspector": own, "numpy": np.__version__, "scikit-learn": sklearn.__version__}
 
 
-def write(
-    path: str | Path, model: Any, settings: Mapping[str, Any], *, overwrite: bool = False
-) -> None:
+def write(path: str | Path, model: Any, settings: Mapping[str, Any], *, overwrite: bool) -> None:
     """Write a model file, whole or not at all; settings are profile, rate, and recipe if any."""
     known = {name: dict(getattr(model, name)) for name in ("runs", "metrics", "versions")}
     manifest = {"format": FORMAT, **settings, "classes": list(model.classes), **known}
