@@ -1,6 +1,7 @@
 import io
 import os
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -137,28 +138,21 @@ def home(tmp_path, monkeypatch):
     return tmp_path / "noise-inspector" / "geometry"
 
 
-class Maker:
+@pytest.fixture
+def make():
     """Makes arrays, and counts how often."""
-
-    def __init__(self):
-        self.calls = 0
-
-    def __call__(self):
-        self.calls += 1
-        return {"points": np.arange(6.0).reshape(2, 3), "faces": np.array([[0, 1, 0]], np.int32)}
+    points, faces = np.arange(6.0).reshape(2, 3), np.array([[0, 1, 0]], np.int32)
+    return Mock(side_effect=lambda: {"points": points, "faces": faces})
 
 
-def assert_made(arrays):
-    assert set(arrays) == {"points", "faces"}
-    assert np.array_equal(arrays["points"], [[0, 1, 2], [3, 4, 5]])
-    assert arrays["faces"].dtype == np.int32
-
-
-def test_cached_arrays_are_made_once():
-    make = Maker()
-    assert_made(cached("a-1", make))
-    assert_made(cached("a-1", make))
-    assert make.calls == 1
+def kept(make, key="a-1"):
+    """Whether the arrays of a key were not made anew; they are as they are made."""
+    before, found, made = make.call_count, cached(key, make), make.side_effect()
+    assert set(found) == set(made)
+    for name, array in made.items():
+        assert found[name].dtype == array.dtype
+        assert np.array_equal(found[name], array)
+    return make.call_count == before
 
 
 @pytest.mark.parametrize("value", ["", "relative/folder", None])
@@ -171,83 +165,62 @@ def test_without_an_absolute_folder_it_is_the_one_in_the_home_folder(tmp_path, m
     assert cache_folder() == tmp_path / ".cache" / "noise-inspector" / "geometry"
 
 
-def test_a_file_that_is_damaged_or_of_another_key_is_made_anew(home):
-    make = Maker()
-    cached("a-1", make)
+def test_arrays_are_made_once_and_anew_if_the_file_is_damaged_or_of_another_key(home, make):
+    assert [kept(make), kept(make)] == [False, True]
     whole = (home / "a-1.npz").read_bytes()
-    places = range(0, len(whole), 13)
-    changed = [bytearray(whole) for _ in places]
-    for position, each in zip(places, changed, strict=True):
-        each[position] ^= 0x55
-    cut_off = [b"", whole[:10], whole[:-1]]
-    for content in [*cut_off, *changed]:
+    changed = [bytearray(whole) for _ in range(0, len(whole), 13)]
+    for number, each in enumerate(changed):
+        each[13 * number] ^= 0x55
+    for content in (b"", whole[:10], whole[:-1], *changed):
         (home / "a-1.npz").write_bytes(content)
-        assert_made(cached("a-1", make))
-    assert make.calls == 1 + len(cut_off) + len(changed)
+        assert not kept(make)
     (home / "a-1.npz").replace(home / "a-2.npz")
-    assert_made(cached("a-2", make))
-    assert make.calls == 2 + len(cut_off) + len(changed)
+    assert not kept(make, "a-2")
 
 
-def test_a_folder_that_cannot_be_written_to_is_no_error(tmp_path, monkeypatch):
-    (tmp_path / "file").write_text("in the way")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    make = Maker()
-    assert_made(cached("a-1", make))
-    assert_made(cached("a-1", make))
-    assert make.calls == 2
-
-
-def test_arrays_that_cannot_be_made_are_not_cached(home):
-    def fail():
-        raise ValueError("no such thing")
-
+def test_arrays_that_cannot_be_made_are_not_cached(home, make):
     with pytest.raises(ValueError, match="no such thing"):
-        cached("a-1", fail)
+        cached("a-1", Mock(side_effect=ValueError("no such thing")))
     assert list(home.iterdir()) == []
-    assert_made(cached("a-1", Maker()))
+    assert not kept(make)
 
 
-@pytest.mark.parametrize("mode", [0o720, 0o702])
-def test_a_folder_that_others_can_write_to_is_not_used(home, mode):
-    make = Maker()
-    cached("a-1", make)
+def homeless():
+    raise RuntimeError("Could not determine home directory.")
+
+
+def without_home(_, patch):
+    patch.delenv("XDG_CACHE_HOME")
+    patch.setattr(Path, "home", homeless)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        without_home,
+        lambda home, _: home.chmod(0o720),
+        lambda home, _: home.chmod(0o702),
+        lambda home, patch: patch.setattr(os, "getuid", lambda: home.stat().st_uid - 1),
+        lambda home, patch: patch.setattr(os, "getuid", lambda: home.stat().st_uid + 1),
+        lambda home, patch: patch.setenv("XDG_CACHE_HOME", str(home / "a-1.npz")),
+    ],
+    ids=["no home", "of a group", "of all", "of one user", "of another", "a file"],
+)
+def test_a_folder_that_is_not_there_or_that_others_can_write_to_is_not_used(
+    home, make, monkeypatch, spoil
+):
+    assert not kept(make)
     assert home.stat().st_mode & 0o777 == 0o700
-    home.chmod(mode)
-    assert_made(cached("a-1", make))
-    assert_made(cached("a-2", make))
-    assert make.calls == 3
+    spoil(home, monkeypatch)
+    assert [kept(make), kept(make, "a-2")] == [False, False]
     assert [path.name for path in home.iterdir()] == ["a-1.npz"]
 
 
-@pytest.mark.parametrize("difference", [-1, 1])
-def test_the_folder_of_another_user_is_not_used(monkeypatch, difference):
-    make, user = Maker(), os.getuid()
-    cached("a-1", make)
-    monkeypatch.setattr(os, "getuid", lambda: user + difference)
-    assert_made(cached("a-1", make))
-    assert make.calls == 2
-
-
-def test_without_a_home_folder_nothing_is_kept(monkeypatch):
-    def homeless():
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setattr(Path, "home", homeless)
-    make = Maker()
-    for _ in range(2):
-        assert_made(cached("a-1", make))
-    assert make.calls == 2
-
-
-def test_pickles_are_neither_opened_nor_kept(home):
-    make, file = Maker(), home / "a-1.npz"
-    cached("a-1", make)
-    archive = io.BytesIO()
+def test_pickles_are_neither_opened_nor_kept(home, make):
+    file, archive = home / "a-1.npz", io.BytesIO()
+    assert not kept(make)
     np.savez(archive, points=np.array([{"a": 1}], dtype=object))
     file.write_bytes(archive.getvalue() + files._digest(file, archive.getvalue()))
-    assert_made(cached("a-1", make))
-    assert make.calls == 2
+    assert not kept(make)
     cached("a-2", lambda: {"points": np.array([{"a": 1}], dtype=object)})
     assert [path.name for path in home.iterdir()] == ["a-1.npz"]
