@@ -184,9 +184,14 @@ def test_a_pentagon_has_the_same_area_however_it_is_cut(tmp_path, part):
     assert area(triangles) == 5.0
 
 
-ASCII = ascii_stl(BRICK)
-NEGATIVE = "<vcount>4 -1</vcount><p>9 0 9 1 9 2</p>"
+ASCII, WHOLE = ascii_stl(BRICK), dae(geometry(BRICK), NODE)
+FOUR = "<vcount>4</vcount>"
+MINUS = "<vcount>4 -1</vcount><p>9 0 9 1 9 2</p>"
 BAD_NODE = '<node id="n"><instance_node url="#n"/></node>'
+
+
+def of(part):
+    return dae(geometry(BRICK, part=part), NODE)
 
 
 @pytest.mark.parametrize(
@@ -216,27 +221,19 @@ BAD_NODE = '<node id="n"><instance_node url="#n"/></node>'
         ("a.dae", dae("", NODE), "<instance_geometry> refers to '#g', which is not there"),
         ("a.dae", dae("", BAD_NODE), "cannot be read .*recursion"),
         ("a.dae", dae(geometry(BRICK * np.nan), NODE), "not finite"),
-        ("a.dae", dae(geometry(BRICK), NODE).replace(b"0.5", b"half"), "cannot be read"),
-        ("a.dae", dae(geometry(BRICK), NODE).replace(b"34 35<", b"34 36<"), "names a point"),
-        ("a.dae", dae(geometry(BRICK), NODE).replace(b"34 35<", b"34 -1<"), "names a point"),
-        ("a.dae", dae(geometry(BRICK), NODE).replace(b" 35<", b"<"), "cannot be read"),
-        (
-            "a.dae",
-            dae(geometry(BRICK), NODE).replace(b'"3"', b'"9' + b"0" * 30 + b'"'),
-            "cannot be",
-        ),
+        ("a.dae", WHOLE.replace(b"0.5", b"half"), "cannot be read"),
+        ("a.dae", WHOLE.replace(b"34 35<", b"34 36<"), "names a point"),
+        ("a.dae", WHOLE.replace(b"34 35<", b"34 -1<"), "names a point"),
+        ("a.dae", WHOLE.replace(b" 35<", b"<"), "cannot be read"),
+        ("a.dae", WHOLE.replace(b'"3"', b'"9' + b"0" * 30 + b'"'), "cannot be"),
         ("a.obj", obj(TRIANGLE) + b"f 1 2 9" + b"0" * 30, "a face names point 90"),
-        ("a.dae", dae(geometry(BRICK), NODE).replace(b'"VERTEX"', b'"V"'), "no input VERTEX"),
-        ("a.dae", dae(geometry(BRICK), NODE).replace(b'"POSITION"', b'"P"'), "no input POSITION"),
+        ("a.dae", WHOLE.replace(b'"VERTEX"', b'"V"'), "no input VERTEX"),
+        ("a.dae", WHOLE.replace(b'"POSITION"', b'"P"'), "no input POSITION"),
         ("a.dae", dae("", "<node><skew>0 0 0 0 0 0 0</skew></node>"), "it has a <skew>"),
         ("a.dae", dae("", "<node><instance_controller/></node>"), "it has a skin"),
-        ("a.dae", dae(geometry(BRICK, part=f"<polygons>{INPUTS}<ph/></polygons>"), NODE), "holes"),
-        ("a.dae", dae(geometry(BRICK, part=f"<patch>{INPUTS}</patch>"), NODE), "it has <patch>"),
-        (
-            "a.dae",
-            dae(geometry(BRICK, part=f"<polylist>{INPUTS}<vcount>4</vcount></polylist>"), NODE),
-            "a <polylist> of 4 corners has 0",
-        ),
+        ("a.dae", of(f"<polygons>{INPUTS}<ph/></polygons>"), "holes"),
+        ("a.dae", of(f"<patch>{INPUTS}</patch>"), "it has <patch>"),
+        ("a.dae", of(f"<polylist>{INPUTS}{FOUR}</polylist>"), "a <polylist> of 4 corners has 0"),
         ("a.obj", b"v 0 0\n", "'v 0 0' is no point"),
         ("a.obj", b"v 1 " + b"0" * 80, f"'v 1 {'0' * 56}' is no point"),
         ("a.obj", b"f 0 " + b"1" * 80, f"'f 0 {'1' * 56}' names a point"),
@@ -245,7 +242,7 @@ BAD_NODE = '<node id="n"><instance_node url="#n"/></node>'
         ("a.dae", dae("", "<node><lookat>1 2 3</lookat></node>"), "it has a <lookat>"),
         (
             "a.dae",
-            dae(geometry(BRICK, part=f"<polylist>{INPUTS}{NEGATIVE}</polylist>"), NODE),
+            of(f"<polylist>{INPUTS}{MINUS}</polylist>"),
             "a <polylist> of 3 corners has 3",
         ),
         ("a.step", b"x", "of kind '.step', expected .dae, .obj, .stl"),
