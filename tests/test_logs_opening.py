@@ -99,10 +99,12 @@ def test_a_folder_is_its_logs_however_deep_and_other_files_are_named(tmp_path, r
 
 
 def test_a_folder_that_is_a_bag_or_a_data_set_is_one_log(tmp_path):
-    for name in ("bag/metadata.yaml", "episodes/meta/info.json"):
-        (tmp_path / name).parent.mkdir(parents=True)
+    files = ("bag/metadata.yaml", "cut/a.mcap", "episodes/meta/info.json", "two/a.db3", "two/b.db3")
+    for name in files:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("{}")
-    assert logs_in(tmp_path)[0] == (tmp_path / "bag", tmp_path / "episodes")
+    logs = ("bag", "cut", "episodes", "two/a.db3", "two/b.db3")
+    assert logs_in(tmp_path)[0] == tuple(tmp_path / name for name in logs)
 
 
 def test_a_single_run_is_not_chosen_from_several(tmp_path, run):
