@@ -1,6 +1,7 @@
 """The recording and the report of a run say the same."""
 
 import re
+from unittest.mock import patch
 
 import pytest
 from recordings import read
@@ -58,36 +59,26 @@ def test_an_annotated_failure_that_was_found_is_localised_as_it_was_found(page, 
 
 @pytest.fixture(scope="module")
 def page(analysis):
-    """The page, and what its picture was drawn with: spans, bars, names of rows."""
+    """The page, and what its picture was drawn with: spans and bars."""
     axes = pytest.importorskip("matplotlib.axes").Axes
-    drawn = {"axvspan": [], "broken_barh": [], "set_yticks": []}
-
-    def noted(name):
-        plain = getattr(axes, name)
-
-        def call(self, *values, **style):
-            drawn[name].append((values, style))
-            return plain(self, *values, **style)
-
-        return call
-
-    with pytest.MonkeyPatch.context() as patched:
-        for name in drawn:
-            patched.setattr(axes, name, noted(name))
-        return html.page(analysis), drawn
+    with (
+        patch.object(axes, "axvspan", autospec=True, side_effect=axes.axvspan) as spans,
+        patch.object(axes, "broken_barh", autospec=True, side_effect=axes.broken_barh) as bars,
+    ):
+        return html.page(analysis), spans.call_args_list, bars.call_args_list
 
 
 def test_the_picture_of_the_page_shades_the_same_stretches_in_the_same_colours(
     analysis, recording, page
 ):
-    _, drawn = page
+    _, spans, bars = page
     (event,) = analysis.findings
     ends, shade = (event.start, event.stop), colors.CLASSES[event.label]
     painted = tuple(channel / 255 for channel in shade)
-    assert drawn["axvspan"]
-    for span, style in drawn["axvspan"]:
-        assert (span, style["facecolor"]) == (ends, painted)
-    bars = [(bar[0], style["facecolor"]) for bar, style in drawn["broken_barh"]]
-    assert ([(event.start, event.stop - event.start)], painted) in bars
+    assert spans
+    for call in spans:
+        assert (call.args[1:], call.kwargs["facecolor"]) == (ends, painted)
+    drawn = [(call.args[1], call.kwargs["facecolor"]) for call in bars]
+    assert ([(event.start, event.stop - event.start)], painted) in drawn
     _, (rgba,) = read(recording, f"/noise/finding/{event.label}", "Measurements:colors")
     assert rgba[0] >> 8 == int.from_bytes(bytes(shade), "big")
