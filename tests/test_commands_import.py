@@ -72,14 +72,6 @@ def test_one_bad_log_does_not_stop_the_others(bag, tmp_path):
     assert [path.name for path in (tmp_path / "runs").iterdir()] == ["bag.npz"]
 
 
-def test_nothing_is_written_of_a_log_that_cannot_be_read(tmp_path):
-    (tmp_path / "bad.csv").write_text("time,a.velocity\n0,1\n1,x\n")
-    status, out, err = importing(tmp_path / "bad.csv", "-o", tmp_path / "run.npz")
-    assert (status, out) == (3, "")
-    assert len(err.splitlines()) == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
-
-
 def test_a_mapping_is_saved_and_used_again(tmp_path):
     np.savez(tmp_path / "log.npz", clock=np.arange(400) / 100, dq=VELOCITY)
     options = ["--map", "time=clock", "--map", "velocity=dq", "--joints", ",".join(JOINTS)]
