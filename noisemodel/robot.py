@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, distribution
 from math import inf, isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -418,6 +417,8 @@ def _coupled(
 
 def listed_folders() -> tuple[Path, ...]:
     """Folders that the listed robots' ``package://`` addresses are searched in."""
+    from importlib.metadata import PackageNotFoundError, distribution  # slow
+
     try:
         share = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
     except PackageNotFoundError as error:

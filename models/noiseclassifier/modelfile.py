@@ -15,7 +15,6 @@ import stat
 import zipfile
 from collections.abc import Mapping
 from contextlib import suppress
-from importlib import metadata
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -56,6 +55,8 @@ _KINDS += [
 
 def versions() -> dict[str, str]:
     """Versions of the software that trains models, by name."""
+    from importlib import metadata
+
     import sklearn
 
     try:
