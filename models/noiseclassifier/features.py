@@ -27,7 +27,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 AT_ONCE = 2**17
 CHUNK = 64  # frames that are evaluated at once, which bounds the memory that they take
 # Frames' lengths of samples that are taken at once, which bounds the memory that they take.
-LENGTHS = 8
+LENGTHS = 2
 # Added to each spread, in [Np]: features of a robot that stands hardly vary at all.
 LEAST_SPREAD = 0.15
 MOST_RELATIVE = 15.0  # largest relative feature
