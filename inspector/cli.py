@@ -9,6 +9,7 @@ from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any
 
 import typer
@@ -126,34 +127,29 @@ UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.E
 # --- commands
 
 
-class _Plain:
-    """Takes defaults and paths as they are: to check them, typer imports pydantic for 0.1 s."""
+def _plain(checked: Callable[[], Any]) -> Any:
+    """Take defaults and paths as they are: to check them, typer imports pydantic for 0.1 s."""
 
-    def __init__(self, checked: Callable[[], Any]) -> None:
-        self._checked = checked
-
-    def __call__(self) -> "_Plain":
-        return self
-
-    def coerce(self, value: Any, *, param: Any, ctx: Any) -> Any:
+    def coerce(value: Any, *, param: Any, ctx: Any) -> Any:
         many = param.multiple or param.nargs == -1
         if value is None or value is param.default:
             return () if value is None and many else value
         paths = many and param.type_descriptor.annotation == list[Path]
         if paths and all(isinstance(each, str) and os.access(each, os.R_OK) for each in value):
             return list(map(Path, value))
-        return self._checked().coerce(value, param=param, ctx=ctx)
+        return checked().coerce(value, param=param, ctx=ctx)
+
+    return lambda: SimpleNamespace(coerce=coerce)
 
 
 class _Taking:
-    """A command or group that checks what was typed alone."""
+    """A command or group that has typer check what was typed alone."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         found: list[Any] = super().get_params(ctx)  # type: ignore[misc]
         for each in found:
-            checked = getattr(each, "get_runtime_param", None)  # of typer's latest versions
-            if checked is not None and not isinstance(checked, _Plain):
-                each.get_runtime_param = _Plain(checked)
+            if hasattr(each, "get_runtime_param"):  # of typer's latest versions
+                each.get_runtime_param = _plain(each.get_runtime_param)
         return found
 
 

@@ -180,21 +180,16 @@ class Lasting(Windows):
 
         Few are. Each window shares its second half with the third window from it.
         """
-        _, windows, samples = slopes.shape
-        length = samples - 2 * self._hop
-        at_once = max(1, AT_ONCE // ((windows + 2) * length))
-        loudest = np.empty((len(slopes), windows + 2))
-        for first in range(0, len(slopes), at_once):
-            some = slopes[first : first + at_once]
-            halves = np.zeros((len(some), windows + 2, length + 1))  # one more is transformed fast
-            halves[:, :windows, 1:] = some[..., :length]
-            halves[:, windows, 1:] = some[:, -1, self._hop : self._hop + length]
-            halves[:, windows + 1, 1:] = some[:, -1, 2 * self._hop :]
-            power, frequency = spectrum(halves, self.rate)
-            least = max(1, int(np.searchsorted(frequency, LOWEST)) - 1)
-            loudest[first : first + at_once] = power[..., least:].max(axis=2, initial=0.0)
-        loudest = np.maximum(np.maximum(loudest[:, :-2], loudest[:, 1:-1]), loudest[:, 2:])
-        return np.asarray(loudest >= 10.0 ** ((STRONG + FLOOR - HALVES) / 10.0))
+        joints, windows, samples = slopes.shape
+        length, hop = samples - 2 * self._hop, self._hop
+        halves = np.zeros((joints, windows + 2, length + 1))  # one more is transformed fast
+        halves[:, :-2, 1:] = slopes[..., :length]
+        halves[:, -2:, 1:] = sliding_window_view(slopes[:, -1, hop:], length, axis=1)[:, ::hop]
+        power, frequency = spectrum(halves, self.rate)
+        least = max(1, int(np.searchsorted(frequency, LOWEST)) - 1)
+        loudest = power[..., least:].max(axis=2, initial=0.0)
+        level = sliding_window_view(loudest, 3, axis=1).max(axis=2)
+        return np.asarray(level >= 10.0 ** ((STRONG + FLOOR - HALVES) / 10.0))
 
     def _end(self, rest: Array) -> None:
         length = rest.shape[2]
