@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import rerun as rr
 from rerun.chunk import RrdReader
 
 from noiseclassifier import Labels
 
+rr.set_strict_mode(True)  # wrong arguments are errors
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 LINE = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
 LINE |= {"SeriesLines:aggregation_policy"}

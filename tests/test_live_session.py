@@ -2,7 +2,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import rerun as rr
 from recordings import entities, read
 from rerun.chunk import RrdReader
 
@@ -19,11 +18,6 @@ from noisemodel import UnknownJointError
 
 RATE = 1000.0
 PANDA = tuple(f"panda_joint{i}" for i in range(1, 8))
-
-
-@pytest.fixture(autouse=True)
-def strict():
-    rr.set_strict_mode(True)
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +76,6 @@ def classes(path):
 @pytest.fixture(scope="module")
 def panda(tmp_path_factory, library):
     """Recording, warnings and summary of a Panda that hums for a second."""
-    rr.set_strict_mode(True)
     folder, signals = tmp_path_factory.mktemp("panda"), motion(3.0, 7)
     return shown(folder, signals, robot="panda", joint_names=PANDA, library=library)
 

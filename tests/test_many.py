@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import rerun as rr
 from commandline import call
 from recordings import entities, read
 
@@ -11,11 +10,6 @@ from inspector.logs.read import open_run
 from inspector.recording.axes import TOP
 from noiseclassifier import Event
 from noisemodel import Block, Run
-
-
-@pytest.fixture(autouse=True)
-def strict():
-    rr.set_strict_mode(True)
 
 
 def run_file(folder, name, *, loud=0.0, seconds=3.0, start=0.0, blocks=()):

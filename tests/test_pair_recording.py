@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import rerun as rr
 from commandline import call as inspector
 from recordings import (
     BAND,
@@ -23,19 +22,14 @@ from recordings import (
     stretches,
 )
 from rerun.chunk import RrdReader
+from test_pair_pair import compared
 
-from inspector.compare.pair import compare
 from inspector.compare.recording import write
 from inspector.levels import LINKS as LINK_SCALE
 from inspector.levels import link_levels
 from inspector.recording import panels
 from noiseclassifier import Event
 from noisemodel import Block, Run
-
-
-@pytest.fixture(autouse=True)
-def strict():
-    rr.set_strict_mode(True)
 
 
 def panda(scale=1.0, rattle=0.1, **changes):
@@ -57,15 +51,8 @@ def panda(scale=1.0, rattle=0.1, **changes):
     return Run(**(fields | changes))
 
 
-def compared(folder, before, after, **options):
-    before.save(folder / "before.npz", overwrite=True)
-    after.save(folder / "after.npz", overwrite=True)
-    return compare(folder / "before.npz", folder / "after.npz", {}, **options)
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    rr.set_strict_mode(True)
     folder = tmp_path_factory.mktemp("whole")
     pair = compared(folder, panda(), panda(2.0))
     events = (Event("impact", 0.5, 1.0, 0.9),)

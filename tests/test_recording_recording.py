@@ -3,7 +3,6 @@ import hashlib
 
 import numpy as np
 import pytest
-import rerun as rr
 from recordings import (
     BAND,
     LABELS,
@@ -35,11 +34,6 @@ from inspector.reference.judging import Scenario, compare
 from inspector.reference.levels import levels as levels_of
 from noiseclassifier import Event
 from noisemodel import Block, Run
-
-
-@pytest.fixture(autouse=True)
-def strict():
-    rr.set_strict_mode(True)
 
 
 def panda_run(**changes):
@@ -82,7 +76,6 @@ LABELLED = some_labels(slice(5, 8))
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    rr.set_strict_mode(True)
     folder = tmp_path_factory.mktemp("whole")
     run = panda_run()
     found = inspected(run, folder, LABELLED, kind="paper")
