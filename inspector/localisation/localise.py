@@ -149,7 +149,7 @@ def _high_passed(signal: Array, begin: Indices, rate: float) -> Array:
     last = np.arange(1, len(signal) + 1)
     first = np.maximum(begin, last - round(PAST * rate))
     sums = np.concatenate((np.zeros((1, signal.shape[1])), np.cumsum(signal, axis=0)))
-    return np.asarray(signal - (sums[last] - sums[first]) / np.maximum(last - first, 1)[:, None])
+    return np.asarray(signal - (sums[1:] - sums[first]) / np.maximum(last - first, 1)[:, None])
 
 
 def _gain(power: Array, known: Mask, shortest: int) -> Array:

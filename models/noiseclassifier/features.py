@@ -148,8 +148,8 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
         rows = np.moveaxis(squares, 0, -2)[..., None, :]
         amplitude = (rows @ _power_shares(profile.rate, resolution))[..., 0, :]
         if signals and not profile.relative:  # the loudest joint has the largest logarithm
-            norms, joints = amplitude[..., : profile.norms, :], amplitude[..., profile.norms :, :]
-            amplitude = np.concatenate((norms, _loudest(joints, signals)), axis=-2)
+            loudest = _loudest(amplitude[..., profile.norms :, :], signals)
+            amplitude = np.concatenate((amplitude[..., : profile.norms, :], loudest), axis=-2)
         np.sqrt(amplitude, out=amplitude)
     else:
         amplitude = np.moveaxis(compress(np.abs(spectrum), comb=profile.bands == "comb"), 0, -2)
@@ -160,7 +160,7 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
     if profile.differences:
         parts.append(norms[..., 1:, :] - norms[..., :-1, :])
     if signals:
-        loudest = _loudest(joints, signals)
+        loudest = _loudest(joints, signals) if profile.relative else joints
         moving = loudest[..., : profile.moving, :]
         parts += [loudest, moving[..., 1:, :] - moving[..., :-1, :]]
         if profile.relative:
