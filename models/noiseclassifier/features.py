@@ -26,7 +26,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 # How many samples are transformed at once, of all rows: more leave the cache of the processor.
 AT_ONCE = 2**17
 CHUNK = 64  # frames that are evaluated at once, which bounds the memory that they take
-# Frames' lengths of samples that are taken at once, which bounds the memory that they take.
+# Frames' lengths of samples that are taken at once at least: few, which bounds the memory.
 LENGTHS = 2
 # Added to each spread, in [Np]: features of a robot that stands hardly vary at all.
 LEAST_SPREAD = 0.15
@@ -497,7 +497,7 @@ class FrameFeatures:
                 f"sample {self.count + place} of the signal is not finite ({plain[row, place]})"
             )
         exact = rounded(samples, self._profile).reshape(self._rows, count)
-        at_once = LENGTHS * self._profile.length
+        at_once = max(LENGTHS * self._profile.length, 4 * AT_ONCE // self._rows)
         pieces = [slice(first, first + at_once) for first in range(0, count, at_once)]
         found = [self._take(exact[:, piece], valid[piece]) for piece in pieces]
         return _joined(found) if found else self._nothing
