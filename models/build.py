@@ -42,7 +42,7 @@ THROUGHOUT = 1  # and one with a fault of the whole run
 FAST = 10_018  # a further one, the first whose runs are kept at 10 kHz
 # Robots whose scenarios are in the training data, too.
 HOME = ("panda", "go2", "solo12", "anymal", "g1")
-SEEDS = 2  # their seeds in every scenario, from 0
+SEEDS = 6  # their seeds in every scenario, from 0
 # Robots whose scenarios at home are measured on, and their seed.
 TEST, FIRST = ("panda", "go2", "talos"), 55
 # Rates of the logs in the training data, in [Hz].

@@ -88,7 +88,7 @@ def test_a_sample_has_the_frame_whose_middle_is_nearest(exported):
     assert list(frames) == labels.start.tolist()
     rows = list(frames.values())
     assert [row["frame_stop"] for row in rows] == labels.stop.tolist()
-    assert [row["label"] for row in rows] == labels.label.tolist()
+    assert [row["label"] for row in rows] == labels.debounced.tolist()
     scores = [[row[f"score_{name}"] for name in labels.classes] for row in rows]
     np.testing.assert_array_equal(scores, labels.scores)
     for row in table[::97]:
@@ -182,7 +182,7 @@ def test_mcap_holds_levels_where_they_are_known(exported, tmp_path):
 def test_mcap_holds_labels_scores_findings_and_annotations(exported, demo):
     folder, content = exported
     frames = [message for _, message in messages(folder / "demo.mcap", "/labels")]
-    assert [frame["label"] for frame in frames] == content.analysis.labels.label.tolist()
+    assert [frame["label"] for frame in frames] == content.analysis.labels.debounced.tolist()
     assert {frame["alarm"] for frame in frames} == {content.analysis.alarm}
     scores = [list(frame["scores"].values()) for frame in frames]
     assert scores == content.analysis.labels.scores.tolist()

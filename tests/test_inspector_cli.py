@@ -244,5 +244,5 @@ def test_classifying_imports_neither_scikit_learn_nor_scipy_signal_nor_rerun():
 def test_a_score_that_no_finding_can_have_is_refused():
     status, _, err = inspector("classify", demo_run(), "--min-score", "1.5")
     assert (status, "'--min-score'" in err) == (2, True)
-    assert inspector("classify", demo_run(), "--min-score", "0.99")[0] == 0
+    assert inspector("classify", demo_run(), "--min-score", "0.999")[0] == 0
     assert inspector("classify", demo_run(), "--min-score", "0.9")[0] == 1
