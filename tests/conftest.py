@@ -28,6 +28,19 @@ def cache(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def simulate():
+    """The robot of `examples/accept`."""
+    folder = str(Path(__file__).parents[1] / "examples" / "accept")
+    sys.path.insert(0, folder)
+    try:
+        import simulate
+
+        yield simulate
+    finally:
+        sys.path.remove(folder)
+
+
+@pytest.fixture(scope="session")
 def lola():
     """A folder of synthetic logs in NoisyTest's form, made once and kept for the next time."""
     script = SHARED / "tools" / "standin_lola.py"

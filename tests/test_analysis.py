@@ -483,30 +483,23 @@ def inspected(tmp_path, *, blocks=(), events=(), **changes):
 KNOCK, RATTLE = Event("impact", 0.9, 1.2, 3.0), Event("oscillations", 2.0, 3.0, 1.0)
 
 
-def test_the_loudest_finding_comes_first_whatever_its_score(tmp_path):
+def test_the_loudest_three_findings_come_first_whatever_their_scores(tmp_path):
     first, second = worst(inspected(tmp_path, events=(KNOCK, RATTLE)))
     assert (first.label, second.label) == ("oscillations", "impact")
     assert 2.0 <= first.peak <= 3.0
     assert second.peak == pytest.approx(1.0, abs=0.05)
     assert (first.start, first.stop) == (2.0, 3.0)
+    many = [Event("impact", start, start + 0.1, 1.0) for start in np.arange(5) * 0.5]
+    assert len(worst(inspected(tmp_path / "many", events=many))) == 3
 
 
-def test_annotations_count_where_nothing_was_found(tmp_path):
+def test_without_findings_annotations_count_and_else_the_loudest_moment(tmp_path):
     blocks = (Block(0.0, 0.5, "ok"), Block(0.9, 1.2, "impact"))
-    (only,) = worst(inspected(tmp_path, blocks=blocks))
-    assert only.label == "impact"
-
-
-def test_without_any_failure_it_is_the_loudest_moment(tmp_path):
-    (only,) = worst(inspected(tmp_path))
+    assert [each.label for each in worst(inspected(tmp_path, blocks=blocks))] == ["impact"]
+    (only,) = worst(inspected(tmp_path / "bare"))
     assert only.label == LOUDEST
     assert 2.0 <= only.peak <= 3.0
     assert (only.start, only.stop) == (0.0, 3.999)
-
-
-def test_at_most_three_are_picked(tmp_path):
-    events = [Event("impact", start, start + 0.1, 1.0) for start in np.arange(5) * 0.5]
-    assert len(worst(inspected(tmp_path, events=events))) == 3
 
 
 def test_gaps_last_from_their_first_sample_to_the_next_valid_one():
@@ -540,13 +533,6 @@ def test_rows_are_the_loudest_during_findings_in_the_order_of_the_robot():
     assert {12, 17} <= set(found)
 
 
-def test_rows_of_a_run_without_findings_are_the_loudest_at_any_time():
-    level = np.full((100, 20), -60.0)
-    level[10, 5:9] = 20.0
-    level[20] = np.nan  # a gap
-    assert set(range(5, 9)) <= set(chosen(analysed("...."), STEPS, level))
-
-
 def test_steps_that_a_finding_only_touches_do_not_count():
     finding = Event("impact", 3.0, 3.5, 0.9)
     time = np.array([3.0 - STEP, 3.0 - STEP + 1e-6, 3.5 - 1e-6, 3.5])
@@ -558,12 +544,13 @@ def test_steps_that_a_finding_only_touches_do_not_count():
     assert chosen(analysed("....", findings=(again, finding)), time, level) == list(range(4, 12))
 
 
-def test_a_joint_without_a_level_is_the_quietest():
+def test_without_findings_rows_are_the_loudest_at_any_time_and_without_a_level_the_quietest():
+    level = np.full((100, 20), -60.0)
+    level[10, 5:9] = 20.0
+    level[20] = np.nan  # a gap
+    assert set(range(5, 9)) <= set(chosen(analysed("...."), STEPS, level))
     level = np.full((100, 12), -60.0)
     level[:, :4] = np.nan
     assert chosen(analysed("...."), STEPS, level) == list(range(4, 12))
     assert chosen(analysed("...."), STEPS[:0], level[:0]) == list(range(8))
-
-
-def test_a_robot_of_few_joints_has_a_row_for_each():
     assert chosen(analysed("...."), STEPS, np.full((100, 3), -np.inf)) == [0, 1, 2]

@@ -1,11 +1,9 @@
 """Runs of any rate, labelled by a general model: what could not be seen, and held values."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from commandline import call
 from generalmodel import RATES, fixed, run_at, trained
 from scipy.signal import butter, sosfilt
 
@@ -114,19 +112,6 @@ def test_differentiated_velocities_end_what_can_be_seen_earlier():
     log = replace(run, velocity=central, position=position, velocity_desired=None)
     (line,) = (each for each in analyse(log, library()).remarks if "cannot be seen" in each)
     assert "(velocities were differentiated)" in line
-
-
-def test_text_and_json_have_the_sentence(tmp_path):
-    trained().save(tmp_path / "general.npz")
-    run_at(125.0).save(tmp_path / "run.npz")
-    sentence = "At 125 Hz, oscillations above 55 Hz cannot be seen."
-    options = (tmp_path / "run.npz", "--model", tmp_path / "general.npz")
-    _, out, _ = call("classify", *options)
-    assert out.count(sentence) == 1
-    _, out, _ = call("classify", *options, "--format", "json")
-    assert json.dumps(json.loads(out)).count(sentence) == 1
-    call("view", *options, "-o", tmp_path / "report.html")
-    assert (tmp_path / "report.html").read_text().count(sentence) == 1
 
 
 # --- held values

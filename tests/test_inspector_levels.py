@@ -52,13 +52,6 @@ def test_a_tone_of_one_rad_per_second_effective_is_at_zero_decibels():
     np.testing.assert_allclose(level[2:-2], 0.0, atol=0.2)
 
 
-def test_twice_the_amplitude_is_six_decibels_more():
-    valid = everywhere(tone(1.0))
-    _, one = velocity_levels(tone(0.1), valid, RATE)
-    _, two = velocity_levels(tone(0.2), valid, RATE)
-    np.testing.assert_allclose(two - one, 20 * np.log10(2))
-
-
 def test_slow_motion_and_standstill_have_no_level():
     slow = tone(1.0, hertz=0.5)
     _, level = velocity_levels(np.hstack((slow, 0 * slow)), everywhere(slow), RATE)
@@ -113,17 +106,12 @@ def wave(hertz, rate, seconds):
 
 
 @pytest.mark.parametrize(("hertz", "rate"), [(300.0, 10_000.0), (120.0, 1000.0), (20.0, 250.0)])
-def test_a_tone_is_loudest_at_its_frequency(hertz, rate):
-    signal = wave(hertz, rate, 2.0)
+@pytest.mark.parametrize("constant", [0.0, 1000.0])
+def test_a_tone_is_loudest_at_its_frequency_and_a_constant_is_not_shown(hertz, rate, constant):
+    signal = constant + wave(hertz, rate, 2.0)
     shown = spectrogram(signal, rate, start=0.0, valid=everywhere(signal))
     loudest = shown.frequency[shown.amplitude.argmax(axis=0)]
     assert np.abs(loudest - hertz).max() <= shown.frequency[1] - shown.frequency[0]
-
-
-def test_the_constant_part_of_a_noise_is_not_shown():
-    signal = 1000.0 + wave(200.0, 10_000.0, 1.0)
-    shown = spectrogram(signal, 10_000.0, start=0.0, valid=everywhere(signal))
-    assert shown.frequency[shown.amplitude.mean(axis=1).argmax()] == pytest.approx(200.0, abs=10.0)
 
 
 def test_windows_that_touch_a_gap_are_silent():

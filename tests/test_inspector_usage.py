@@ -10,6 +10,7 @@ import typer
 from commandline import call
 from typer.testing import CliRunner
 
+import inspector
 import noisemodel
 from inspector import cli
 from inspector.cli import app
@@ -27,6 +28,11 @@ def test_the_version_is_that_of_the_distribution_and_0_without_one(monkeypatch):
         monkeypatch.setattr(metadata, "version", version)
         result = CliRunner().invoke(app, ["--version"])
         assert (result.exit_code, result.output) == (0, f"inspector {shown}\n")
+
+
+def test_the_names_of_the_package_are_the_public_ones_and_can_be_imported():
+    assert dir(inspector) == sorted(inspector.__all__)
+    assert all(hasattr(inspector, name) for name in inspector.__all__)
 
 
 def test_kinds_are_those_of_the_noise_model():

@@ -87,34 +87,25 @@ def test_ripple_of_a_steady_motion_cannot_be_told_from_a_tone():
     assert order(run, FINDING) is None
 
 
-@pytest.mark.parametrize("scale", [0.1, 10.0])
-def test_the_scale_of_ripple_does_not_change_its_order(scale):
-    one, other = (best_lines(run_with(ripple(0.02 * k), noise=0.0), FINDING) for k in (1.0, scale))
-    assert other[0].periods_per_turn == pytest.approx(one[0].periods_per_turn, rel=1e-3)
-    assert other[1:] == pytest.approx(one[1:], abs=0.01)
+def test_scale_units_and_the_direction_of_time_do_not_change_ripple():
+    def same(one, other, factor=1.0):
+        order = pytest.approx(factor * one[0].periods_per_turn, rel=1e-3)
+        assert other[0].periods_per_turn == order
+        assert other[1:] == pytest.approx(one[1:], abs=0.01)
 
-
-def test_units_of_velocity_and_angle_scale_the_order_alone():
+    plain, quiet, loud = (
+        best_lines(run_with(ripple(0.02 * k), noise=0.0), FINDING) for k in (1.0, 0.1, 10.0)
+    )
+    same(plain, quiet)
+    same(plain, loud)
     run = run_with(ripple(0.02))
     signals = {name: 2.0 * getattr(run, name) for name in ("velocity", "velocity_desired")}
     doubled = replace(run, position=2.0 * run.position, **signals)
-    one, other = best_lines(run, FINDING), best_lines(doubled, FINDING)
-    assert other[0].periods_per_turn == pytest.approx(one[0].periods_per_turn / 2, rel=1e-3)
-    assert other[1:] == pytest.approx(one[1:], abs=0.01)
-
-
-def test_a_run_backwards_in_time_has_the_same_order():
-    run = run_with(ripple(0.02))
-    backwards = replace(
-        run,
-        velocity=-run.velocity[::-1],
-        velocity_desired=-run.velocity_desired[::-1],
-        position=run.position[::-1],
-    )
+    same(best_lines(run, FINDING), best_lines(doubled, FINDING), 0.5)
+    signals = {name: -getattr(run, name)[::-1] for name in ("velocity", "velocity_desired")}
+    backwards = replace(run, position=run.position[::-1], **signals)
     mirrored = Event("oscillations", SECONDS - FINDING.stop, SECONDS - FINDING.start, 0.9)
-    one, other = best_lines(run, FINDING), best_lines(backwards, mirrored)
-    assert other[0].periods_per_turn == pytest.approx(one[0].periods_per_turn, rel=1e-3)
-    assert other[1:] == pytest.approx(one[1:], abs=0.01)
+    same(best_lines(run, FINDING), best_lines(backwards, mirrored))
 
 
 def test_a_tone_in_the_loudest_joint_masks_the_ripple_of_another():

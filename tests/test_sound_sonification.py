@@ -54,13 +54,6 @@ def rms(signal):
     return float(np.sqrt(np.mean(np.square(middle(signal)))))
 
 
-def test_an_oscillation_of_440_hz_sounds_at_440_hz():
-    sound = sonify(run_of(0.01 * tone(440)))
-    frequency, rate = pitch(sound.file(common_gain([sound])))
-    assert rate == 48_000
-    assert frequency == pytest.approx(440, abs=0.5)
-
-
 def test_an_oscillation_about_a_steady_motion_sounds_the_same():
     still, moving = (sonify(run_of(base + 0.01 * tone(440))) for base in (0.0, 2.0))
     np.testing.assert_allclose(middle(still.signal), middle(moving.signal), atol=1e-8)
@@ -79,13 +72,6 @@ def test_the_power_of_a_sound_is_that_of_the_noise_estimate():
     whole = np.sqrt(np.mean(nm.simplified(run.motion, run.velocity_desired) ** 2))
     # Windows that overlap do not quite agree where many joints rattle at random.
     assert 20 * np.log10(rms(sonify(run).signal) / whole) == pytest.approx(0, abs=1.0)
-
-
-def test_twice_the_noise_is_6_db_more_at_equal_gain():
-    quiet, loud = sonify(run_of(0.01 * tone(440))), sonify(run_of(0.02 * tone(440)))
-    gain = common_gain([quiet, loud])
-    levels = [20 * np.log10(rms(read(sound.file(gain))[0])) for sound in (quiet, loud)]
-    assert levels[1] - levels[0] == pytest.approx(20 * np.log10(2), abs=0.01)
 
 
 def test_standstill_is_silent_and_reported_so():
@@ -120,13 +106,13 @@ def test_an_impact_sounds_at_its_time():
     assert np.abs(sound.signal).argmax() == pytest.approx(10_010, abs=25)
 
 
-@pytest.mark.parametrize("rate", [100.0, 333.0, 1000.0, 9999.0, 48_000.0, 100_000.0])
-def test_a_sound_has_the_duration_of_its_log_at_any_rate(rate):
+@pytest.mark.parametrize("rate", [100.0, 333.0, 1000.0, 9999.0, RATE, 48_000.0, 100_000.0])
+def test_a_sound_has_the_duration_and_the_pitch_of_its_log_at_any_rate(rate):
     hertz = min(rate / 4, 440.0)
     sound = sonify(run_of(tone(hertz, rate=rate), rate=rate))
     data = sound.file(-6.0)
     assert len(read(data)[0]) / 48_000 == pytest.approx(2.0, abs=2 / rate)
-    assert pitch(data)[0] == pytest.approx(hertz, abs=1.0)
+    assert pitch(data) == (pytest.approx(hertz, abs=0.5), 48_000)
 
 
 def test_playing_faster_makes_low_frequencies_audible():
