@@ -107,6 +107,21 @@ def write_bag(path, talk, topics, *, storage="mcap", compression=None):
     return path
 
 
+def write_mcap(path, messages, *, kind="sensor_msgs/msg/JointState", text="", **how):
+    """Write an MCAP file of messages with their times, whatever the definition of their type."""
+    from mcap.writer import Writer
+
+    with path.open("wb") as stream:
+        writer = Writer(stream, **how)
+        writer.start("ros2")
+        schema = writer.register_schema(kind, "ros2msg", text.encode())
+        topic = writer.register_channel("/joint_states", "cdr", schema)
+        for at, data in messages:
+            writer.add_message(topic, int(at), bytes(data), int(at))
+        writer.finish()
+    return path
+
+
 def joint_states(talk, times=TIMES, names=JOINTS, received=None, **arrays):
     """Messages of joint states, each a row of the arrays."""
     received = times if received is None else received
@@ -116,7 +131,7 @@ def joint_states(talk, times=TIMES, names=JOINTS, received=None, **arrays):
     ]
 
 
-def write_lerobot(folder, episodes, *, names, v3=True, fps=30, action=True, **more):
+def write_lerobot(folder, episodes, *, names, v3=True, fps=30):
     """Write a LeRobot data set of states, (frames, joints) each, the actions a frame ahead."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -127,7 +142,7 @@ def write_lerobot(folder, episodes, *, names, v3=True, fps=30, action=True, **mo
         "codebase_version": "v3.0" if v3 else "v2.1",
         "robot_type": "so101",
         "fps": fps,
-        "features": {"observation.state": feature, "action": feature} | more.pop("features", {}),
+        "features": {"observation.state": feature, "action": feature},
     }
     (folder / "meta").mkdir(parents=True)
     (folder / "meta" / "info.json").write_text(json.dumps(info))
@@ -143,8 +158,6 @@ def write_lerobot(folder, episodes, *, names, v3=True, fps=30, action=True, **mo
             "frame_index": np.arange(len(state)),
             "episode_index": np.full(len(state), number),
         }
-        if not action:
-            del columns["action"]
         tables.append(pa.table(columns))
         if not v3:
             pq.write_table(tables[-1], data / f"episode_{number:06d}.parquet")

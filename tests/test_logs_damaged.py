@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
-from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag
+from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag, write_mcap
 
 from inspector import read_log
 from inspector.errors import LogError
@@ -70,15 +69,9 @@ def test_a_damaged_chunk_is_a_gap(whole, tmp_path):
 
 @pytest.mark.parametrize("damaged", [False, True])
 def test_a_checksum_of_the_whole_file_is_checked(tmp_path, damaged):
-    path = tmp_path / "log.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream, use_chunking=False, enable_data_crcs=True)
-        writer.start()
-        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
-        channel = writer.register_channel("/a", "cdr", schema)
-        for at, message in joint_states(TALK, position=POSITION[:400]):
-            writer.add_message(channel, int(at), bytes(TALK.raw(message)), int(at))
-        writer.finish()
+    messages = [(at, TALK.raw(each)) for at, each in joint_states(TALK, position=POSITION[:400])]
+    how = {"use_chunking": False, "enable_data_crcs": True}
+    path = write_mcap(tmp_path / "log.mcap", messages, **how)
     if damaged:
         number = POSITION[7, 0].tobytes()
         path.write_bytes(path.read_bytes().replace(number, number[:-3] + b"\1" + number[-2:], 1))

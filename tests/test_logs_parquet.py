@@ -46,17 +46,6 @@ def test_columns_of_lists_are_arrays_of_joints(tmp_path):
     assert np.array_equal(run.velocity, VELOCITY)
 
 
-def test_columns_of_mujocos_state_are_read_as_in_other_tables(tmp_path):
-    columns = {f"qpos_{n}": POSITION[:, n] for n in range(3)}
-    columns |= {f"ctrl_{n}": POSITION[:, n] for n in range(3)}
-    imported = read_log(wide(tmp_path, **columns), rate=100)
-    assert np.array_equal(imported.run.position_desired, POSITION)
-    assert imported.remarks[:2] == (
-        "log.parquet: there are no stamps: 100 Hz, as --rate says",
-        "log.parquet: taken: position = qpos[0:3], position_desired = ctrl (position follows it)",
-    )
-
-
 def test_what_does_not_fit_is_an_error_of_one_line(tmp_path):
     ragged = [row[: 2 + n % 2] for n, row in enumerate(POSITION)]
     with pytest.raises(

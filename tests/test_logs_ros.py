@@ -4,9 +4,8 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_bag
+from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_bag, write_mcap
 
 from inspector import read_log
 from inspector.errors import LogError
@@ -62,15 +61,8 @@ def test_the_stamps_are_those_of_the_messages_and_without_any_those_of_the_recor
 
 
 def test_messages_are_in_the_order_in_which_they_were_received(tmp_path):
-    path = tmp_path / "log.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
-        topic = writer.register_channel("/joint_states", "cdr", schema)
-        for at, message in sorted(states(), key=lambda each: int(each[0]) // 10_000_000 % 7):
-            writer.add_message(topic, int(at), bytes(TALK.raw(message)), int(at))
-        writer.finish()
+    mixed = sorted(states(), key=lambda each: int(each[0]) // 10_000_000 % 7)
+    path = write_mcap(tmp_path / "log.mcap", [(at, TALK.raw(message)) for at, message in mixed])
     assert np.array_equal(read_log(path).run.position, POSITION)
 
 

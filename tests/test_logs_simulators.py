@@ -179,7 +179,7 @@ def test_mujocos_arrays_are_joints_base_and_targets_without_floating_objects(tmp
     assert np.abs(run.velocity_desired - run.velocity).std() < 0.5
 
 
-def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_a_csv(tmp_path):
+def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_tables(tmp_path):
     log = simulated("")
     names = [
         f"{name}_{n}"
@@ -188,9 +188,11 @@ def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_a_csv(tmp_path):
     ]
     table = np.hstack([log["time"][:, None], log["qpos"], log["qvel"], log["ctrl"]])
     np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=",".join(["time", *names]))
+    columns = dict(zip(["time", *names], table.T, strict=True))
+    pq.write_table(pa.table(columns), tmp_path / "log.parquet")
     npz = read_log(savez(tmp_path / "log.npz", **log)).run
     del log["qfrc_actuator"]
-    for path in (hdf5(tmp_path / "log.h5", log), tmp_path / "log.csv"):
+    for path in (hdf5(tmp_path / "log.h5", log), tmp_path / "log.parquet", tmp_path / "log.csv"):
         run, remarks = said(path)
         assert run.joint_names == ("joint_0", "joint_1")
         assert np.allclose(run.position, npz.position, atol=1e-12)
@@ -199,9 +201,7 @@ def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_a_csv(tmp_path):
         taken += " (position follows it)"
         assert remarks.count(taken) == 1
     mapping = ["effort.joint_0=ctrl_0", "effort.joint_1=ctrl_1"]
-    run = read_log(
-        tmp_path / "log.csv", mapping=mapping
-    ).run  # columns that are mapped are no array
+    run = read_log(path, mapping=mapping).run  # columns that are mapped are no array
     assert run.velocity_desired is None
     assert np.array_equal(run.effort, log["ctrl"])
 

@@ -7,8 +7,8 @@ from contextlib import closing, suppress
 
 import numpy as np
 import pytest
-from mcap.writer import CompressionType, Writer
-from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag
+from mcap.writer import CompressionType
+from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag, write_mcap
 
 from inspector import read_log
 from inspector.errors import LogError
@@ -50,14 +50,8 @@ def test_a_bag_that_unpacks_to_too_much_is_refused_and_one_that_does_not_is_read
 
 @pytest.mark.parametrize("how", [CompressionType.ZSTD, CompressionType.LZ4])
 def test_a_chunk_of_zeros_is_not_unpacked(tmp_path, limit, how):
-    path = tmp_path / "a.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream, chunk_size=2**25, compression=how)
-        writer.start("ros2")
-        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"string[] name")
-        topic = writer.register_channel("/joint_states", "cdr", schema)
-        writer.add_message(topic, 1, bytes(2**25), 1)
-        writer.finish()
+    zeros = {"text": "string[] name", "chunk_size": 2**25, "compression": how}
+    path = write_mcap(tmp_path / "a.mcap", [(1, bytes(2**25))], **zeros)
     with pytest.raises(LogError, match="unpacks to"):
         read_log(path)
 
@@ -98,24 +92,11 @@ def test_a_schema_that_is_no_text_is_one_line(tmp_path):
         read_log(path)
 
 
-def mcap(path, kind, text, messages):
-    """An MCAP file with messages of a type, whatever its definition is; each with its time."""
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start("ros2")
-        schema = writer.register_schema(kind, "ros2msg", text.encode())
-        topic = writer.register_channel("/joint_states", "cdr", schema)
-        for at, data in messages:
-            writer.add_message(topic, int(at), bytes(data), int(at))
-        writer.finish()
-    return path
-
-
 @pytest.mark.parametrize("stamp", [2**63, 2**64 - 1])
 def test_stamps_of_64_bits_are_left_out_and_said(tmp_path, stamp):
     text = TALK.store.generate_msgdef(STATE)[0]
     messages = [(at, TALK.raw(message)) for at, message in states(TALK)]
-    path = mcap(tmp_path / "a.mcap", STATE, text, [*messages, (stamp, messages[-1][1])])
+    path = write_mcap(tmp_path / "a.mcap", [*messages, (stamp, messages[-1][1])], text=text)
     imported = read_log(path)
     assert len(imported.run.time) == len(TIMES)
     assert any("1 messages without data, or with stamps after 2116" in r for r in imported.remarks)
@@ -153,7 +134,8 @@ DEFINITIONS = {
 @pytest.mark.parametrize("kind", [STATE, "control_msgs/msg/JointTrajectoryControllerState"])
 def test_a_definition_in_a_bag_is_not_run(tmp_path, kind, text):
     data = b"\0\1\0\0" + b"\xff" * 4000
-    path = mcap(tmp_path / "a.mcap", kind, text, [(at, data) for at in range(3)])
+    messages = [(at, data) for at in range(3)]
+    path = write_mcap(tmp_path / "a.mcap", messages, kind=kind, text=text)
     tracemalloc.start()
     with pytest.raises(LogError) as caught:
         read_log(path)
