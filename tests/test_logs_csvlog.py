@@ -18,16 +18,6 @@ def test_the_first_stamp_is_kept_exactly(tmp_path):
     )
 
 
-def test_a_known_rate_determines_the_unit_of_the_stamps(tmp_path):
-    path = write(tmp_path / "log.csv", {"t": np.arange(5), "a.velocity": np.ones(5)})
-    run = read_log(path, rate=1000).run
-    assert run.rate == 1000.0
-    with pytest.raises(
-        LogError, match="counts samples; give the log's rate, in samples per second: --rate HZ"
-    ):
-        read_log(path)
-
-
 HEAD = "time,a.velocity,b.velocity\n"
 
 
@@ -67,7 +57,11 @@ HEAD = "time,a.velocity,b.velocity\n"
             r"row 1: the name 'a.velocity\\n0,1' cannot be printed; is a q",
         ),
         ("clock,a.velocity\n0,1\n1,1\n", "there are no stamps; give the log's rate"),
-        ("0.0,1.0\n0.1,1.0\n", "row 1: there is no header; .* such as --columns time,q1,q2,"),
+        (
+            "0,1,2,3,4\n" * 2,
+            "row 1: there is no header; the first row has 5 numbers.* such as --columns"
+            r" time,q1,q2,dq1,dq2 \(without stamps: no time, but --rate HZ\)",
+        ),
         ("0,00;1,0;\n0,04;1,0;\n", "row 1: there is no header; the first row has 2 numbers"),
         ("0.0,1.0,2.0\n\n0.1,1.0\n", "row 1: there is no header; the first row has 3 numbers"),
         ("time,speed\n0,1\n0.1,1\n", "no position or velocity of a joint; name columns"),

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,6 @@ from commandline import call
 
 from inspector import read_log
 from inspector.errors import LogError
-from noisemodel import Run
 
 TIME = np.arange(21) / 100
 EPOCH = 1_700_000_000  # where absolute stamps start, in [s] since 1970
@@ -45,8 +44,6 @@ class Format:
     signals: tuple[str, ...]  # of the run, which are those of the motion
     joints: tuple[str, ...] = ("joint_1", "joint_2")
     said: tuple[str, ...] = ()  # the remarks, without the name of the file
-    typed: str = ""  # what has to be typed beside the name of the file
-    options: dict[str, Any] = field(default_factory=dict)  # the same for `read_log`
     gaps: tuple[int, ...] = ()  # samples in gaps
 
     @property
@@ -55,7 +52,7 @@ class Format:
         said = "; ".join(self.said).replace("|", "\\|") or "nothing"
         joints = ", ".join(self.joints)
         return (
-            f"| {self.title} | `{self.shown}` | {f'`{self.typed}`' if self.typed else 'nothing'}"
+            f"| {self.title} | `{self.shown}` | nothing"
             f" | {said} | {', '.join(self.signals)} of {joints} |"
         )
 
@@ -306,7 +303,7 @@ FORMATS = (
 def test_a_log_of_others_is_imported_untouched_and_says_what_was_assumed(tmp_path, each):
     path = tmp_path / "log.csv"
     path.write_bytes(each.text.encode())
-    imported = read_log(path, **each.options)
+    imported = read_log(path)
     run = imported.run
     remarks = tuple(remark.removeprefix("log.csv: ") for remark in imported.remarks)
     assert (remarks, run.joint_names, run.rate) == (each.said, each.joints, 100.0)
@@ -322,24 +319,6 @@ def test_a_log_of_others_is_imported_untouched_and_says_what_was_assumed(tmp_pat
             assert error.max() < 0.05 * np.abs(values).max()
         else:
             assert found is None, signal
-
-
-def test_what_is_typed_is_what_the_command_takes(tmp_path):
-    for number, each in enumerate(each for each in FORMATS if each.typed):
-        path = tmp_path / f"log{number}.csv"
-        path.write_text(each.text)
-        status, _, err = call("import", path, *each.typed.split(), "-o", tmp_path / f"{number}.npz")
-        assert (status, err) == (0, "")
-        assert Run.load(tmp_path / f"{number}.npz").joint_names == each.joints
-
-
-def test_a_log_without_a_header_shows_the_line_to_type(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text(table("", (P, V)))
-    status, _, err = call("import", path, "-o", tmp_path / "run.npz")
-    assert status == 3
-    assert "row 1: there is no header; the first row has 5 numbers." in err
-    assert "such as --columns time,q1,q2,dq1,dq2 (without stamps: no time, but --rate HZ)" in err
 
 
 def test_a_listing_tells_what_each_column_is_taken_for(tmp_path):

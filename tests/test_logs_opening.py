@@ -69,23 +69,10 @@ def test_arrays_of_a_run_file_in_degrees_are_converted_on_request(tmp_path):
     assert "angles taken for degrees" in opened.assumed
 
 
-def test_a_run_file_whose_stamps_jitter_is_resampled(tmp_path):
-    time = TIME + np.random.default_rng(0).uniform(-0.002, 0.002, len(TIME))
-    np.savez(tmp_path / "a.npz", time=time, velocity=np.cos(time)[:, None])
-    assert "resampled to 100 Hz" in open_run(tmp_path / "a.npz").assumed
-
-
 def test_a_run_file_with_an_unknown_array_is_refused_not_read_in_part(tmp_path):
     np.savez(tmp_path / "a.npz", time=TIME, velocity=TIME[:, None], velocity_desird=TIME[:, None])
     with pytest.raises(RunFileError, match="did you mean 'velocity_desired'"):
         open_run(tmp_path / "a.npz")
-
-
-def test_arrays_of_a_simulator_are_a_log(tmp_path):
-    np.savez(tmp_path / "sim.npz", time=TIME, qpos=swing(TIME)[0][:, None])
-    opened = open_run(tmp_path / "sim.npz")
-    assert opened.run.joint_names == ("joint_0",)
-    assert "differentiated from positions" in opened.assumed
 
 
 def test_a_folder_is_its_logs_however_deep_and_other_files_are_named(tmp_path, run):
@@ -185,7 +172,7 @@ def test_a_run_too_short_for_a_frame_does_not_make_a_batch_bad_input(tmp_path):
     status, out, _ = call("classify", tmp_path)
     assert status == 4
     assert "is too short: a frame takes 400" in out
-    assert out.endswith("4 runs: 4 cannot tell\n") or "4 runs" in out
+    assert "4 runs" in out
 
 
 @pytest.mark.parametrize("format_", ["json", "junit", "github"])

@@ -66,29 +66,22 @@ def test_a_target_that_rests_stays_at_rest(tmp_path):
     assert np.abs(run.position_desired - desired[: len(run.time)])[2030:2960].max() < 1e-9
 
 
-def test_targets_of_every_sample_are_left_as_they_are(tmp_path):
-    run, remarks = read(tmp_path, POSITION)
+PLACES = np.arange(SAMPLES) // 10 * 10
+
+
+@pytest.mark.parametrize(
+    ("desired", "more"),
+    [
+        (POSITION, {}),
+        (np.round(POSITION, 3), {}),  # steps of an encoder
+        (held(10), {"dq_des": VELOCITY}),
+        (held(10), {"q": POSITION[PLACES], "dq": VELOCITY[PLACES]}),  # all of the log is held
+    ],
+)
+def test_targets_of_every_sample_or_with_velocities_are_left_as_they_are(tmp_path, desired, more):
+    run, remarks = read(tmp_path, desired, **more)
     assert not remarks
-    assert np.array_equal(run.position_desired, POSITION)
-
-
-def test_targets_with_a_logged_velocity_are_left_as_they_are(tmp_path):
-    run, remarks = read(tmp_path, held(10), dq_des=VELOCITY)
-    assert not remarks
-    assert np.array_equal(run.position_desired, held(10))
-
-
-def test_a_log_that_holds_all_its_values_is_left_as_it_is(tmp_path):
-    places = np.arange(SAMPLES) // 10 * 10
-    run, remarks = read(tmp_path, held(10), q=POSITION[places], dq=VELOCITY[places])
-    assert not remarks
-    assert np.array_equal(run.position_desired, held(10))
-
-
-def test_encoder_steps_are_no_hold(tmp_path):
-    run, remarks = read(tmp_path, np.round(POSITION, 3))
-    assert not remarks
-    assert np.array_equal(run.position_desired, np.round(POSITION, 3))
+    assert np.array_equal(run.position_desired, desired)
 
 
 def test_updates_are_where_values_are_set_before_the_first_sample_too():
