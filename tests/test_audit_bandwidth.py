@@ -41,9 +41,6 @@ def low_passed(signal, cutoff, rate, order):
     return sosfilt(butter(order, cutoff, fs=rate, output="sos"), signal, axis=0)
 
 
-# --- the spectrum
-
-
 @pytest.mark.parametrize("rate", RATES)
 def test_the_power_of_white_noise_is_spread_evenly_and_adds_up(rate):
     velocity = noise((40_000, 3), level=0.1)
@@ -82,9 +79,6 @@ def test_no_segment_reaches_over_a_gap():
     assert spectrum(velocity[1990:2200], 1000.0, valid[1990:2200]) is None
 
 
-# --- filters
-
-
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("order", [2, 4])
 @pytest.mark.parametrize("share", [0.15, 0.2, 0.4])
@@ -111,6 +105,7 @@ def test_sensor_noise_alone_is_no_filter(rate, level):
         None,
     )
     assert found.usable == rate / 2
+    assert differentiator_of(run_of(velocity, rate)) is None
 
 
 @pytest.mark.parametrize("rate", RATES)
@@ -127,9 +122,6 @@ def test_an_encoder_filter_of_first_order_gives_no_warning():
     _, _, velocity = motion(10_000.0)
     noisy = velocity + low_passed(noise(velocity.shape), 500.0, 10_000.0, 1)
     assert bandwidth(run_of(noisy, 10_000.0)).corner is None
-
-
-# --- quantisation
 
 
 def test_the_step_of_quantised_values_is_found():
@@ -188,9 +180,6 @@ def test_standstill_has_no_limits():
     )
 
 
-# --- zero-order hold
-
-
 @pytest.mark.parametrize("length", [2, 8, 33])
 def test_a_zero_order_hold_is_found_with_its_length(length):
     _, _, velocity = motion(1000.0)
@@ -220,9 +209,6 @@ def test_quantisation_and_rest_are_no_hold():
     assert hold_length(velocity, everywhere) == 1.0
 
 
-# --- differentiated positions
-
-
 def test_the_slope_of_a_sine_is_right_at_low_frequencies():
     low = np.array([1.0])
     for method in (CENTRAL, SMOOTH):
@@ -240,12 +226,6 @@ def test_differences_of_positions_are_recognised(dtype):
     assert "before" in differentiator_of(run_of(backward, 100.0, position=position)).name
     central = np.gradient(position, 0.01, axis=0).astype(dtype)
     assert differentiator_of(run_of(central, 100.0, position=position)) is CENTRAL
-
-
-def test_measured_velocities_are_not_taken_for_differences():
-    _, position, velocity = motion(1000.0)
-    assert differentiator_of(run_of(velocity, 1000.0, position=position)) is None
-    assert differentiator_of(run_of(velocity, 1000.0)) is None
 
 
 def test_velocities_differentiated_on_import_are_known(tmp_path):

@@ -185,11 +185,13 @@ def test_the_order_of_joints_does_not_matter():
     assert audit(turned, LIBRARY).classes == audit(plain, LIBRARY).classes
 
 
-@pytest.mark.parametrize("meta", [{"jitter": 3}, {"jitter": {"rms": "x"}}, {"differentiated": 7}])
-def test_unknown_values_in_meta_are_ignored(meta):
-    assert audit(noisy_run(1000.0, meta=meta), LIBRARY).jitter is None
-
-
-def test_jitter_in_meta_is_reported():
-    noted = {"jitter": {"rms": 1e-4, "max": 2e-3}}
-    assert audit(noisy_run(1000.0, meta=noted), LIBRARY).jitter == (1e-4, 2e-3)
+@pytest.mark.parametrize(
+    ("meta", "jitter"),
+    [
+        ({"jitter": {"rms": 1e-4, "max": 2e-3}}, (1e-4, 2e-3)),
+        *(({"jitter": each}, None) for each in (3, {"rms": "x"})),
+        ({"differentiated": 7}, None),
+    ],
+)
+def test_jitter_in_meta_is_reported_and_unknown_values_are_ignored(meta, jitter):
+    assert audit(noisy_run(1000.0, meta=meta), LIBRARY).jitter == jitter

@@ -10,9 +10,6 @@ def warnings(velocity, position=None, rate=1000.0):
     return list(unit_warnings(run_of(velocity, rate, position=position)))
 
 
-# --- units
-
-
 @pytest.mark.parametrize("rate", [50.0, 1000.0])
 @pytest.mark.parametrize("level", [0.0, 0.01])
 def test_radians_give_no_warning(rate, level):
@@ -66,9 +63,6 @@ def test_velocities_that_no_robot_reaches_give_a_warning():
     assert "degrees or turns per minute (joint4 reaches" in message
 
 
-# --- copies
-
-
 @pytest.mark.parametrize("lag", [0, 1, 5, -3])
 def test_a_copy_is_found_with_its_lag(lag):
     _, _, velocity = motion(30.0)
@@ -98,9 +92,6 @@ def test_copies_are_found_by_name():
     assert [copy.joints for copy in copies(run)] == [("joint3",)]
 
 
-# --- gaps
-
-
 def test_gaps_are_counted_and_measured():
     valid = np.ones(1000, dtype=bool)
     assert str(audit(run_of(np.zeros((1000, 1)), 100.0), {}).gaps) == "no gaps"
@@ -108,9 +99,6 @@ def test_gaps_are_counted_and_measured():
     found = audit(run_of(np.zeros((1000, 1)), 100.0, valid=valid), {}).gaps
     assert (found.count, found.total, found.longest) == (3, pytest.approx(0.41), pytest.approx(0.3))
     assert str(found) == "3 gaps, 0.41 s in all, 0.3 s the longest"
-
-
-# --- long runs
 
 
 def test_the_fastest_part_of_a_long_run_is_examined():

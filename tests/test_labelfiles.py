@@ -146,11 +146,7 @@ def reading(tmp_path, name, content):
         ),
         ("l.toml", "[data\n", r"not TOML \(.*line 1"),
         ("l.toml", "", "lacks chunk_ranges and chunk_labels, lists"),
-        ("l.toml", "data = 3\n", "lacks chunk_ranges and"),
-        ("l.toml", toml(3, "[]"), "lacks chunk_ranges and"),
-        ("l.toml", toml([[0, 1]], ["ok", "ok"]), "lacks chunk_ranges and"),
         ("l.toml", toml([[0, 1], [2]], ["ok", "ok"]), r"chunk 2: \[2\] with label 'ok', expected"),
-        ("l.toml", toml([[0, 10**400]], ["ok"]), "not TOML .an integer of more than 20 digits"),
         ("l.toml", toml("[[nan, true]]", ["ok"]), "chunk 1: .* expected"),
         ("l.toml", toml([[0, 5], [4, -1]], ["ok", "impact"]), "chunk 2: .* 'ok' stops at 5 s"),
     ],
@@ -183,9 +179,6 @@ def test_nothing_is_overwritten_or_written_in_part(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
     write_labels([Block(0.0, 1.0, "ok")], path, overwrite=True)
     assert path.read_text() == "start,stop,label\n0.0,1.0,ok\n"
-
-
-# --- the commands
 
 
 def test_annotated_blocks_are_written_and_read_by_the_command(tmp_path):

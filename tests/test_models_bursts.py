@@ -38,7 +38,6 @@ def found(velocity, *, rate=RATE, whole=True, valid=None, sizes=(10**9,)):
 @pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0, 4000.0])
 @pytest.mark.parametrize("rms", [0.03, 1.0, 100.0])
 def test_a_tone_of_half_a_second_is_one_burst_however_loud(rms, rate):
-    """It is near its time."""
     velocity = with_tone(motion(rate=rate), 0.3 * rate, rms, 4.0, 4.5, rate=rate)
     (event,) = found(velocity, rate=rate)
     assert event.label == "oscillations"
@@ -49,7 +48,6 @@ def test_a_tone_of_half_a_second_is_one_burst_however_loud(rms, rate):
 @pytest.mark.parametrize("rate", [300.0, 997.0, 1000.0])
 @pytest.mark.parametrize("duration", [0.4, 0.7, 1.1])
 def test_a_tone_is_one_burst_however_long_it_lasts(duration, rate):
-    """Wherever it begins."""
     for start in (2.01, 3.3, 4.77):
         velocity = with_tone(motion(rate=rate), 90.0, 0.1, start, start + duration, rate=rate)
         (event,) = found(velocity, rate=rate)
@@ -58,17 +56,14 @@ def test_a_tone_is_one_burst_however_long_it_lasts(duration, rate):
 
 @pytest.mark.parametrize("whole", [True, False])
 def test_motion_and_the_noise_of_sensors_are_no_burst(whole):
-    """Whatever is known of it."""
     assert found(motion(), whole=whole) == ()
 
 
 def test_a_tone_from_the_first_sample_to_the_last_is_no_burst():
-    """It is what lasts."""
     assert found(with_tone(motion(), 90.0, 1.0, 0.0, 8.0)) == ()
 
 
 def test_a_tone_that_comes_again_and_again_is_no_burst():
-    """The rest of the run has it, too."""
     velocity = motion()
     for start in (1.0, 3.0, 5.0, 7.0):
         velocity = with_tone(velocity, 90.0, 0.1, start, start + 0.5)
@@ -76,7 +71,6 @@ def test_a_tone_that_comes_again_and_again_is_no_burst():
 
 
 def test_an_octave_of_noise_is_no_burst():
-    """A burst is a line."""
     velocity = motion()
     waves = np.fft.rfft(np.random.default_rng(5).standard_normal(250))
     own = np.fft.rfftfreq(250, 1 / RATE)
@@ -86,7 +80,6 @@ def test_an_octave_of_noise_is_no_burst():
 
 
 def test_a_line_of_2_millirad_per_second_is_none_however_silent_the_joint_is():
-    """Nobody hears it."""
     assert found(with_tone(motion(noise=1e-6), 90.0, 2e-3, 4.0, 4.5)) == ()
     assert found(with_tone(motion(noise=1e-6), 90.0, 2e-2, 4.0, 4.5))
 
@@ -100,14 +93,12 @@ def test_a_stream_has_its_past_alone():
 
 
 def test_a_run_that_is_too_short_has_no_burst():
-    """There is no rest that a tone could be compared with."""
     assert found(with_tone(motion(1.6), 90.0, 0.1, 0.6, 1.1)) == ()
 
 
 @pytest.mark.parametrize("whole", [True, False])
 @pytest.mark.parametrize("size", [1, 7, 100, 1999])
 def test_chunks_have_the_bursts_of_the_whole(size, whole):
-    """And a gap parts them alike."""
     velocity = with_tone(motion(), 90.0, 0.1, 5.0, 5.5)
     valid = np.ones(velocity.shape[1], dtype=bool)
     valid[1500:1600] = False
@@ -118,7 +109,6 @@ def test_chunks_have_the_bursts_of_the_whole(size, whole):
 
 
 def test_no_burst_touches_a_gap():
-    """Lost samples are no silence."""
     velocity = with_tone(motion(), 90.0, 0.1, 4.0, 4.5)
     valid = np.ones(velocity.shape[1], dtype=bool)
     assert found(velocity, valid=valid)

@@ -28,9 +28,6 @@ PROFILE = nc.ANY.at(1000.0, INPUTS[0])
 ONE = np.array(["one"])
 
 
-# --- support vector machines
-
-
 def blobs(classes, frames=160):
     """Feature vectors about one centre for each class, unevenly many and overlapping."""
     share = np.arange(classes, 0.0, -1.0)
@@ -104,9 +101,6 @@ def test_votes_decide_and_the_first_of_equals_wins():
     assert choose(np.zeros((1, 3)), classes=3, multiclass="one-vs-one").tolist() == [2]
 
 
-# --- networks of earlier versions
-
-
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
 def test_networks_have_the_mean_probabilities_of_scikit_learn_calibrated():
     features, targets = drawn(3)
@@ -132,9 +126,6 @@ def test_networks_have_the_mean_probabilities_of_scikit_learn_calibrated():
     np.testing.assert_allclose(ours.score(decisions), expected, atol=1e-9)
     np.testing.assert_allclose(decisions[:, -1], (features - 2.0).max(axis=1))
     np.testing.assert_array_equal(ours.decision(features[:1]), decisions[:1])
-
-
-# --- trees
 
 
 def drawn(classes, count=400):
@@ -277,9 +268,6 @@ def test_a_thousandth_of_the_training_frames_lies_above_the_bound_of_a_feature()
     ours = Detector.fit(features, (order > 5000).astype(int), ONE.repeat(10_000), profile)
     assert (features > ours.known).sum(axis=0).tolist() == [10, 10]
     assert ours.decision(ours.known[None] + [[0.5, -3.0]])[0, -1] == pytest.approx(0.5)
-
-
-# --- decisions by probabilities
 
 
 def test_calibration_finds_the_scale_of_overconfident_logits():

@@ -113,9 +113,6 @@ def test_a_general_model_is_nearer_than_one_of_a_lower_rate_and_yields_to_more_s
         nc.nearest(library, 50.0)
 
 
-# --- training
-
-
 def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_feed():
     one = recording(500.0, "oscillations", 0)
     parts = list(nc.frames_of([one], RECIPE))
@@ -178,9 +175,6 @@ def test_a_part_of_the_frames_may_lack_a_feature_that_others_have():
     shaken = signals(500.0, "oscillations", seed=12)
     labels = model.at(500.0, shaken).classify(shaken, 500.0)
     assert "oscillations" in {event.label for event in labels.events()}
-
-
-# --- the file
 
 
 def test_a_model_that_was_saved_decides_as_before(path):

@@ -263,8 +263,6 @@ def test_trees_with_children_or_features_out_of_range_are_refused(path, name, va
     refused(path, reason)
 
 
-# --- files of earlier versions
-
 # Some of the settings that profiles had up to version 6.
 EARLIER = {
     "single_precision": False,

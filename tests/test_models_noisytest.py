@@ -115,6 +115,8 @@ def test_annotations_take_integers_and_open_ends(log):
         ("chunk_ranges = [", r"not TOML \(Invalid value"),
         ("[data]\nchunk_ranges = []", "lacks chunk_ranges and chunk_labels, lists of one"),
         ("[simulation]\n", "lacks chunk_ranges and chunk_labels, lists of one"),
+        ("data = 3\n", "lacks chunk_ranges and chunk_labels, lists of one"),
+        ("[data]\nchunk_ranges = 3\nchunk_labels = []", "lacks chunk_ranges and chunk_labels"),
         (
             '[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = ["ok", "ok"]',
             "lacks chunk_ranges and chunk_labels, lists of one",
