@@ -18,6 +18,7 @@ from noisemodel.surface import LinkSurface, fine
 from noisemodel.types import MeshError
 
 READERS = ((Run.load, RunFileError), (read_log, LogError))
+MODELS = (lambda path: load_library([path]), nc.FileError)
 LAUGHS = "".join(f'<!ENTITY l{n + 1} "{f"&l{n};" * 10}">' for n in range(9))
 
 
@@ -228,14 +229,9 @@ def test_a_hostile_manifest_of_a_model_is_one_line(tmp_path, text):
     assert "\n" not in str(caught.value)
 
 
-def test_a_device_is_no_model():
-    with pytest.raises(nc.FileError, match="is no regular file"):
-        load_library([Path("/dev/zero")])
-
-
-def test_a_device_is_no_log():
-    for read, error in READERS:
-        with pytest.raises(error, match="no regular file"):
+def test_a_device_is_no_file():
+    for read, error in (*READERS, MODELS):
+        with pytest.raises(error, match="is no regular file"):
             read(Path("/dev/zero"))
 
 
@@ -244,11 +240,7 @@ def test_an_archive_whose_names_are_no_text_is_one_line(tmp_path):
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("é\n.npy", b"")
     path.write_bytes(path.read_bytes().replace("é".encode(), b"\xff\xfe"))
-    for read, error in (
-        (Run.load, RunFileError),
-        (read_log, LogError),
-        (lambda each: load_library([each]), nc.FileError),
-    ):
+    for read, error in (*READERS, MODELS):
         with pytest.raises(error) as caught:
             read(path)
         assert "\n" not in str(caught.value)

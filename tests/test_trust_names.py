@@ -42,16 +42,11 @@ def test_a_typed_name_with_control_characters_is_wrong_usage(tmp_path):
         assert len(err.splitlines()) == 1
 
 
-def test_the_contents_of_a_log_are_listed_without_control_characters(tmp_path):
+def test_joints_cannot_be_named_by_control_characters_and_are_listed_without(tmp_path):
     (tmp_path / "log.csv").write_text("time,b\x1b[31m.velocity\n0,1\n0.1,2\n")
     status, out, _ = call("import", tmp_path / "log.csv", "--list")
-    assert status == 0
-    assert "\x1b" not in out
+    assert (status, "\x1b" in out) == (0, False)
     assert r"b\x1b[31m.velocity" in out
-
-
-def test_joints_cannot_be_named_by_control_characters(tmp_path):
-    (tmp_path / "log.csv").write_text("time,b\x1b[31m.velocity\n0,1\n0.1,2\n")
     status, _, err = call("classify", tmp_path / "log.csv")
     assert status == 3
     assert "\x1b" not in err
