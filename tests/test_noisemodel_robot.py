@@ -194,7 +194,7 @@ def test_a_missing_example_robot_data_is_an_error_with_what_to_install(monkeypat
     def gone(name):
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr("noisemodel.robot.distribution", gone)
+    monkeypatch.setattr("importlib.metadata.distribution", gone)
     with pytest.raises(RobotError, match="pip install example-robot-data"):
         Robot.load("talos")
 
