@@ -85,7 +85,7 @@ def test_nothing_is_pickled():
     [
         ("noisemodel", [*SLOW, "noiseclassifier", "inspector"]),
         ("noiseclassifier", [*SLOW, "noisemodel", "noiseclassifier.scenarios", "inspector"]),
-        ("noiseclassifier.scenarios", ["rerun", "typer", "sklearn", "mujoco", "inspector"]),
+        ("noiseclassifier.scenarios", [*SLOW, "inspector"]),
         ("inspector.cli", ["rerun", "sklearn", "mujoco", "pinocchio", "scipy", "numpy"]),
         ("inspector.verdict", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
         ("inspector.reference.difference", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),

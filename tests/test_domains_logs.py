@@ -52,13 +52,6 @@ def test_a_perfect_logger_changes_nothing():
     assert found.blocks == run.blocks
 
 
-def test_equal_seeds_give_equal_logs():
-    noisy = replace(PLAIN, noise=0.01, jitter=0.1, lost=0.01, repeated=0.01, ripple=0.01)
-    first, second, other = (logged(TWIN, TWIN, noisy, seed=seed) for seed in (1, 1, 2))
-    assert np.array_equal(first.velocity, second.velocity)
-    assert not np.array_equal(first.velocity, other.velocity)
-
-
 @pytest.mark.parametrize("noise", [1e-4, 1e-3, 1e-2])
 def test_a_louder_fault_never_loses_a_label_that_a_fainter_one_has(noise):
     times = [labelled(fault, replace(PLAIN, noise=noise)) for fault in np.geomspace(1e-5, 1, 9)]

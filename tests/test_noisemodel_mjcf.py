@@ -112,20 +112,6 @@ def test_bodies_move_as_in_mujoco(tmp_path, apart, text):
         np.testing.assert_allclose(twist.vector, np.roll(expected, 3), atol=1e-12)
 
 
-def test_joints_are_those_that_pinocchio_reads_itself(tmp_path):
-    path = written(tmp_path, LEGS)
-    ours, theirs = Robot.load(path).model, pinocchio.buildModelFromMJCF(str(path))
-    assert list(ours.names) == list(theirs.names)
-    np.testing.assert_array_equal(ours.lowerPositionLimit[7], theirs.lowerPositionLimit[7])
-    _, q, v = state_in_mujoco(mujoco.MjModel.from_xml_path(str(path)))
-    found = []
-    for model in (ours, theirs):
-        data = model.createData()
-        pinocchio.forwardKinematics(model, data, q, v)
-        found.append([data.v[joint].vector for joint in range(model.njoints)])
-    np.testing.assert_allclose(*found, atol=1e-12)
-
-
 def test_joints_without_a_name_are_named_after_their_body_and_numbered(tmp_path):
     joints = '<joint axis="0 0 1"/><joint axis="1 0 0"/>'
     text = LEGS.replace('<joint name="hip"', f'{joints}<joint name="hip"')
@@ -398,7 +384,6 @@ def test_visual_geoms_are_those_that_are_drawn(tmp_path, geoms, visual, collisio
         ("", "the MJCF is empty"),
         ("hello", "not XML"),
         ("<sdf/>", "not an MJCF, its root is <sdf>, expected <mujoco>"),
-        ("<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "no document type or entities"),
         (one_body("<gem/>"), r"MuJoCo cannot read the MJCF \(XML Error: .*gem"),
         (
             one_body(BALL, joint='<joint name="hip" type="ball"/>'),
@@ -406,7 +391,6 @@ def test_visual_geoms_are_those_that_are_drawn(tmp_path, geoms, visual, collisio
         ),
         ('<mujoco><include file="gone.xml"/></mujoco>', "includes 'gone.xml', which is missing"),
         ("<mujoco><include/></mujoco>", "includes '', which is missing"),
-        ("<a>" * 5000 + "</a>" * 5000, "elements are nested more than 500 deep"),
     ],
 )
 def test_a_file_that_is_no_robot_is_refused_in_one_line(tmp_path, text, problem):

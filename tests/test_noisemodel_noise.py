@@ -43,17 +43,6 @@ def test_noise_grows_with_the_speed_whatever_the_signs_and_the_order_of_joints(v
     assert np.allclose(simplified(velocity), simplified(-velocity[:, ::-1]), rtol=1e-14)
 
 
-def test_a_floating_base_counts_with_its_six_velocities():
-    run = Run(
-        time=np.arange(4) / 1000,
-        velocity=np.ones((4, 2)),
-        joint_names=("a", "b"),
-        base_velocity=np.full((4, 6), 2.0),
-    )
-    assert run.motion.shape == (4, 8)
-    assert np.allclose(simplified(run.motion), np.sqrt(2 + 24), rtol=1e-15)
-
-
 def test_single_precision_is_summed_in_double():
     velocity = np.full((1, 40), 0.1, dtype=np.float32)
     noise = simplified(velocity)
@@ -90,8 +79,9 @@ def test_measured_and_desired_norms_make_the_noise():
 def test_errors_are_between_joints_of_one_name():
     swapped = nm.norms(run(velocity_desired=velocity[:, ::-1], desired_joint_names=("c", "b", "a")))
     assert not swapped["error"].any()
-    fewer = nm.norms(run(velocity_desired=desired[:, :1], desired_joint_names=("b",)))
-    np.testing.assert_allclose(fewer["error"], np.abs(desired[:, 0] - velocity[:, 1]), rtol=1e-12)
+    fewer = nm.norms(run(velocity_desired=desired[:, :2], desired_joint_names=("b", "c")))
+    error = np.linalg.norm(desired[:, :2] - velocity[:, 1:], axis=1)
+    np.testing.assert_allclose(fewer["error"], error, rtol=1e-12)
 
 
 def test_what_a_run_does_not_have_makes_no_norm_and_nothing_joint_by_joint():
@@ -110,14 +100,6 @@ def test_joints_are_those_that_are_desired_as_well_as_measured():
     np.testing.assert_array_equal(
         both["error_joints"], both["desired_joints"] - both["measured_joints"]
     )
-
-
-def test_joints_have_the_norms_of_their_run():
-    moved = run(velocity_desired=desired)
-    norms = nm.norms(moved)
-    for name in ("measured", "desired", "error"):
-        own = np.linalg.norm(nm.by_joint(moved)[f"{name}_joints"], axis=0)
-        np.testing.assert_allclose(own, norms[name], rtol=1e-12)
 
 
 IMPEDANCE = 1.204 * 343.2
@@ -177,13 +159,6 @@ def test_desired_motion_adds_its_own_power_with_a_resting_base(solo):
     assert np.allclose(
         same.power, apart[0].power + extended(robot, surface, q, rests).power, rtol=1e-12
     )
-
-
-def test_a_link_without_geometry_radiates_nothing(tmp_path):
-    robot = chain(tmp_path, "revolute", "revolute", shapes=["", BAR])
-    noise = extended(robot, Surface.of(robot), *motion(robot))
-    assert not noise.power[:, 0].any()
-    assert noise.power[:, 1].all()
 
 
 @pytest.mark.parametrize(
@@ -297,23 +272,6 @@ def test_a_floating_base_is_carried_by_nothing():
     only = surface_speed(robot, surface, q, slides, "C")[:, 0]
     assert np.allclose(only, np.linalg.norm(v[:, :3], axis=1), rtol=1e-14)
     assert (c[:, 0] > only).all()
-
-
-def test_only_the_part_that_a_parent_carries_is_in_a_and_b(panda):
-    """With the last joint alone moving nothing carries; with the first alone all else does."""
-    robot, surface = panda
-    q, v = motion(robot)
-    first = np.zeros_like(v)
-    first[:, 0] = v[:, 0]
-    a, b, c = terms(robot, surface, q, first)
-    assert not c[:, 1:].any()
-    assert (b[:, 1:] > 0).all()
-    last = np.zeros_like(v)
-    last[:, -1] = v[:, -1]
-    a, b, c = terms(robot, surface, q, last)
-    assert np.abs(a).max() < 1e-15
-    assert not b.any()
-    assert np.allclose(c[:, -1], np.abs(v[:, -1]))
 
 
 def test_mean_squares_are_the_kinetic_energy_of_bodies_with_the_surfaces_for_masses():
@@ -439,13 +397,6 @@ def test_a_long_run_has_no_more_bins_than_a_short_one():
 SIZE = 20
 
 
-@pytest.fixture(scope="module")
-def little():
-    """A quadruped: four legs that branch from a base that floats."""
-    robot = Robot.load("solo12")
-    return robot, Surface.of(robot, "auto")
-
-
 def vibration(robot, samples, *, moving):
     generator = np.random.default_rng(0)
     v = generator.normal(size=(samples, robot.nv))
@@ -466,8 +417,8 @@ def test_gaps_count_neither_as_motion_nor_as_rest():
 
 @pytest.mark.parametrize("offset", [0.0, 0.7])
 @pytest.mark.parametrize("kind", ["normal", "paper"])
-def test_the_noise_of_a_floating_robot_is_the_extended_one(little, kind, offset):
-    robot, surface = little
+def test_the_noise_of_a_floating_robot_is_the_extended_one(solo, kind, offset):
+    robot, surface = solo
     q, v = vibration(robot, 400, moving=True)
     q[:, :3] = [0.3, -0.2, 0.5]
     run = Run(
@@ -493,8 +444,8 @@ def test_the_noise_of_a_floating_robot_is_the_extended_one(little, kind, offset)
 
 @pytest.mark.parametrize("lost", [8, 9])
 @pytest.mark.parametrize("kind", ["normal", "paper"])
-def test_a_bin_that_begins_in_a_gap_takes_the_pose_of_its_valid_part(little, kind, lost):
-    robot, _ = little
+def test_a_bin_that_begins_in_a_gap_takes_the_pose_of_its_valid_part(solo, kind, lost):
+    robot, _ = solo
     q, v = vibration(robot, 200, moving=False)
     v[:] = v[0]
     valid = np.ones(200, dtype=bool)

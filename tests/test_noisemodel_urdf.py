@@ -50,7 +50,6 @@ def test_fixed_joints_may_have_an_axis_of_length_0(tmp_path):
         ("<sdf><model/></sdf>", "not a URDF, its root is <sdf>, expected <robot>"),
         ("<robot/>", "its <robot> has no name or no link"),
         ('<robot name="arm"/>', "its <robot> has no name or no link"),
-        ('<!DOCTYPE robot [<!ENTITY a "b">]>' + GOOD, "no document type or entities"),
         (GOOD.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>'), "'elbow' has length 0"),
         (GOOD.replace('<axis xyz="0 0 1"/>', "<axis/>"), "'elbow' has length 0"),
         *(
@@ -60,7 +59,6 @@ def test_fixed_joints_may_have_an_axis_of_length_0(tmp_path):
             )
             for numbers in ("0 nan 1", "0 inf 1", "0 1", "a b c", "")
         ),
-        (chain(5000), "5000 joints; the limit is 1000"),
         (GOOD.replace('"revolute"', '"screw"'), r"Joint \[elbow\] has no known type \[screw\]"),
         (GOOD.replace('"tip"/><origin', '"toe"/><origin'), r"child link \[toe\] of joint"),
         (GOOD.replace(JOINT, JOINT * 2), "joint 'elbow' is not unique"),

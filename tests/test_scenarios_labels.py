@@ -140,5 +140,3 @@ def test_a_commanded_oscillation_is_detected_in_its_band():
     blocks, _ = label(shake(1.0, 3.1, 0.3, hertz=80.0), event)
     (block,) = failures(blocks)
     assert (block.start, block.stop) == pytest.approx((1.0, 3.1), abs=0.05)
-    for before, after in pairwise(blocks):
-        assert after.start - before.stop >= 0.0499

@@ -1,8 +1,6 @@
 """Simulated runs show the failures of their scenario, and the same seed gives the same file."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -165,15 +163,6 @@ def test_a_run_that_diverges_is_refused(monkeypatch, tmp_path):
 def test_what_cannot_be_simulated_is_refused(robot, name, seed, options, problem):
     with pytest.raises(scenarios.ScenarioError, match=problem):
         scenarios.simulate(robot, name, seed, **options)
-
-
-def test_listing_scenarios_needs_no_simulator():
-    code = (
-        "import sys; from noiseclassifier import scenarios as s; assert s.SCENARIOS and s.ROBOTS;"
-        "loaded = {'mujoco', 'pinocchio', 'scipy.signal'} & set(sys.modules);"
-        "assert not loaded, loaded"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_the_table_has_the_papers_numbers_and_a_sentence_for_each_scenario():
