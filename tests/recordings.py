@@ -9,6 +9,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from noiseclassifier import Labels
+from noisemodel import Block, Run
 
 rr.set_strict_mode(True)  # wrong arguments are errors
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
@@ -23,6 +24,22 @@ LABELS = {f"Points2D:{part}" for part in ("positions", "labels", "colors", "radi
 STRIP = {f"LineStrips2D:{part}" for part in ("strips", "colors", "radii")}
 MOTION = {f"Transform3D:{part}" for part in ("translation", "quaternion")}
 MOTION |= {"Transform3D:parent_frame", "Transform3D:child_frame"}
+
+
+def panda(scale: float = 1.0, *, seconds: float = 3.0, rate: float = 5000.0, **changes) -> Run:
+    """A Panda that swings, faster by ``scale``, and rattles at 120 Hz from 0.5 s to 1 s."""
+    time = np.arange(round(seconds * rate)) / rate
+    phase = 2 * np.pi * np.linspace(0.2, 0.5, 7) * time[:, None]
+    rattle = 0.1 * np.sin(2 * np.pi * 120 * time) * ((time >= 0.5) & (time < 1.0))
+    fields = {
+        "time": time,
+        "velocity": scale * (np.cos(phase) + rattle[:, None]),
+        "position": 0.1 * np.sin(phase),
+        "joint_names": tuple(f"panda_joint{i}" for i in range(1, 8)),
+        "robot": "panda",
+        "blocks": (Block(0.2, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
+    }
+    return Run(**(fields | changes))
 
 
 def read(path: Path, entity: str, component: str):

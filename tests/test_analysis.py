@@ -414,24 +414,6 @@ def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
     assert work_of(found) == pytest.approx(0.03, rel=1e-12)
 
 
-def test_a_base_that_floats_makes_noise_by_its_own_motion():
-    robot = Robot.load("solo12")
-    time = np.arange(200) / 1000
-    still = np.zeros((200, len(robot.joint_names)))
-    pose = np.tile([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], (200, 1))
-    run = Run(
-        time=time,
-        velocity=still,
-        position=still,
-        joint_names=robot.joint_names,
-        robot="solo12",
-        base_pose=pose,
-        base_velocity=np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (200, 1)),
-    )
-
-    assert (estimate(run, "normal").pressure > 0.0).all()
-
-
 def test_the_papers_sum_is_given_where_a_robot_and_its_positions_are_known():
     whole = replace(moving(), robot="panda", position=np.zeros_like(moving().velocity))
     assert default_kinds(whole) == ("simplified", "paper")

@@ -238,10 +238,7 @@ def test_junit_counts_runs_and_states_reasons():
     assert "oscillations from 2.00 s to 3.00 s, out of distribution" in failure.text
 
 
-WRITERS = pytest.mark.parametrize("write", FORMATS.values(), ids=FORMATS)
-
-
-@WRITERS
+@pytest.mark.parametrize("write", FORMATS.values(), ids=FORMATS)
 @pytest.mark.parametrize("verdict", [QUIET, LOUD])
 def test_ignored_unknown_frames_are_stated_in_every_format(write, verdict):
     ignoring = replace(verdict, unknown=Unknown.IGNORE, message="Unknown frames are ignored.")

@@ -187,13 +187,6 @@ def test_without_a_validation_set_a_part_of_the_recordings_is_folded(data, tmp_p
     assert sorted([*header["training_set"], *held_out]) == ["walk0", "walk1", "walk2", "walk3"]
 
 
-def test_a_validation_set_without_a_recording_is_refused(data, tmp_path):
-    (tmp_path / "empty").mkdir()
-    arguments = ("--validation", tmp_path / "empty", *OPTIONS, *GRID, "-o", tmp_path / "a.jsonl")
-    status, _, err = call("tune", data / "training", *arguments)
-    assert (status, err) == (3, f"inspector: {tmp_path / 'empty'}: no recording (of part 'all')\n")
-
-
 def refused(data, output, *more, grid=GRID, code=3):
     """Call in vain; the complaint, which is one line."""
     status, out, err = tune(data, output, *more, grid=grid)
@@ -239,11 +232,16 @@ def test_a_damaged_file_is_named_and_left_alone(data, whole, tmp_path, damage, r
     assert output.read_bytes() == before
 
 
-def test_recordings_of_the_training_set_do_not_validate(data, tmp_path):
-    arguments = ("--validation", data / "training", *OPTIONS, *GRID, "-o", tmp_path / "a.jsonl")
+def test_sets_that_do_not_validate_are_refused(data, tmp_path):
+    output, empty = tmp_path / "a.jsonl", tmp_path / "empty"
+    empty.mkdir()
+    arguments = ("--validation", empty, *OPTIONS, *GRID, "-o", output)
     status, _, err = call("tune", data / "training", *arguments)
-    assert status == 3
-    assert "trained on the same recording as 'walk0'" in err
+    assert (status, err) == (3, f"inspector: {empty}: no recording (of part 'all')\n")
+    seen = refused(data, output, "--validation", data / "training")
+    assert "trained on the same recording as 'walk0'" in seen
+    status, _, err = tune(data, output, "--folds", 3)
+    assert (status, "not both" in err) == (2, True)
 
 
 def test_an_output_that_cannot_be_written_is_named(data, tmp_path):
@@ -259,9 +257,3 @@ def test_a_model_that_exists_is_refused_before_the_work(data, tmp_path, counted)
     assert f"{model}: exists already" in complaint
     assert not counted
     assert not (tmp_path / "tuned.jsonl").exists()
-
-
-def test_folds_and_a_validation_set_exclude_each_other(data, tmp_path):
-    status, _, err = tune(data, tmp_path / "tuned.jsonl", "--folds", 3)
-    assert status == 2
-    assert "not both" in err

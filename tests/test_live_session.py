@@ -355,14 +355,11 @@ def test_a_rate_without_a_model_shows_noise_and_warns_that_there_are_no_labels(t
 
 
 def test_a_robot_without_positions_is_not_drawn_and_that_is_warned_of(tmp_path, library):
-    warned = []
-    with inspector.LiveSession(
-        RATE, robot="panda", joint_names=PANDA, save=tmp_path / "a.rrd", library=library,
-        on_warning=warned.append,
-    ) as session:  # fmt: skip
-        session.push(velocity=np.zeros((100, 7)))
+    signals = {"velocity": np.zeros((100, 7)), "time": np.arange(100) / RATE}
+    options = {"robot": "panda", "joint_names": PANDA, "library": library}
+    path, warned, _ = shown(tmp_path, signals, **options)
     assert warned == ["no positions: the robot is not drawn"]
-    assert "/noise/simplified" in entities(tmp_path / "a.rrd")
+    assert "/noise/simplified" in entities(path)
 
 
 def test_joints_are_named_by_the_robot_if_they_are_all_there(tmp_path, library):

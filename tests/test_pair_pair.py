@@ -1,7 +1,9 @@
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
+import recordings
 
 from inspector.compare.pair import (
     Align,
@@ -35,18 +37,7 @@ def moving(seconds=4.0, rate=1000, *, seed=0, **changes):
     return Run(**(fields | changes))
 
 
-def panda(velocity_scale=1.0, **changes):
-    time = np.arange(10_000) / 5000
-    phase = 2 * np.pi * np.linspace(0.2, 0.5, 7) * time[:, None]
-    rattle = 0.1 * np.sin(2 * np.pi * 120 * time) * ((time >= 0.5) & (time < 1.0))
-    fields = {
-        "time": time,
-        "velocity": velocity_scale * (np.cos(phase) + rattle[:, None]),
-        "position": 0.1 * np.sin(phase),
-        "joint_names": tuple(f"panda_joint{i}" for i in range(1, 8)),
-        "robot": "panda",
-    }
-    return Run(**(fields | changes))
+panda = partial(recordings.panda, seconds=2.0, blocks=())
 
 
 def compared(tmp_path, before, after, library=None, **options):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import recordings
 from commandline import call as inspector
 from recordings import (
     BAND,
@@ -29,26 +30,14 @@ from inspector.levels import LINKS as LINK_SCALE
 from inspector.levels import link_levels
 from inspector.recording import panels
 from noiseclassifier import Event
-from noisemodel import Block, Run
+from noisemodel import Run
 
 
-def panda(scale=1.0, rattle=0.1, **changes):
-    time = np.arange(15_000) / 5000
-    phase = 2 * np.pi * np.linspace(0.2, 0.5, 7) * time[:, None]
-    shaking = rattle * np.sin(2 * np.pi * 120 * time) * ((time >= 0.5) & (time < 1.0))
-    velocity = scale * (np.cos(phase) + shaking[:, None])
-    fields = {
-        "time": time,
-        "velocity": velocity,
-        "velocity_desired": scale * np.cos(phase),
-        "position": 0.1 * np.sin(phase),
-        "effort": velocity,
-        "stages": {"planned": velocity},
-        "joint_names": tuple(f"panda_joint{i}" for i in range(1, 8)),
-        "robot": "panda",
-        "blocks": (Block(0.2, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
-    }
-    return Run(**(fields | changes))
+def panda(scale=1.0, **changes):
+    run = recordings.panda(scale)
+    desired = scale * np.cos(2 * np.pi * np.linspace(0.2, 0.5, 7) * run.time[:, None])
+    fields = {"velocity_desired": desired, "effort": run.velocity}
+    return replace(run, **(fields | {"stages": {"planned": run.velocity}} | changes))
 
 
 @pytest.fixture(scope="module")
@@ -111,9 +100,6 @@ def test_both_noises_lie_over_each_other_in_two_colours(whole):
 
 def test_twice_the_motion_is_6_db_in_all_that_is_drawn(whole):
     path, _ = whole
-    _, before = scalars(path, "/noise/before")
-    _, after = scalars(path, "/noise/after")
-    np.testing.assert_allclose(after / before, 2.0, rtol=1e-6)
     time, change = scalars(path, "/change/noise")
     rattling = (time > 0.55) & (time < 0.95)
     np.testing.assert_allclose(change[rattling], 20 * np.log10(2), rtol=1e-9)

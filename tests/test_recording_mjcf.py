@@ -97,7 +97,6 @@ def test_a_base_that_floats_is_the_root_and_the_world_is_left_out(tmp_path):
 def test_commands_take_the_path_of_an_mjcf(run_file, tmp_path):
     mjcf = tmp_path / "arm.xml"
     assert "arm" in inspector("noise", "--robots", mjcf, "--kind", "rms", "--kind", "mean")
-    assert "simplified" in inspector("noise", run_file)
     inspector("classify", run_file, status=(0, 1, 4))
     rows = ["time," + ",".join(f"{name}.velocity,{name}.position" for name in ("lift", "turn"))]
     rows += [f"{i / 500},0.1,{i / 5000},0.2,{i / 2500}" for i in range(1000)]

@@ -14,6 +14,7 @@ from recordings import (
     check_columns,
     entities,
     layout,
+    panda,
     properties,
     read,
     settings,
@@ -33,25 +34,13 @@ from inspector.recording.run import height, write
 from inspector.reference.judging import Scenario, compare
 from inspector.reference.levels import levels as levels_of
 from noiseclassifier import Event
-from noisemodel import Block, Run
+from noisemodel import Run
 
 
 def panda_run(**changes):
-    time = np.arange(30_000) / 10_000
-    phase = 2 * np.pi * np.linspace(0.2, 0.5, 7) * time[:, None]
-    rattle = 0.1 * np.sin(2 * np.pi * 120 * time) * ((time >= 0.5) & (time < 1.0))
-    velocity = np.cos(phase) + rattle[:, None]
-    fields = {
-        "time": time,
-        "velocity": velocity,
-        "velocity_desired": velocity,
-        "position": 0.1 * np.sin(phase),
-        "joint_names": tuple(f"panda_joint{i}" for i in range(1, 8)),
-        "robot": "panda",
-        "blocks": (Block(0.2, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
-        "meta": {"scenario": "made up", "seed": 1},
-    }
-    return Run(**(fields | changes))
+    run = panda(rate=10_000)
+    fields = {"velocity_desired": run.velocity, "meta": {"scenario": "made up", "seed": 1}}
+    return dataclasses.replace(run, **(fields | changes))
 
 
 def inspected(run, tmp_path, labels=None, **options) -> Analysis:
@@ -359,13 +348,6 @@ def test_details_hold_raw_samples_around_the_worst_moment(whole):
     np.testing.assert_allclose(velocity, run.velocity[inside][:, columns], rtol=1e-12)
 
 
-def test_the_time_selection_rests_on_the_worst_event_and_loops_it(whole):
-    path, _ = whole
-    panel = settings(path, "TimePanelBlueprint:")
-    assert panel["time_selection"] == [{"min": 500_000_000, "max": 1_000_000_000}]
-    assert panel["loop_mode"] == [2]  # the selection
-
-
 def test_a_run_without_failures_selects_nothing(tmp_path):
     path = tmp_path / "out.rrd"
     write(inspected(panda_run(robot=None, blocks=()), tmp_path), path)
@@ -374,8 +356,11 @@ def test_a_run_without_failures_selects_nothing(tmp_path):
     assert "/detail/0/noise" in entities(path)
 
 
-def test_events_list_failures_found_and_annotated_by_time(whole):
+def test_events_list_failures_by_time_and_the_worst_is_selected_and_looped(whole):
     path, _ = whole
+    panel = settings(path, "TimePanelBlueprint:")
+    assert panel["time_selection"] == [{"min": 500_000_000, "max": 1_000_000_000}]
+    assert panel["loop_mode"] == [2]  # the selection
     time, text = read(path, "/events", "TextLog:text")
     _, level = read(path, "/events", "TextLog:level")
     assert time.tolist() == [0.5, 1.0]

@@ -256,17 +256,13 @@ def test_episodes_with_the_same_actions_are_ordered_by_what_tells_them_apart():
     assert [episode.log for episode in order.episodes] == ["clean", "rough"]
 
 
-def test_equal_episodes_have_one_rank_and_none_is_the_roughest():
+def test_equal_episodes_have_one_rank_and_those_without_the_score_none():
     rough = replace(rollout(0.05), position_desired=rollout().position_desired)
     order = ranked([scored(rollout(), "a"), scored(rough, "b")], by="action_curvature")
     assert order.ranks == (1, 1)
     last = "All are equal by 2nd diff.: `--by` orders them by another score."
     assert as_text(order).splitlines()[-1] == last
-
-
-def test_an_episode_without_the_score_has_no_rank_and_comes_last():
-    episodes = [scored(rollout(samples=5), "short"), scored(rollout(), "long")]
-    order = ranked(episodes, by="level")
+    order = ranked([scored(rollout(samples=5), "short"), scored(rollout(), "long")], by="level")
     assert [episode.log for episode in order.episodes] == ["long", "short"]
     assert order.ranks == (1, None)
 
