@@ -263,19 +263,19 @@ def test_junit_has_one_case_with_time_type_and_picture_for_each_run():
     assert (numbers["runs.internal-error"], numbers["findings.waived"]) == ("1", "1")
 
 
-def test_ignored_bad_input_is_skipped_and_a_warning():
-    ignored = replace(BROKEN, ignored=True)
-    skipped = ET.fromstring(junit([ignored])).find(".//skipped")
-    assert skipped.get("message") == "not a run file: 100%\nbad"
-    assert github([ignored]).startswith("::warning file=broken")
-
-
-def test_names_and_texts_are_kept_apart_and_escaped():
+def test_names_and_texts_are_kept_apart_and_escaped_and_what_is_ignored_is_a_warning():
     odd = Verdict(Path("a\x00b\x1b.npz"), Status.BAD_INPUT, message="x\x07y")
     cases = ET.fromstring(junit([odd, LOUD, LOUD])).iter("testcase")
     assert [case.get("name") for case in cases] == ["ab.npz", "loud.npz", "loud.npz (2)"]
     line = github([BROKEN])
     assert line == "::error file=broken%2C1.npz::bad-input: not a run file: 100%25%0Abad"
+    ignored = [replace(BROKEN, ignored=True)]
+    skipped = ET.fromstring(junit(ignored)).find(".//skipped")
+    assert skipped.get("message") == "not a run file: 100%\nbad"
+    assert github(ignored).startswith("::warning file=broken")
+    odd = replace(LACKING, path=Path("a|b`c<i>.npz"), missing=(Missing("x|y<b>"),))
+    row = next(line for line in markdown([odd]).splitlines() if line.startswith("| `"))
+    assert row == "| `a\\|b'c<i>.npz` | FAIL | missing: x\\|y&lt;b> |"
 
 
 def test_github_gets_the_ten_worst_and_then_a_summary():
@@ -339,12 +339,8 @@ def test_sarif_names_files_by_addresses_and_keeps_fingerprints_when_findings_mov
     ]  # fmt: skip
     before, after = (json.loads(sarif([e]))["runs"][0]["results"][0] for e in (far, moved))
     assert before["partialFingerprints"] == after["partialFingerprints"]
-
-
-def test_scenarios_without_a_log_have_a_fingerprint_each():
     missing = tuple(Missing(f"log of {name}") for name in ("pick", "place"))
-    store = Path("reference.toml")
-    absent = Verdict(store, Status.FINDINGS, missing=missing, expectations=str(store))
+    absent = replace(LACKING, missing=missing)
     results = json.loads(sarif([absent]))["runs"][0]["results"]
     prints = [each["partialFingerprints"]["primaryLocationLineHash"] for each in results]
     assert len(prints) == len(set(prints)) == 2
@@ -367,9 +363,3 @@ def test_markdown_fits_into_a_comment():
     written = markdown(many + [replace(EXPECTED, path=each.path) for each in many])
     assert len(written) < COMMENT
     assert re.search(r"^\d+ more are left out here\.$", written, re.MULTILINE)
-
-
-def test_markdown_keeps_what_a_run_is_named_in_its_cell():
-    odd = replace(LACKING, path=Path("a|b`c<i>.npz"), missing=(Missing("x|y<b>"),))
-    row = next(line for line in markdown([odd]).splitlines() if line.startswith("| `"))
-    assert row == "| `a\\|b'c<i>.npz` | FAIL | missing: x\\|y&lt;b> |"

@@ -37,18 +37,6 @@ def test_standstill_uniform_and_smooth_motion_without_sensor_noise_have_no_findi
         assert label_run(run_of(velocity, rate), LIBRARY).labels.events() == ()
 
 
-@pytest.mark.parametrize("rate", [1000.0, 10_000.0])
-def test_a_rattle_on_a_smooth_motion_is_found_when_it_happens(rate):
-    time = np.arange(int(6 * rate)) / rate
-    velocity = np.sin(2 * np.pi * 0.3 * np.outer(time, np.linspace(0.5, 1, 7)))
-    during = (time >= 2.0) & (time < 4.0)
-    velocity[during] += 0.1 * np.sin(2 * np.pi * 120 * time[during])[:, None]
-    events = label_run(run_of(velocity, rate), LIBRARY).labels.events()
-    assert "oscillations" in {event.label for event in events}
-    assert min(event.start for event in events) > 1.3
-    assert max(event.stop for event in events) < 4.7
-
-
 def test_a_faster_run_is_decimated_and_a_slower_one_is_not_classified():
     labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), of_panda())
     assert (

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -107,29 +106,6 @@ def test_without_the_simulator_one_line_names_what_to_install(tmp_path, monkeypa
         assert (status, err.count("\n")) == (3, 1)
         assert "pip install 'noise-inspector[sim]'" in err
     assert not (tmp_path / "r.npz").exists()
-
-
-def test_a_model_is_trained_on_a_folder_of_runs_and_one_without_a_block_is_skipped(
-    simulated, tmp_path
-):
-    data, model = tmp_path / "data", tmp_path / "m.npz"
-    inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
-    one = data / "panda/straight-002.npz"
-
-    def frames(runs):
-        status, out, _ = inspector("evaluate", model, runs, "--json", "--seen-too")
-        assert status == 0
-        return np.array(json.loads(out)["frames"]["confusion"]).sum()
-
-    for left in (3, 2):
-        status, out, _ = inspector(
-            "train", data, "-o", model, "--profile", "logbands", "--overwrite"
-        )
-        assert (status, "Subset accuracy" in out) == (0, True)
-        assert frames(data / "panda") == left * 2 * 7
-        if left == 3:
-            assert frames(one) == 2 * 7
-            replace(Run.load(one), blocks=()).save(one, overwrite=True)
 
 
 def test_a_data_set_keeps_the_signals_of_its_runs_at_its_rate(simulated, tmp_path):

@@ -55,7 +55,6 @@ def commands(group=None, path=()):
 
 
 COMMANDS = dict(commands())
-PATHS = pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
 
 
 @pytest.fixture
@@ -112,15 +111,11 @@ def test_options_on_reading_logs_are_in_one_topic_and_in_the_help_of_import():
     assert call("help", "nothing")[0] == 2
 
 
-@PATHS
-def test_the_help_of_a_command_ends_with_an_example_on_one_line(help_of, path):
+@pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
+def test_the_help_of_a_command_ends_with_an_example_that_is_accepted(help_of, path, monkeypatch):
     *_, last = filter(None, help_of(*path))
     assert last == COMMANDS[path].epilog
     assert last.startswith(f"Example: inspector {' '.join(path)}")
-
-
-@PATHS
-def test_the_example_of_a_command_is_accepted(path, monkeypatch):
     inspector, called = typer.main.get_command(app), []
     for words, command in commands(inspector):
         if not hasattr(command, "commands"):

@@ -74,9 +74,7 @@ def test_a_limb_whose_joints_fail_is_named_though_others_are_louder():
     assert [share for _, share in named] == pytest.approx([0.4, 0.3, 0.1])
 
 
-def test_a_failure_without_excess_has_no_links():
+def test_a_failure_without_excess_or_after_the_end_of_the_noise_has_no_links():
     assert fault_links(noise(), BLOW, [BLOW], known=blow("hip")) == ()
-
-
-def test_a_failure_after_the_end_of_the_noise_has_no_links():
-    assert fault_links(noise(foot=(1.0, 1.4, 0.5)), Event("impact", 5.0, 5.4, 1.0), []) == ()
+    late = Event("impact", 5.0, 5.4, 1.0)
+    assert fault_links(noise(foot=(1.0, 1.4, 0.5)), late, []) == ()

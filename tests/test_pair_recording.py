@@ -84,7 +84,7 @@ def test_every_entity_has_its_columns_and_there_is_no_other(whole):
     check_columns(path, COLUMNS)
 
 
-def test_both_noises_lie_over_each_other_in_two_colours(whole):
+def test_both_noises_lie_over_each_other_in_two_colours_and_twice_is_6_db(whole):
     path, pair = whole
     for name, side, color in (
         ("before", pair.before, panels.BEFORE),
@@ -96,10 +96,6 @@ def test_both_noises_lie_over_each_other_in_two_colours(whole):
         np.testing.assert_allclose(time, pair.time, atol=1e-9)
         _, drawn = read(path, f"/noise/{name}", "SeriesLines:colors")
         assert drawn == [[int.from_bytes([*color, 255], "big")]]
-
-
-def test_twice_the_motion_is_6_db_in_all_that_is_drawn(whole):
-    path, _ = whole
     time, change = scalars(path, "/change/noise")
     rattling = (time > 0.55) & (time < 0.95)
     np.testing.assert_allclose(change[rattling], 20 * np.log10(2), rtol=1e-9)
@@ -154,8 +150,11 @@ def test_both_spectrograms_have_one_scale_and_the_difference_its_own(whole):
     assert bytes(shade) in [each[0].to_bytes(4, "big") for each in change]
 
 
-def test_both_robots_are_coloured_by_one_scale_of_levels(whole):
+def test_both_robots_are_seen_from_one_place_and_coloured_by_one_scale_of_levels(whole):
     path, pair = whole
+    eyes = [value for _, name, value in layout(path) if name == "EyeControls3D:position"]
+    assert len(eyes) == 2
+    assert eyes[0] == eyes[1]
     every = [link_levels(noise)[1] for noise in pair.links]
     scale = LINK_SCALE.following(np.concatenate(every))
     for side, noise in zip(("before", "after"), pair.links, strict=True):
@@ -170,13 +169,6 @@ def test_both_robots_are_coloured_by_one_scale_of_levels(whole):
         time, (still,) = read(path, base, "Asset3D:albedo_factor")
         assert time is None
         assert still[0].to_bytes(4, "big") == bytes(scale.colours(np.array(-np.inf)))
-
-
-def test_both_robots_are_seen_from_one_place(whole):
-    path, _ = whole
-    eyes = [value for _, name, value in layout(path) if name == "EyeControls3D:position"]
-    assert len(eyes) == 2
-    assert eyes[0] == eyes[1]
 
 
 def test_colours_distinguish_louder_from_quieter_and_grow_with_the_change():

@@ -106,7 +106,7 @@ def test_every_entity_has_its_columns_and_there_is_no_other(whole):
     assert len(RrdReader(path).blueprints()) == 1
 
 
-def test_the_noise_is_logged_sample_by_sample_and_drawn_by_its_extremes(whole):
+def test_the_noise_is_logged_sample_by_sample_beside_its_level_and_drawn_by_extremes(whole):
     path, run = whole
     time, noise = read(path, "/noise/simplified", "Scalars:scalars")
     expected = np.sqrt(2 * (run.velocity**2).sum(axis=1))
@@ -114,6 +114,10 @@ def test_the_noise_is_logged_sample_by_sample_and_drawn_by_its_extremes(whole):
     np.testing.assert_allclose(time, run.time, atol=1e-9)
     _, policy = read(path, "/noise/simplified", "SeriesLines:aggregation_policy")
     assert policy == [[5]]  # MinMax: the default would hide vibration
+    time, values = read(path, "/level/noise", "Scalars:scalars")
+    starts, level = velocity_levels(expected[:, None], run.mask, run.rate)
+    np.testing.assert_allclose(time, starts, atol=1e-9)
+    np.testing.assert_allclose(values, level, rtol=1e-9)
 
 
 def test_rows_of_classes_last_as_long_as_what_was_found_and_annotated(whole):
@@ -200,15 +204,6 @@ def test_the_probability_of_a_failure_stands_beside_the_alarm_threshold(whole):
     assert {value[0] for value in score} == {0.7}
     _, (labels,) = read(path, "/axis/probability/right", "Points2D:labels")
     assert labels == ["alarm 0.25"]
-
-
-def test_the_level_is_that_of_the_noise_above_10_hz(whole):
-    path, run = whole
-    time, values = read(path, "/level/noise", "Scalars:scalars")
-    noise = np.sqrt(2 * (run.velocity**2).sum(axis=1))[:, None]
-    starts, level = velocity_levels(noise, run.mask, run.rate)
-    np.testing.assert_allclose(time, starts, atol=1e-9)
-    np.testing.assert_allclose(values, level, rtol=1e-9)
 
 
 def shades(path, entity):
@@ -491,16 +486,11 @@ def test_an_unreadable_mesh_is_named_and_the_run_can_be_shown_without(tmp_path):
 
 def test_the_loudest_links_have_rows_and_the_power_is_beside_the_noise(whole):
     path, _ = whole
-    found = entities(path)
-    assert "/power/total" in found
-    assert len([entity for entity in found if entity.startswith("/strips/links/")]) == 8
+    assert len([each for each in entities(path) if each.startswith("/strips/links/")]) == 8
     time, level = read(path, "/power/total", "Scalars:scalars")
     assert len(time) == 300  # every 10 ms
     assert 60 < np.median(level) < 160
-
-
-def test_the_scale_is_the_same_beside_the_robot_and_the_links(whole):
-    path, _ = whole
+    # The scale is the same beside the robot and the links.
     _, (robot,) = read(path, "/axis/key/right", "Points2D:labels")
     _, (links,) = read(path, "/axis/links/right", "Points2D:labels")
     assert robot[:-1] == links[:-1]

@@ -45,24 +45,24 @@ def test_a_window_that_opens_is_not_waited_for(monkeypatch):
     assert viewer.open_window(Path("run.rrd")) == ""
 
 
-def test_a_viewer_that_runs_already_takes_the_recording_over(monkeypatch, tmp_path):
-    fake_viewer(monkeypatch, f"echo $2 >> {tmp_path}/ports")  # `--port 9876`, and it ends at once
-    assert viewer.open_window(Path("run.rrd")) == ""
-    assert (tmp_path / "ports").read_text().split() == [viewer.PORT]
-
-
-def test_where_another_program_listens_a_free_port_is_taken(monkeypatch, tmp_path):
-    fake_viewer(monkeypatch, f'echo $2 >> {tmp_path}/ports; [ "$2" = auto ]')
-    assert viewer.open_window(Path("run.rrd")) == ""
-    assert (tmp_path / "ports").read_text().split() == [viewer.PORT, "auto"]
-
-
-def test_a_viewer_that_ends_is_one_line_with_the_reason(monkeypatch):
-    fake_viewer(
-        monkeypatch, "printf 'INFO fine\\n\\033[31mError: no \\033[0mdisplay\\n' >&2; exit 101"
-    )
-    problem = viewer.open_window(Path("run.rrd"))
-    assert problem == "the viewer ended with status 101 (no display)"
+@pytest.mark.parametrize(
+    ("script", "ports", "problem"),
+    [
+        ("", [viewer.PORT], ""),  # a viewer that runs already takes the recording over
+        ('; [ "$2" = auto ]', [viewer.PORT, "auto"], ""),  # another program listens
+        (
+            "; printf 'INFO fine\\n\\033[31mError: no \\033[0mdisplay\\n' >&2; exit 101",
+            [viewer.PORT, "auto"],
+            "the viewer ended with status 101 (no display)",
+        ),
+    ],
+)
+def test_a_viewer_that_ends_took_the_recording_over_or_is_tried_at_a_free_port_or_told(
+    monkeypatch, tmp_path, script, ports, problem
+):
+    fake_viewer(monkeypatch, f"echo $2 >> {tmp_path}/ports{script}")  # `--port 9876`
+    assert viewer.open_window(Path("run.rrd")) == problem
+    assert (tmp_path / "ports").read_text().split() == ports
 
 
 def test_a_missing_viewer_is_an_error(monkeypatch):
