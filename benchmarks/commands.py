@@ -1,9 +1,9 @@
 """Commands, each as a process of its own, beside real time, or beside an older checkout.
 
 The runs: 10 s at 10 kHz of TALOS, 32 joints; 150 s at 1 kHz of 60 joints; both float32, with
-positions, velocities measured and desired. The log: 10 s of noise in two columns. The batch: 28
-runs of 7 s. The MCAP: 20 s at 1 kHz of 60 joints, by `export`. With an older checkout, each has its
-own caches, and they take turns after a warm-up.
+positions, velocities measured and desired. The batch: 28 runs of 7 s. The MCAP: 20 s at 1 kHz of 60
+joints, by `export`. With an older checkout, each has its own caches, and they take turns after a
+warm-up.
 """
 
 import sys
@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.checkouts import Checkout
 from benchmarks.table import ROOT, Row, in_turns, of_process
-from noisemodel import Robot, Run, simplified
+from noisemodel import Robot, Run
 
 REPEATS, BATCH = 3, 28
 RECORDINGS = {"view of 10 s, 10 kHz, 32 joints": 20.0}  # most that a recording may have, in [MB]
@@ -35,7 +35,6 @@ def cases(folder: Path) -> dict[str, tuple[list[str], float, float | None]]:
         "classify 10 s, 10 kHz, 32 joints": (["classify", short], 10.0, None),
         "classify 150 s, 1 kHz, 60 joints": (["classify", long], 150.0, None),
         "classify 28 runs of 7 s, 1 kHz, 18 joints": (["classify", batch], BATCH * 7.0, None),
-        "classify 10 s of noise, 10 kHz": (["classify", str(folder / "noise.log")], 10.0, 1.5),
         "import of an MCAP of 20 s, 1 kHz, 60 joints": (["import", mcap, *run], 20.0, 4.0),
         "view of 10 s, 10 kHz, 32 joints": (["view", short, *save], 10.0, 3.0),
         "view of 150 s, 1 kHz, 60 joints": (["view", long, *save], 150.0, 5.0),
@@ -86,9 +85,9 @@ def elapsed(checkout: Checkout, folder: Path, jobs: str) -> float:
 
 
 def write(folder: Path) -> None:
-    """Write the runs and the log."""
-    run = moving(10_000, 10.0, Robot.load("talos").joint_names, "talos")
-    run.save(folder / "short.npz")
+    """Write the runs."""
+    short = moving(10_000, 10.0, Robot.load("talos").joint_names, "talos")
+    short.save(folder / "short.npz")
     many = tuple(f"joint_{number}" for number in range(60))
     moving(1000, 150.0, many, None).save(folder / "long.npz")
     (folder / "batch").mkdir()
@@ -99,8 +98,6 @@ def write(folder: Path) -> None:
     of_process(
         [sys.executable, "-m", "inspector", "export", folder / "run.npz", "-o", folder / "run.mcap"]
     )
-    noise = simplified(run.motion, run.velocity_desired)
-    np.savetxt(folder / "noise.log", np.column_stack((run.time, noise)), fmt="%.12f %.15e")
 
 
 def moving(rate: float, seconds: float, names: tuple[str, ...], robot: str | None) -> Run:
