@@ -34,12 +34,6 @@ def failures(blocks):
     return [block for block in blocks if block.label != "ok"]
 
 
-def test_a_run_like_its_twin_is_ok_from_end_to_end():
-    blocks, traces = label(np.zeros((len(TIME), 2)))
-    assert [(block.start, block.stop, block.label) for block in blocks] == [(0.0, 4.0, "ok")]
-    assert traces == []
-
-
 def test_a_strong_blow_is_an_impact_from_its_onset():
     blocks, (trace,) = label(knock(2.0, 1.0), Event("impact", "contact", 2.0, 2.02))
     (impact,) = failures(blocks)

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from functools import partial
 from itertools import cycle
 
 import numpy as np
@@ -11,9 +10,6 @@ from simulated import simulated
 
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import simulation
-from noiseclassifier.scenarios.faults import multisine
-from noiseclassifier.scenarios.motions import Picks
-from noiseclassifier.scenarios.simulation import Case
 from noisemodel import Block, Run
 
 SHORT = 3.0
@@ -117,22 +113,6 @@ def test_an_unplanned_contact_is_recorded_with_its_impulse(runs):
     assert 0.2 < contact["facts"]["impulse"] < 20
     assert contact["facts"]["force"] > 50
     assert not any(event["label"] == "impact" for event in runs["force-jump"].meta["events"])
-
-
-def with_defect(monkeypatch, defect):
-    line = replace(
-        scenarios.SCENARIOS["obstacle-full"], name="special", cases={"arm": Case(Picks(), defect)}
-    )
-    monkeypatch.setattr(simulation, "SCENARIOS", {**scenarios.SCENARIOS, "special": line})
-
-
-def test_a_defect_without_an_effect_yields_no_failure(monkeypatch):
-    with_defect(monkeypatch, partial(multisine, bands=((20, 30),), amplitude=(1e-7, 1e-7)))
-    run = scenarios.simulate("panda", "special", 10, duration=SHORT)
-    (event,) = run.meta["events"]
-    assert labels(run) == {"ok"}
-    assert event["labelled"] == 0
-    assert not any(block.start < event["start"] + 0.1 < block.stop for block in run.blocks)
 
 
 def test_a_run_that_diverges_is_refused(monkeypatch, tmp_path):
