@@ -210,9 +210,6 @@ def test_the_headline_counts_findings_by_class_and_those_out_of_distribution():
     assert analysed("....").headline == "ok"
 
 
-# A desired velocity that is zero throughout.
-
-
 def zeros(run, **changes):
     return replace(run, velocity_desired=np.zeros_like(run.velocity), **changes)
 
@@ -340,7 +337,7 @@ def still_and_fast(**changes):
     return Run(**(fields | changes))
 
 
-def test_the_level_of_a_run_is_that_of_its_samples():
+def test_the_level_of_a_run_is_that_of_its_samples_with_parts_of_a_thousandth_and_remarks():
     def level(**changes):
         run = still_and_fast(**changes)
         return noise_level(run, estimate(run, "simplified"))
@@ -352,9 +349,6 @@ def test_the_level_of_a_run_is_that_of_its_samples():
     assert gap == f"simplified: rms 5 rad/s, peak 5 rad/s at 2.000 s{shares}"
     rest = level(velocity=np.zeros((10, 2)))
     assert rest == "simplified: rms 0 rad/s, peak 0 rad/s at 2.000 s"
-
-
-def test_parts_of_a_thousandth_are_listed_and_remarks_after_them():
     power = np.tile([0.998, 0.001, 0.0009], (10, 1))
     known = Estimate("paper", "√W", power, ("a", "b", "c"), ("links without geometry: d",))
     assert noise_level(still_and_fast(), known).splitlines()[1:] == [
@@ -444,8 +438,6 @@ def test_samples_cut_from_the_end_move_no_earlier_finding(rate):
         for one, other in zip(found, whole, strict=True):
             assert (one.start, one.stop) == pytest.approx((other.start, other.stop), abs=1 / rate)
 
-
-# The worst moments, and the rows of pictures.
 
 STEPS = np.arange(100) * STEP
 

@@ -41,9 +41,6 @@ def held(run, count, lead=0):
     )
 
 
-# --- what could not be seen
-
-
 @pytest.mark.parametrize(
     ("rate", "edge"), [(80.0, 35), (125.0, 55), (250.0, 110), (1000.0, 440), (2000.0, 880)]
 )
@@ -112,9 +109,6 @@ def test_differentiated_velocities_end_what_can_be_seen_earlier():
     log = replace(run, velocity=central, position=position, velocity_desired=None)
     (line,) = (each for each in analyse(log, library()).remarks if "cannot be seen" in each)
     assert "(velocities were differentiated)" in line
-
-
-# --- held values
 
 
 @pytest.mark.parametrize(("count", "lead"), [(2, 0), (4, 0), (4, 3), (8, 1)])

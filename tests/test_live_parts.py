@@ -18,9 +18,6 @@ def warnings():
     return Warnings(lines.append), lines
 
 
-# The clock.
-
-
 def taken(stamps, rate=1000.0, size=50):
     """Which stamps a clock keeps, and when they are, in batches; how many are lost; warnings."""
     counted, lines = warnings()
@@ -119,9 +116,6 @@ def test_another_rate_than_the_nominal_one_is_a_warning():
     ]
 
 
-# Labels.
-
-
 @pytest.mark.parametrize(
     ("rate", "remark"),
     [
@@ -166,9 +160,6 @@ def test_live_motion_of_any_rate_is_labelled_as_it_comes(rate):
         ) if name != "label" else np.testing.assert_array_equal(each, whole.label[:count])
 
 
-# The spectrogram.
-
-
 @pytest.mark.parametrize("size", [1, 50, 999])
 def test_a_hum_is_bright_in_its_band_whatever_the_blocks(size):
     rate, hertz = 5000.0, 440.0
@@ -201,9 +192,6 @@ def test_silence_and_gaps_are_dark():
     assert level[0].max() == 0.0  # what a viewer draws between before and after the gap
     assert level[1:].max(axis=1).min() > 0.5
     assert 8.5 < time[0] < time[1] < 8.56
-
-
-# The robot.
 
 
 @pytest.mark.parametrize("robot", ["panda", "talos", "tiago", "hyq"])

@@ -29,9 +29,6 @@ def read(reader, lines, first=2):
     return list(reader.read(lines, first, lambda *told: warned.append(told))), warned
 
 
-# CSV.
-
-
 def test_columns_are_found_by_their_names():
     reader = CsvReader(HEAD, ())
     (rows,), warned = read(reader, b"0.5,1,2,3,4,9\n0.6,1.5,-2e-3,3,4,9\n0.7,,nan,3,4,9\n")
@@ -117,9 +114,6 @@ def test_headers_that_do_not_define_all_columns_are_refused(head, names, reason)
         CsvReader(head, names)
 
 
-# JSON.
-
-
 def test_objects_hold_arrays_as_a_run_file_names_them():
     reader, is_header = reader_of(b' {"velocity": [1]}', ("a",))
     assert not is_header
@@ -140,9 +134,6 @@ def test_objects_of_other_widths_are_kept_apart_and_malformed_ones_reported():
     assert [line.split(":")[0] for _, line in warned] == ["line 3", "line 4", "line 5", "line 6"]
     assert warned[1][1] == "line 4: no JSON object with a velocity; such rows are left out"
     assert warned[3][1] == ("line 6: velocity holds no numbers; such rows are left out")
-
-
-# The stream.
 
 
 class Trickle(io.RawIOBase):
@@ -177,9 +168,6 @@ def test_little_waits_for_more_and_much_is_read_at_once(monkeypatch):
 def test_a_line_that_never_ends_is_refused():
     with pytest.raises(LiveError, match=f"line 1 is longer than {MAX_LINE_BYTES} bytes"):
         list(chunks(Trickle(b"x" * (MAX_LINE_BYTES + 2), 1 << 20)))
-
-
-# The command.
 
 
 def live(*arguments, text="", **options):

@@ -164,14 +164,10 @@ def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, librar
     assert [state for _, _, state in classes(path)] == changes
 
 
-def test_no_peak_of_the_noise_is_lost(tmp_path, library):
+def test_no_peak_of_a_joint_is_lost(tmp_path, library):
     signals = motion(2.0)
     signals["velocity"][1234] += 3.0
     path, _, _ = shown(tmp_path, signals, library=library)
-    noise = nm.simplified(signals["velocity"], signals["velocity_desired"])
-    time, values = read(path, "/noise/simplified", "Scalars:scalars")
-    assert np.max(values) == pytest.approx(noise.max())
-    assert time[np.argmax(values)] == pytest.approx(1.234, abs=1e-6)
     _, velocity = read(path, "/joints/velocity/0", "Scalars:scalars")
     assert len(velocity) <= 2.0 * 400
     assert np.max(velocity) == pytest.approx(signals["velocity"].max())
@@ -302,14 +298,6 @@ def test_unknown_values_make_no_noise_and_no_label(tmp_path, library):
     np.testing.assert_allclose(centres, [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.3, 1.8], atol=1e-6)
 
 
-def test_unknown_positions_only_stop_the_robot(tmp_path, library):
-    signals = motion(1.0, 7)
-    signals["position"][:] = np.nan
-    path, _, summary = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)
-    assert "/robot/motion" not in entities(path)
-    assert sum(summary.labels.values()) == 7
-
-
 def test_other_signals_than_at_first_are_warned_of_once_counted_and_not_labelled(tmp_path, library):
     whole, warned = motion(3.0), []
     with inspector.LiveSession(
@@ -354,12 +342,17 @@ def test_a_rate_without_a_model_shows_noise_and_warns_that_there_are_no_labels(t
     assert not any(path.startswith(("/class", "/score")) for path in found)
 
 
-def test_a_robot_without_positions_is_not_drawn_and_that_is_warned_of(tmp_path, library):
+def test_a_robot_is_not_drawn_without_positions_that_are_known(tmp_path, library):
     signals = {"velocity": np.zeros((100, 7)), "time": np.arange(100) / RATE}
     options = {"robot": "panda", "joint_names": PANDA, "library": library}
     path, warned, _ = shown(tmp_path, signals, **options)
     assert warned == ["no positions: the robot is not drawn"]
     assert "/noise/simplified" in entities(path)
+    signals = motion(1.0, 7)
+    signals["position"][:] = np.nan
+    path, _, summary = shown(tmp_path, signals, **options)
+    assert "/robot/motion" not in entities(path)
+    assert sum(summary.labels.values()) == 7
 
 
 def test_joints_are_named_by_the_robot_if_they_are_all_there(tmp_path, library):

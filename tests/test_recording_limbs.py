@@ -34,16 +34,13 @@ def test_talos_has_two_legs_a_torso_two_arms_and_a_head(tmp_path):
     assert found["arm_left"][-1] == "gripper_left_joint"
 
 
-def test_fingers_belong_to_their_arm_and_wheels_belong_together():
+def test_fingers_belong_to_their_arm_wheels_together_and_unnamed_joints_are_passed_over():
     hand = tree(("root", "a1"), ("a1", "a2"), ("a2", "left"), ("a2", "right"))
     assert limbs(["a1", "a2", "left", "right"], hand) == {"joints": ("a1", "a2", "left", "right")}
     car = tree(*(("root", f"wheel{i}") for i in range(4)), ("root", "arm1"), ("arm1", "arm2"))
     found = limbs(["wheel0", "wheel1", "wheel2", "wheel3", "arm1", "arm2"], car)
     assert found["wheel"] == ("wheel0", "wheel1", "wheel2", "wheel3")
     assert found["arm"] == ("arm1", "arm2")
-
-
-def test_joints_that_a_run_does_not_name_are_passed_over():
     chain = tree(("root", "a1"), ("a1", "fixed"), ("fixed", "a2"), ("root", "b1"), ("b1", "b2"))
     assert list(limbs(["a1", "a2", "b1", "b2"], chain).values()) == [("a1", "a2"), ("b1", "b2")]
 

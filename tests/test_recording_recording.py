@@ -438,11 +438,6 @@ def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):
     assert {"/noise/simplified", "/joints/velocity/0"} <= found
     assert {f"/spectrogram/bands/{band:02d}" for band in range(48)} <= found
     assert not any(entity.startswith(("/robot", "/class")) for entity in found)
-    _, (text,) = read(path, "/report", "TextDocument:text")
-    assert text[0].startswith("### cannot-tell: ")
-    assert "250 Hz" in text[0].partition("\n")[0]
-    assert "No 3D robot: the run names none." in text[0]
-    assert "no desired velocities" in text[0]
 
 
 @pytest.mark.parametrize(("samples", "rate"), [(2, 100), (8, 50_000), (30, 1000)])

@@ -212,9 +212,6 @@ def test_a_browser_draws_the_recording(recording, tmp_path):
     assert sizes[-1] > 40_000
 
 
-# Recordings without a name: few are kept.
-
-
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

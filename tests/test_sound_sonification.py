@@ -122,13 +122,10 @@ def test_playing_faster_makes_low_frequencies_audible():
     assert "Played 10 times as fast: frequencies are 10 times as high." in remarks(run, 10.0)
 
 
-def test_a_log_at_a_low_rate_has_a_remark_on_its_bandwidth():
+def test_a_log_at_a_low_rate_has_a_remark_and_without_audible_frequencies_is_refused():
     found = list(remarks(run_of(tone(40, rate=250.0), rate=250.0), 1.0))
     assert "Audible: 20 Hz to 125 Hz of the motion (half the rate of 250 Hz)." in found
     assert any("no content above 125 Hz" in remark for remark in found)
-
-
-def test_a_log_without_audible_frequencies_is_refused_with_a_speed():
     run = run_of(tone(5, rate=30.0), rate=30.0)
     with pytest.raises(InspectorError, match="30 Hz has no content above 15 Hz.*--speed 6"):
         sonify(run)
