@@ -19,6 +19,7 @@ def test_the_first_stamp_is_kept_exactly(tmp_path):
 
 
 HEAD = "time,a.velocity,b.velocity\n"
+ROW = HEAD + "0,1,2\n"
 
 
 @pytest.mark.parametrize(
@@ -26,27 +27,21 @@ HEAD = "time,a.velocity,b.velocity\n"
     [
         ("", "log.csv: the log is empty; expected a header"),
         (HEAD, "log.csv: 0 samples; a run needs at least 2"),
-        (HEAD + "0,1,2\n", "log.csv: 1 sample; a run needs at least 2"),
-        (HEAD + "0,1,2\n0.1,1,2\n0.05,1,2\n", "row 4: time runs backwards: 0.05 comes after 0.1"),
-        (HEAD + "0,1,2\n\n0.1,1,2\n0.1,1,2\n", "row 5: time stands still: 0.1 comes after 0.1"),
-        (
-            HEAD + "0,1,2\n0.1,nan,2\n",
-            "row 3: column 'a.velocity' is empty in 50% of the rows; col",
-        ),
-        (HEAD + "0,1,2\n0.1,1,-inf\n", "row 3: column 'b.velocity' holds -inf"),
-        (HEAD + "0,1,2\nnan,1,2\n", "row 3: column 'time' holds 'nan', which is no time"),
-        (HEAD + "0,1,2\n0.1,,2\n", r"row 3: column 'a.velocity' is empty .* \(--desired\)"),
-        (HEAD + "0,1,2\n,,\n", "row 3: column 'time' is empty"),
-        (
-            HEAD + "0,1,2\n0.1,1,off\n",
-            "row 3: column 'b.velocity' holds 'off', which is not a number",
-        ),
+        (ROW, "log.csv: 1 sample; a run needs at least 2"),
+        (ROW + "0.1,1,2\n0.05,1,2\n", "row 4: time runs backwards: 0.05 comes after 0.1"),
+        (ROW + "\n0.1,1,2\n0.1,1,2\n", "row 5: time stands still: 0.1 comes after 0.1"),
+        (ROW + "0.1,nan,2\n", "row 3: column 'a.velocity' is empty in 50% of the rows; col"),
+        (ROW + "0.1,1,-inf\n", "row 3: column 'b.velocity' holds -inf"),
+        (ROW + "nan,1,2\n", "row 3: column 'time' holds 'nan', which is no time"),
+        (ROW + "0.1,,2\n", r"row 3: column 'a.velocity' is empty .* \(--desired\)"),
+        (ROW + ",,\n", "row 3: column 'time' is empty"),
+        (ROW + "0.1,1,off\n", "row 3: column 'b.velocity' holds 'off', which is not a number"),
         (
             HEAD.replace(",", ";") + "0;1;2\n0,1s;1;2\n",
             "row 3: column 'time' holds '0,1s', which is no time",
         ),
-        (HEAD + "0,1,2\n0.1,1\n", "row 3: 2 cells where the header names 3 columns"),
-        (HEAD + "0,1,2\n0.1,1,2,3\n", "row 3: 4 cells where the header names 3 columns"),
+        (ROW + "0.1,1\n", "row 3: 2 cells where the header names 3 columns"),
+        (ROW + "0.1,1,2,3\n", "row 3: 4 cells where the header names 3 columns"),
         ("time,a.velocity,a.velocity\n0,1,2\n", "row 1: two columns are named 'a.velocity'"),
         (
             "time,a.velocity,/js/a/velocity\n0,1,2\n0.1,1,2\n",
@@ -66,7 +61,7 @@ HEAD = "time,a.velocity,b.velocity\n"
         ("0.0,1.0,2.0\n\n0.1,1.0\n", "row 1: there is no header; the first row has 3 numbers"),
         ("time,speed\n0,1\n0.1,1\n", "no position or velocity of a joint; name columns"),
         ("time,a.effort\n0,1\n0.1,1\n", "no position or velocity of a joint"),
-        (HEAD + "0,1,2\n0.1,1,2\n0.2,1,2\n1e9,1,2\n", "row 5: time jumps by 1e.09 s; most of"),
+        (ROW + "0.1,1,2\n0.2,1,2\n1e9,1,2\n", "row 5: time jumps by 1e.09 s; most of"),
         (HEAD + '0,1,"2\n' + "0,1,2\n" * 40_000, r"not a CSV log \(field larger than field limit"),
     ],
 )

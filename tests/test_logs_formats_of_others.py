@@ -1,6 +1,6 @@
 """Logs as robots and tools write them, each of which is imported untouched.
 
-``FORMATS`` is the table of docs/logs.md: `python tests/test_logs_formats_of_others.py` prints it.
+``FORMATS`` is a table of docs/log-formats.md: `python docs/generate.py` writes it.
 """
 
 from collections.abc import Callable, Sequence

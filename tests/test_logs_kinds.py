@@ -1,6 +1,6 @@
 """Logs in the manner of 38 public ones: read right as they are, or by the first hint, or refused.
 
-``python tests/test_logs_kinds.py`` prints the table of the documentation.
+``KINDS`` is a table of docs/log-formats.md: `python docs/generate.py` writes it.
 """
 
 import re
@@ -20,15 +20,12 @@ from inspector.logs.mapping import read_options
 from inspector.logs.plausibility import contradictions
 
 DEG = 180 / np.pi
-
-
 SAMPLES = 1200
 
 
-def motion(joints, rate, samples=SAMPLES, seed=0):
+def motion(joints, rate):
     """Time, positions and velocities of joints that swing, and targets ahead of them."""
-    random = np.random.default_rng(seed)
-    time = np.arange(samples) / rate
+    random, time = np.random.default_rng(0), np.arange(SAMPLES) / rate
     speed = min(2.0, rate / 60) * random.uniform(0.5, 1.0, joints)
     phase, size = random.uniform(0, 6, joints), random.uniform(0.4, 1.2, joints)
     angle = 2 * np.pi * speed * time[:, None] + phase
@@ -123,14 +120,14 @@ def rtde(folder, doubled=False):
     return csv(folder / "rtde.csv", header, position, velocity, *extra)
 
 
-def bare(header, joints, rate=100.0, before=(), after=0):
+def bare(header, joints, rate=100.0, after=0):
     """A writer of positions under names of joints alone, and of columns that are none."""
 
     def write(folder):
         time, position, _ = motion(joints, rate)
         other = np.random.default_rng(1).normal(size=(SAMPLES, after))
         stamped = [time] if header.lower().startswith("time") else []
-        return csv(folder / "bare.csv", header, *stamped, *before, position, other)
+        return csv(folder / "bare.csv", header, *stamped, position, other)
 
     return write
 
@@ -519,7 +516,3 @@ def table():
             place.mkdir()
             rows.append(row(kind, place))
     return "\n".join(["| log | columns | typed | said | read |", "|---|---|---|---|---|", *rows])
-
-
-if __name__ == "__main__":
-    print(table())

@@ -107,6 +107,9 @@ def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
         read_log(path, robot="panda")
 
 
+FITS = {"dof_vel": VELOCITY, "t": TIME}
+
+
 @pytest.mark.parametrize(
     ("arrays", "mapping", "message"),
     [
@@ -117,24 +120,20 @@ def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
             [],
             r"'dof_vel' has shape \(3, 400\); expected 400 samples, as stamps, along its first",
         ),
-        ({"dof_vel": VELOCITY, "t": TIME}, ["position=dof_pos"], "no column 'dof_pos' to map; it"),
-        ({"dof_vel": VELOCITY, "t": TIME}, ["velocity=dof_vel[2:9]"], r"'dof_vel' has 3 columns"),
+        (FITS, ["position=dof_pos"], "no column 'dof_pos' to map; it"),
+        (FITS, ["velocity=dof_vel[2:9]"], r"'dof_vel' has 3 columns"),
         (
-            {"dof_vel": VELOCITY, "t": TIME},
+            FITS,
             ["velocity.elbow=dof_vel"],
             r"'dof_vel' has 3 columns, velocity.elbow is one; name it as dof_vel\[0\]",
         ),
-        ({"dof_vel": VELOCITY, "t": TIME}, ["base_pose=dof_vel"], "3 columns, a base_pose has 7"),
+        (FITS, ["base_pose=dof_vel"], "3 columns, a base_pose has 7"),
         (
-            {"dof_vel": VELOCITY, "t": np.where(TIME == 1, np.nan, TIME)},
+            FITS | {"t": np.where(TIME == 1, np.nan, TIME)},
             [],
             r"column 't' holds nan \(sample 101\)",
         ),
-        (
-            {"dof_vel": np.array([{}], dtype=object), "t": TIME},
-            [],
-            "not an archive of plain arrays",
-        ),
+        (FITS | {"dof_vel": np.array([{}], dtype=object)}, [], "not an archive of plain arrays"),
     ],
 )
 def test_arrays_that_do_not_fit_are_errors_of_one_line(tmp_path, arrays, mapping, message):

@@ -9,6 +9,7 @@ from inspector.logs.mapping import UNITS, Entry, ReadOptions, parse_mapping
 
 LETTERS = st.characters(codec="utf-8", exclude_categories=("Cs", "Cc"), exclude_characters="=")
 NAMES = st.text(LETTERS, min_size=1)
+FORMAT = 'format = "noise-mapping/1"\n'
 
 
 @given(
@@ -62,24 +63,15 @@ def test_a_part_of_an_array_is_named_as_python_does(source, name, columns):
     [
         ("rate = 3", 'not a mapping; expected format = "noise-mapping/1"'),
         ("rate = ", "not a mapping in TOML"),
-        (
-            'format = "noise-mapping/1"\nspeed = 3',
-            "unknown setting 'speed'; there are columns, force, joints, off",
-        ),
-        ('format = "noise-mapping/1"\nrate = "fast"', "rate = 'fast' is of another type"),
-        (
-            'format = "noise-mapping/1"\nrate = -1',
-            "the rate is -1 Hz; expected 0.001 to 1e[+]09 Hz",
-        ),
-        ('format = "noise-mapping/1"\nrate = 2027-01-31', "rate = 2027-01-31 is of another type"),
-        ('format = "noise-mapping/1"\njoints = "a"', "joints = 'a' is of another type"),
-        (
-            'format = "noise-mapping/1"\nunits = "miles"',
-            "no units 'miles'; there are radians, degrees",
-        ),
-        ('format = "noise-mapping/1"\nmap = 3', "m.toml: "),
-        ('format = "noise-mapping/1"\n[map]\nspeed = "x"', "mapping 'speed=x': expected SIGNAL"),
-        ('format = "noise-mapping/1"\n[map]\nvelocity = 3', "velocity = 3 is of another"),
+        (FORMAT + "speed = 3", "unknown setting 'speed'; there are columns, force, joints, off"),
+        (FORMAT + 'rate = "fast"', "rate = 'fast' is of another type"),
+        (FORMAT + "rate = -1", "the rate is -1 Hz; expected 0.001 to 1e[+]09 Hz"),
+        (FORMAT + "rate = 2027-01-31", "rate = 2027-01-31 is of another type"),
+        (FORMAT + 'joints = "a"', "joints = 'a' is of another type"),
+        (FORMAT + 'units = "miles"', "no units 'miles'; there are radians, degrees"),
+        (FORMAT + "map = 3", "m.toml: "),
+        (FORMAT + '[map]\nspeed = "x"', "mapping 'speed=x': expected SIGNAL"),
+        (FORMAT + "[map]\nvelocity = 3", "velocity = 3 is of another"),
     ],
 )
 def test_an_invalid_mapping_is_an_error_of_one_line(tmp_path, text, message):

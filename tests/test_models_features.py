@@ -271,9 +271,12 @@ def test_one_joint_whose_error_grows_is_above_the_mean_of_all():
 
 
 @pytest.mark.parametrize(("samples", "frames"), [(400, 1), (499, 1), (500, 2), (1000, 7)])
-def test_as_many_frames_as_hops_fit(samples, frames):
-    cut = nc.frame(np.arange(float(samples)), length=400, hop=100)
+def test_as_many_frames_as_hops_fit_are_a_view_that_cannot_be_written(samples, frames):
+    signal = np.arange(float(samples))
+    cut = nc.frame(signal, length=400, hop=100)
     assert cut.shape == (frames, 400)
+    assert np.shares_memory(cut, signal)
+    assert not cut.flags.writeable
     assert np.array_equal(cut[:, 0], 100.0 * np.arange(frames))
 
 
@@ -281,13 +284,6 @@ def test_frames_are_of_the_paper_by_default():
     cut = nc.frame(np.arange(10_000.0))
     assert cut.shape == (7, 4000)
     assert cut[:, 0].tolist() == [1000.0 * number for number in range(7)]
-
-
-def test_frames_are_a_view_that_cannot_be_written():
-    signal = np.arange(1000.0)
-    cut = nc.frame(signal, length=400, hop=100)
-    assert np.shares_memory(cut, signal)
-    assert not cut.flags.writeable
 
 
 def test_a_flush_frame_covers_the_tail_once():

@@ -11,9 +11,8 @@ import pytest
 from commandline import call
 
 from inspector import read_log
-from inspector.analysis import Estimate, noise_level
-from inspector.errors import InspectorError, LogError
-from noisemodel import MeshError, Robot, RobotError, Run, RunError, meshes
+from inspector.errors import LogError
+from noisemodel import Robot, RobotError, Run, RunError
 
 TIME = np.arange(40) / 1000
 
@@ -30,28 +29,6 @@ def test_a_stamp_that_is_no_time_is_named(tmp_path, stamp):
     path = csv(tmp_path / "a.csv", [0, stamp, 1, 2])
     with pytest.raises(LogError, match=r"a.csv, row 3: "):
         read_log(path)
-
-
-def test_steps_of_time_that_no_log_has_are_refused(tmp_path):
-    for step in (5e-324, 1e-12, 1e12):
-        with pytest.raises(RunError, match="time: the median step is .* s, expected 1e-09 s to"):
-            Run(time=np.arange(4) * step, velocity=np.ones((4, 1)), joint_names=("a",))
-
-
-@pytest.mark.parametrize("value", [1e200, -1e16, 1e308])
-def test_a_velocity_whose_square_is_not_finite_is_refused(value):
-    velocity = np.full((40, 2), 0.1)
-    velocity[3, 1] = value
-    with pytest.raises(RunError, match=r"velocity: .*e\+.* in row 3, column 1; expected numbers"):
-        Run(time=TIME, velocity=velocity, joint_names=("a", "b"))
-
-
-def test_a_noise_that_is_not_finite_is_no_result():
-    run = Run(time=TIME, velocity=np.ones((40, 1)), joint_names=("a",))
-    power = np.ones((40, 1))
-    power[5] = np.inf
-    with pytest.raises(InspectorError, match="the paper noise is inf at 0.005 s"):
-        noise_level(run, Estimate("paper", "√W", power, ("a",)))
 
 
 @pytest.mark.parametrize("command", ["classify", "audit", "noise", "view"])
@@ -101,8 +78,6 @@ def test_a_column_of_time_that_is_not_there_is_named(tmp_path):
 LINKS = "".join(f'<link name="l{n}"/>' for n in range(3))
 JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><axis xyz="0 0 1"/>
 <limit lower="0" upper="1" effort="1" velocity="1"/>{4}</joint>"""
-INERTIAL = """<link name="m"><inertial>{}<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
-</inertial></link>"""
 
 
 def mimics(leader, more):
@@ -110,20 +85,10 @@ def mimics(leader, more):
     return LINKS + first + JOINT.format("b", "revolute", "l1", "l2", more)
 
 
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        (mimics("a", ""), "joint 'a' mimics itself"),
-        (mimics("b", '<mimic joint="a"/>'), "joint 'a' mimics itself"),
-        *(
-            (INERTIAL.format(mass), "value of <mass> is .*, expected 1 finite number")
-            for mass in ('<mass value=""/>', "<mass/>", '<mass value="1 2"/>')
-        ),
-    ],
-)  # fmt: skip
-def test_a_robot_that_no_one_can_build_is_refused(tmp_path, content, problem):
+@pytest.mark.parametrize("content", [mimics("a", ""), mimics("b", '<mimic joint="a"/>')])
+def test_a_joint_that_mimics_itself_is_refused(tmp_path, content):
     (tmp_path / "r.urdf").write_text(f'<robot name="r">{content}</robot>')
-    with pytest.raises(RobotError, match=problem):
+    with pytest.raises(RobotError, match="joint 'a' mimics itself"):
         Robot.load(tmp_path / "r.urdf")
 
 
@@ -139,11 +104,6 @@ def test_a_name_of_a_joint_that_is_hostile_is_one_line(tmp_path):
 def test_a_name_that_no_file_can_have_is_no_robot(name):
     with pytest.raises(RobotError, match="no such URDF file|neither a URDF or MJCF file"):
         Robot.load(name)
-
-
-def test_a_run_in_half_precision_is_checked_without_warnings():
-    velocity = np.ones((40, 1), dtype=np.float16)
-    assert Run(time=TIME, velocity=velocity, joint_names=("a",)).velocity.dtype == np.float16
 
 
 LIVE = [f'{{"time": {n / 1000}, "velocity": [{n % 7 / 10}, 0.1]}}' for n in range(600)]
@@ -185,11 +145,3 @@ def test_a_file_whose_name_is_not_utf_8_is_printed_escaped(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert rb"\udcff\udcfe.csv: 0.60 s" in done.stdout
-
-
-@pytest.mark.parametrize("point", ["v", "v 1", "v 1 2"])
-def test_a_point_of_a_mesh_has_three_numbers(tmp_path, point):
-    path = tmp_path / "a.obj"
-    path.write_text(f"{point}\n" * 6 + "f 1 2 3\n")
-    with pytest.raises(MeshError, match="is no point"):
-        meshes.read(path)
