@@ -79,12 +79,8 @@ def test_a_robot_that_follows_well_is_no_copy():
 
 def test_copies_are_found_by_name():
     _, _, velocity = motion(30.0)
-    run = run_of(
-        velocity,
-        30.0,
-        velocity_desired=velocity[:, [3, 1]],
-        desired_joint_names=("joint3", "joint0"),
-    )
+    desired = {"velocity_desired": velocity[:, [3, 1]], "desired_joint_names": ("joint3", "joint0")}
+    run = run_of(velocity, 30.0, **desired)
     assert [copy.joints for copy in copies(run)] == [("joint3",)]
 
 

@@ -122,13 +122,8 @@ def test_joint_states_that_are_commands_are_desired_motion(tmp_path):
 
 
 def test_the_signal_of_a_topic_can_be_mapped(tmp_path):
-    path = bag(
-        tmp_path,
-        {
-            "/joint_states": states(),
-            "/mpc": joint_states(TALK, position=VELOCITY, velocity=POSITION),
-        },
-    )
+    targets = joint_states(TALK, position=VELOCITY, velocity=POSITION)
+    path = bag(tmp_path, {"/joint_states": states(), "/mpc": targets})
     mapping = ["position_desired=/mpc/position", "velocity_desired=/mpc/velocity"]
     run = read_log(path, mapping=mapping).run
     assert np.array_equal(run.position_desired, VELOCITY)

@@ -49,10 +49,8 @@ def test_errors_and_outputs_of_a_controller_are_no_motion(tmp_path):
 
 def test_a_mapping_gives_the_signal_of_other_columns(tmp_path):
     columns = {"clock": TIME, "dq2": TIME, "cmd = 2": -TIME}
-    run = read_log(
-        write(tmp_path / "log.csv", columns),
-        mapping=["time=clock", "velocity.left.elbow=dq2", "velocity_desired.left.elbow=cmd = 2"],
-    ).run
+    mapping = ["time=clock", "velocity.left.elbow=dq2", "velocity_desired.left.elbow=cmd = 2"]
+    run = read_log(write(tmp_path / "log.csv", columns), mapping=mapping).run
     assert run.joint_names == ("left.elbow",)
     assert np.array_equal(run.velocity[:, 0], TIME)
     assert np.array_equal(run.velocity_desired[:, 0], -TIME)

@@ -249,13 +249,8 @@ def test_a_rate_that_contradicts_the_motion_is_not_believed(tmp_path):
 def test_pybullets_joint_states_are_read_by_the_names_of_its_documentation(tmp_path):
     _, position, velocity = moved(240)
     effort = np.cos(position)
-    path = savez(
-        tmp_path / "apart.npz",
-        jointPosition=position,
-        jointVelocity=velocity,
-        appliedJointMotorTorque=effort,
-        targetPositions=position,
-    )
+    arrays = {"jointPosition": position, "jointVelocity": velocity, "targetPositions": position}
+    path = savez(tmp_path / "apart.npz", appliedJointMotorTorque=effort, **arrays)
     run = read_log(path).run
     assert run.rate == 240.0
     assert np.array_equal(run.position, position)

@@ -35,14 +35,10 @@ def debounced(text):
 @pytest.mark.parametrize(
     ("alone", "together"),
     [
-        ("..ii..", "......"),
-        ("..Ii..", "......"),
         (".iIIi.", ".iiii."),
         (".IiiiI", ".iiiii"),
-        (".I.I..", "......"),
         ("II.ii.", "ii...."),
         ("i.OOOi", "..oooo"),
-        (".Io...", "......"),
         (".IOo..", ".ooo.."),
         ("uIIu..", "iiii.."),
         (".IuuI.", ".iiii."),

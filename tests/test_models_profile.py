@@ -16,6 +16,7 @@ GENERAL = Path(__file__).parents[1] / "models" / "general.npz"
 
 FAST = nc.LogBands(quick=0.02, speed=True)
 LOG = {"bands": "log", "edges": (15.0, 30.0), "reference": True}
+AT_THE_END = "effort_joints at the end a reference"
 QUICK = {"quick_window": 200, "quick_stride": 9, "quick_edges": (75.0, 150.0)}
 
 
@@ -161,12 +162,8 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
         ),
         ({"bands": "log", "edges": (1, 2)}, r"edges is \(1, 2\), expected a tuple of float"),
         (
-            {"quick_window": 64},
-            "quick_window is 64 with quick_stride 0 and bands 'adjacent', expected",
-        ),
-        (
-            {"bands": "log", "edges": (15.0, 30.0), "quick_window": 5000, "quick_stride": 9},
-            "window of 5000 samples is longer than a frame of 4000",
+            {**LOG, **QUICK, "quick_window": 5000},
+            "window of 5000 samples is longer than a frame of",
         ),
         ({"quick_window": -1}, "quick_window is -1, expected 0 or more"),
         (
@@ -177,29 +174,21 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
             {"signals": ("measured_joints", "measured"), **LOG},
             "are measured_joints, measured, expected norms, and after them those that go joint by",
         ),
-        (
-            {"signals": ("measured", "measured_joints"), **LOG, "reference": False},
-            "with bands 'log', relative False and reference False: joint by joint takes 'log' a",
-        ),
-        (
-            {"signals": ("measured", "measured_joints"), "relative": True},
-            "measured_joints with bands 'adjacent', relative True and reference False: joint by",
-        ),
-        (
-            {"signals": ("measured", "effort_joints", "measured_joints"), **LOG},
-            "and reference True: .* and one of both, effort_joints at the end a reference",
-        ),
-        (
-            {"signals": ("measured", "effort_joints"), **LOG, "reference": False, "relative": True},
-            "relative True and reference False: .*, effort_joints at the end a reference",
-        ),
-        (
-            {"reference": True},
-            "noise with bands 'adjacent', relative False and reference True: .* relative False$",
-        ),
-        (
-            {**LOG, "relative": True},
-            "with bands 'log', relative True and reference True: .* a reference 'log' and relative",
+        *(
+            (
+                {"signals": tuple(names.split()), "bands": bands, "edges": (15.0, 30.0)}
+                | {"relative": relative, "reference": reference},
+                f"{names.split()[-1]} with bands '{bands}', relative {relative} and reference"
+                f" {reference}: .*{wanted}",
+            )
+            for names, bands, relative, reference, wanted in (
+                ("measured measured_joints", "log", False, False, "joint by joint takes 'log' a"),
+                ("measured measured_joints", "adjacent", True, False, "joint by"),
+                ("measured effort_joints measured_joints", "log", False, True, AT_THE_END),
+                ("measured effort_joints", "log", True, False, AT_THE_END),
+                ("noise", "adjacent", False, True, "relative False$"),
+                ("noise", "log", True, True, "a reference 'log' and relative"),
+            )
         ),
         ({"classes": ("ok",)}, "classes are ok, expected 'ok' and others, each once"),
         ({**LOG, **QUICK, "quick_stride": 0}, "with quick_stride 0 and bands 'log', expected a st"),

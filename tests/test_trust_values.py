@@ -37,13 +37,9 @@ def test_a_base_that_moves_without_joints_gives_a_result_or_one_line(tmp_path, c
     pose[:, 6] = 1.0
     stamps = np.arange(4000) / 1000
     twist = np.sin(5.0 * stamps)[:, None] * np.ones(6)
-    Run(
-        time=stamps,
-        velocity=np.zeros((4000, 0)),
-        joint_names=(),
-        base_pose=pose,
-        base_velocity=twist,
-    ).save(tmp_path / "run.npz")
+    base = {"base_pose": pose, "base_velocity": twist}
+    run = Run(time=stamps, velocity=np.zeros((4000, 0)), joint_names=(), **base)
+    run.save(tmp_path / "run.npz")
     outputs = [("-o", tmp_path / f"a.{suffix}") for suffix in ("rrd", "html")]
     for output in outputs if command == "view" else [()]:
         status, _, err = call(command, tmp_path / "run.npz", *output)
