@@ -172,43 +172,42 @@ def test_a_state_of_other_types_is_damaged(tmp_path, change):
         pass
 
 
-def verdict_of(name, **more):
-    found = Localisation("measured", "desired", 0.01, joints=(("a", 0.7), ("b", 0.3)), band=(9, 30))
-    known = Evidence("repetitions", 24.0, 1.1, "a", "velocity", (16.0, 32.0), -20.0)
-    blow = Finding("impact", 1.0, 1.5, 0.9, False, Localisation(), evidence=known)
-    rattle = Finding("oscillations", 2.0, 3.0, 0.8, True, found, Order("b", 3.0))
-    return Verdict(
-        Path(name),
-        Status.FINDINGS,
-        "general",
-        (blow, rattle),
-        "a message",
-        Unknown.IGNORE,
-        "f" * 64,
-        assumed="assumed",
-        scenario="walk",
-        duration=4.5,
-        rate=1000.0,
-        joints=6,
-        seconds=0.25,
-        picture=Path("picture.png"),
-        lost=("a sentence",),
-        begin=1.5,
-        **more,
-    )
+FOUND = Localisation("measured", "desired", 0.01, joints=(("a", 0.7), ("b", 0.3)), band=(9, 30))
+KNOWN = Evidence("repetitions", 24.0, 1.1, "a", "velocity", (16.0, 32.0), -20.0)
+WHOLE = Verdict(
+    Path("a.npz"),
+    Status.FINDINGS,
+    "general",
+    (
+        Finding("impact", 1.0, 1.5, 0.9, False, Localisation(), evidence=KNOWN),
+        Finding("oscillations", 2.0, 3.0, 0.8, True, FOUND, Order("b", 3.0)),
+    ),
+    "a message",
+    Unknown.IGNORE,
+    "f" * 64,
+    assumed="assumed",
+    scenario="walk",
+    duration=4.5,
+    rate=1000.0,
+    joints=6,
+    seconds=0.25,
+    picture=Path("picture.png"),
+    lost=("a sentence",),
+    begin=1.5,
+)
 
 
 def test_a_verdict_is_read_back_as_it_was_written(tmp_path):
     path, settings = tmp_path / "state", {"models": {"a": "0"}, "version": "1"}
     plain = Verdict(Path("b.npz"), Status.OK)
     with kept(path, settings) as (_, add):
-        add(verdict_of("a.npz"), "0" * 64)
+        add(WHOLE, "0" * 64)
         add(plain, "1" * 64)
         add(Verdict(Path("c.npz"), Status.INTERNAL_ERROR), "2" * 64)  # tried again
     with kept(path, settings) as (verdicts, _):
         pass
     assert verdicts == {
-        (Path("a.npz"), "0" * 64): verdict_of("a.npz"),
+        (Path("a.npz"), "0" * 64): WHOLE,
         (Path("b.npz"), "1" * 64): plain,
     }
 

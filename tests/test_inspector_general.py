@@ -89,7 +89,7 @@ def test_below_80_hz_there_is_no_verdict_and_the_rate_that_is_needed_is_told_onc
         assert {each.needed for each in found.audit.classes} == {80.0}
 
 
-def test_a_filter_ends_what_can_be_seen_earlier():
+def test_a_filter_or_differentiation_ends_what_can_be_seen_earlier():
     run = run_at(1000.0, seconds=10.0)
     sections = butter(4, 100, fs=1000, output="sos")
     noise = np.random.default_rng(0).normal(0, 0.01, run.velocity.shape)
@@ -100,9 +100,6 @@ def test_a_filter_ends_what_can_be_seen_earlier():
         f"Impact and oscillations above {high:.4g} Hz cannot be seen (the log looks filtered)."
     )
     assert high == pytest.approx(100, rel=0.2)
-
-
-def test_differentiated_velocities_end_what_can_be_seen_earlier():
     run = run_at(1000.0)
     position = np.cumsum(run.velocity, axis=0) / 1000.0
     central = np.gradient(position, 1e-3, axis=0)

@@ -66,6 +66,8 @@ def test_the_model_with_most_of_the_signals_of_a_run_is_taken():
     assert label_run(apart, of_panda()).model == "noise"  # no joint that is both
     measured = Run(time=time, velocity=noisy, joint_names=names)
     assert label_run(measured, of_panda()).model == "noise"
+    with pytest.raises(CannotTellError, match="no signal desired, error; there is noise, measured"):
+        label_run(measured, {"norms": of_panda()["norms"]})
 
 
 def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
@@ -85,13 +87,6 @@ def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
     labelled = label_run(replace(run, velocity=known, velocity_desired=0 * odd + 0.1), LIBRARY)
     assert "frames are out of distribution for model general" in labelled.remark
     assert set(labelled.labels.label[~labelled.labels.novel]) == {"ok"}
-
-
-def test_a_run_without_the_signals_of_a_model_is_not_classified_and_the_error_has_the_reason():
-    alone = {"norms": of_panda()["norms"]}
-    run = Run(time=np.arange(3000) / 1000.0, velocity=np.ones((3000, 1)), joint_names=("a",))
-    with pytest.raises(CannotTellError, match="no signal desired, error; there is noise, measured"):
-        label_run(run, alone)
 
 
 @pytest.mark.parametrize("rate", [91.0, 1000.0, 5000.0])

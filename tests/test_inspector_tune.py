@@ -244,13 +244,10 @@ def test_sets_that_do_not_validate_are_refused(data, tmp_path):
     assert (status, "not both" in err) == (2, True)
 
 
-def test_an_output_that_cannot_be_written_is_named(data, tmp_path):
+def test_an_output_that_cannot_be_written_is_named_before_the_work(data, tmp_path, counted):
     reason = f"{tmp_path / 'none' / 'tuned.jsonl'}: cannot be written (No such file or directory)"
     assert reason in refused(data, tmp_path / "none" / "tuned.jsonl", code=5)
     assert f"{tmp_path}: is no regular file; name another file, or" in refused(data, tmp_path)
-
-
-def test_a_model_that_exists_is_refused_before_the_work(data, tmp_path, counted):
     model = tmp_path / "model.npz"
     model.write_bytes(b"")
     complaint = refused(data, tmp_path / "tuned.jsonl", "--train", model)

@@ -177,6 +177,7 @@ def test_report_and_list_of_events_say_it_beside_the_band():
     assert PHRASE not in sentence(analysed(tone(0.05)), FINDING)
     (event,) = Verdict.of(Path("run.npz"), analysis).events
     assert event.order == order(analysis.run, FINDING) == analysis.orders[FINDING]
+    assert analysed(ripple(0.05), spans=(), findings=()).orders == {}
 
 
 @pytest.mark.parametrize("vibration", [tone(0.05), ripple(0.05)], ids=["tone", "ripple"])
@@ -188,7 +189,3 @@ def test_the_picture_has_a_line_for_each_order(vibration, monkeypatch):
     picture(analysed(vibration))
     wanted = [f"at 0.30 s: {PHRASE}"] if analysed(vibration).orders else []
     assert titles[0] == "\n".join(["filled: found", *wanted])
-
-
-def test_a_run_without_findings_has_no_orders():
-    assert analysed(ripple(0.05), spans=(), findings=()).orders == {}

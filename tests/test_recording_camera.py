@@ -140,12 +140,16 @@ def test_a_nearer_camera_would_not_see_all():
         assert np.abs(in_picture(points, nearer, camera.target, aspect)).max() > 0.86
 
 
-def test_a_robot_of_twice_the_size_is_the_same_picture():
+def test_a_robot_of_twice_the_size_or_of_none_is_the_same_picture():
     points = np.random.default_rng(3).standard_normal((50, 3))
     one, two = (fitted([scale * points]) for scale in (1.0, 2.0))
     np.testing.assert_allclose(two.eye, 2 * one.eye)
     np.testing.assert_allclose(two.target, 2 * one.target)
     assert two.floor == pytest.approx(2 * one.floor)
+    camera = fitted([np.array([[1.0, 2.0, 3.0]])])  # of no size: in the middle
+    assert np.isfinite(camera.eye).all()
+    np.testing.assert_allclose(camera.target, [1.0, 2.0, 3.0], atol=0.01)
+    assert camera.floor == 3.0
 
 
 def urdf(folder: Path, shape: str) -> Path:
@@ -167,10 +171,3 @@ def test_a_link_without_visual_shapes_is_drawn_as_it_collides(tmp_path):
         "a": ["Boxes3D"],
         "b": ["Boxes3D"],
     }
-
-
-def test_what_has_no_extent_is_in_the_middle_of_the_picture():
-    camera = fitted([np.array([[1.0, 2.0, 3.0]])])
-    assert np.isfinite(camera.eye).all()
-    np.testing.assert_allclose(camera.target, [1.0, 2.0, 3.0], atol=0.01)
-    assert camera.floor == 3.0

@@ -20,19 +20,6 @@ def test_system_packages_that_pictures_take_are_named(monkeypatch, tmp_path):
                 viewer.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
 
 
-def test_a_viewer_that_ends_is_one_line(monkeypatch):
-    monkeypatch.setattr(
-        viewer,
-        "command",
-        lambda *_: ["/bin/sh", "-c", "echo Error: no luck >&2; exit 7"],
-    )
-    with (
-        pytest.raises(ViewerError, match=r"ended with status 7 \(no luck\)"),
-        viewer.headless_viewer(),
-    ):
-        pass
-
-
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

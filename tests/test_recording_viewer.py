@@ -160,12 +160,12 @@ def test_a_port_that_is_taken_is_one_line(recording):
             pass
 
 
-def test_a_server_that_ends_at_once_is_an_error_with_the_reason(monkeypatch, recording):
+@pytest.mark.parametrize("opened", [viewer.serving, lambda _: viewer.headless_viewer()])
+def test_a_server_or_viewer_that_ends_at_once_is_an_error_with_the_reason(
+    monkeypatch, recording, opened
+):
     fake_viewer(monkeypatch, "echo Error: no memory >&2; exit 3")
-    with (
-        pytest.raises(ViewerError, match=r"ended with status 3 \(no memory\)"),
-        viewer.serving(recording),
-    ):
+    with pytest.raises(ViewerError, match=r"ended with status 3 \(no memory\)"), opened(recording):
         pass
 
 

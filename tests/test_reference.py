@@ -495,10 +495,7 @@ def test_repetitions_of_which_no_joint_is_in_all_are_no_reference_for_each_other
     compared = reference.compare(runs[0])
     assert compared.scenarios == compared.exceedances == ()
     assert compared.share(judging.Kind.GENERAL) == 1.0
-
-
-def test_a_reference_shorter_than_a_frame_covers_nothing(simulate):
-    run = simulate.run("pick", 1)
+    run = simulate.run("pick", 1)  # what is shorter than a frame covers nothing, either
     reference = Reference(Path("good"), store.of_runs([levels(run.cut(0.0, 0.15), name="wave")]))
     assert reference.compare(run).share(judging.Kind.GENERAL) == 1.0
 
