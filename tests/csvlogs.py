@@ -24,12 +24,6 @@ def log(tmp_path, time=TIME, name="log.csv", **columns):
     return write(tmp_path / name, held | columns)
 
 
-def text(tmp_path, text):
-    path = tmp_path / "log.csv"
-    path.write_text(text)
-    return path
-
-
 def jittered(seed=0):
     """Stamps that are off by up to 20 %, as a logger without a real-time clock writes them."""
     time = TIME + np.random.default_rng(seed).uniform(-0.002, 0.002, len(TIME))

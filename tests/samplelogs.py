@@ -72,15 +72,10 @@ class Talk:
 
 
 def write_bag(path, talk, topics, *, storage="mcap", compression=None):
-    """Write a bag.
+    """Write a bag: a folder, or a file of ROS 1.
 
-    Args:
-        path: Its folder, or for ROS 1 its file.
-        talk: Serialises.
-        topics: By topic, its messages with the times that the recorder had them; for a topic
-            without messages the name of their type.
-        storage: "mcap" or "sqlite3"; ROS 1 has its own.
-        compression: "storage", "message", "file", or for ROS 1 "lz4" or "bz2".
+    A topic has messages with the times that the recorder had them, or the name of their type alone.
+    Compression is "storage", "message", "file", or for ROS 1 "lz4" or "bz2".
     """
     if talk.ros1:
         from rosbags.rosbag1 import Writer

@@ -209,13 +209,15 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
     [
         (None, "a recipe has alarm, classes, .*, and nothing else"),
         ({"colour": 1}, "a recipe has alarm, classes, .*, and nothing else"),
-        ({"frame": "long"}, "frame is 'long', expected a number from 0 to 10000"),
-        ({"frame": -0.4}, "frame is -0.4, expected a number from 0 to 10000"),
-        ({"lowest": float("-inf")}, "lowest is -inf, expected a number from 0 to 10000"),
-        ({"highest": 10_001.0}, "highest is 10001.0, expected a number from 0 to 10000"),
-        ({"highest": True}, "highest is True, expected a number from 0 to 10000"),
-        ({"softness": None}, "softness is None, expected a number from 0 to 10000"),
-        ({"quick": float("inf")}, "quick is inf, expected a number from 0 to 10000"),
+        *(
+            ({name: value}, f"{name} is {value!r}, expected a number from 0 to 10000")
+            for name, values in {
+                "frame": ("long", -0.4),
+                "highest": (10_001.0, True, None),
+                "quick": (float("inf"), float("-inf")),
+            }.items()
+            for value in values
+        ),
         ({"per_octave": 0.0}, "a setting of the recipe is wrong"),
         ({"window": 0.0}, "a setting of the recipe is wrong"),
         ({"lowest": 30.0}, "a rate of 80 Hz leaves 1 bands"),

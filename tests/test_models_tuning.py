@@ -250,18 +250,3 @@ def test_a_class_of_a_single_recording_cannot_be_folded():
     trial = Trial(recordings, folds([each.name for each in recordings], 2))
     with pytest.raises(nc.DatasetError, match=f"{LACKS.format(2)}; give more recordings of it"):
         measure([PROFILES["paper"]], trial)
-
-
-@pytest.fixture(scope="module")
-def stand_in(lola):
-    """The recordings of the stand-in."""
-    each = [list(nc.noisytest.read_folder(lola / name)) for name in ("training", "validation")]
-    return Sets(*each)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("kernel", "count"), [("rbf", 8), ("linear", 3)])
-def test_points_of_the_papers_grid_predict_what_a_classifier_predicts(stand_in, kernel, count):
-    points = Grid.paper(kernel).profiles(nc.Profile.noisytest(kernel))
-    for index in np.random.default_rng(11).integers(len(points), size=count):
-        assert_equal_to_training([points[index]], stand_in)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-from noisemodel import NoiseModelError, Run, files
+from noisemodel import MeshError, NoiseModelError, Run, files, meshes
 
 TIME = np.arange(40) / 100
 
@@ -28,6 +28,13 @@ def test_more_joints_and_columns_are_read_if_that_is_asked_for(tmp_path):
     assert (status, "1002 columns, the limit is 1000 (--limit columns=N" in err) == (3, True)
     assert call(*command, "--limit", "joints=1001", "--limit", "columns=2000")[0] == 0
     assert len(Run.load(tmp_path / "run.npz").joint_names) == 1001
+
+
+def test_the_limit_of_triangles_is_how_many_a_mesh_may_have(tmp_path, monkeypatch):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 5)
+    monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", "4")
+    with pytest.raises(MeshError, match="5 triangles, the limit is 4 .--limit triangles=N"):
+        meshes.read(tmp_path / "a.obj")
 
 
 @pytest.mark.parametrize("given", ["joint=5", "joints", "joints=", "joints=-5", "joints=1e5"])
