@@ -28,7 +28,6 @@ TALOS = WIDE["talos"]
 
 WAVE = Gesture(way="sines", size=(1.0, 1.0), period=(0.8, 2.0))
 SQUAT = Stand(sway=(0.5, 0.5), squat=(0.1, 0.1), period=(1.5, 2.5), upper=WAVE)
-EACH = pytest.mark.parametrize("robot", HUMANOIDS, ids=lambda robot: robot.name)
 
 
 def planned(robot, wanted, seed=1, duration=4.0):
@@ -58,7 +57,7 @@ def recorded(robot, wanted, seed=1, duration=4.0, delay=0.0, **gains):
     return way, exact(robot, way, like, **gains)
 
 
-@EACH
+@pytest.mark.parametrize("robot", HUMANOIDS, ids=lambda robot: robot.name)
 def test_its_data_are_those_of_its_description(robot):
     model = reduced_model(robot)
     whole = noisemodel.Robot.load(robot.name).model

@@ -74,13 +74,6 @@ def corners(surface):
     return {tuple(point) for point in np.round(surface.reshape(-1, 3), 9) + 0.0}
 
 
-def test_a_box_has_the_area_of_its_sides_and_sits_where_it_is_put(tmp_path):
-    links = triangles(robot(tmp_path, arm=visual(BOX, '<origin xyz="10 0 0"/>')))
-    assert np.isclose(area(links[0]), 22.0, rtol=1e-15)
-    expected = {(10 + x, y, z) for x in (-0.5, 0.5) for y in (-1, 1) for z in (-1.5, 1.5)}
-    assert corners(links[0]) == expected
-
-
 def test_what_is_fixed_to_a_link_belongs_to_it_and_links_without_geometry_have_no_triangles(
     tmp_path,
 ):

@@ -331,10 +331,6 @@ def _swing(name):
     return swings(TIME, _timing(gait), gait) < 1
 
 
-QUADRUPED = {
-    name: each.cases["quadruped"] for name, each in SCENARIOS.items() if "quadruped" in each.cases
-}
-
 ANYMAL = WIDE["anymal"]
 SOLO12 = WIDE["solo12"]
 
@@ -363,13 +359,6 @@ def trot():
     rng = np.random.default_rng(np.random.SeedSequence(SEED).spawn(1)[0])
     plan = planned(GO2, Trot(), rng, SHORT)
     return _trial(Start("go2", SEED, Trot()), no_defect, SHORT), plan
-
-
-@pytest.fixture(scope="module")
-def stumble():
-    """The same trot over an obstacle."""
-    case = QUADRUPED["obstacle-full"]
-    return _trial(Start("go2", SEED, case.motion), case.defect, SHORT)
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
@@ -417,8 +406,10 @@ def test_feet_touch_when_they_are_planned_to(trot):
     assert touching[::10][in_air].mean() < 0.35  # the last of the swing, where it may touch
 
 
-def test_an_obstacle_is_an_impact_and_the_run_is_healthy_before(trot, stumble):
+def test_an_obstacle_is_an_impact_and_the_run_is_healthy_before(trot):
     healthy, _ = trot
+    case = SCENARIOS["obstacle-full"].cases["quadruped"]
+    stumble = _trial(Start("go2", SEED, case.motion), case.defect, SHORT)
     first = stumble.contacts[0]
     assert first.label == "impact"
     assert first.facts["force"] > 100
