@@ -174,14 +174,11 @@ def test_a_run_with_injected_faults_needs_no_blocks(folder, tmp_path):
     assert first.counts["ok_hours"] == 0.0
 
 
-def test_damaged_events_are_refused_in_one_line(folder, tmp_path):
+def test_damaged_events_and_unknown_models_are_refused_in_one_line(folder, tmp_path):
     path = simulated(tmp_path / "odd.npz", 70, events=[{"label": "impact"}])
     status, _, err = call("evaluate", folder / "model.npz", path)
     assert (status, err.count("\n")) == (3, 1)
     assert "odd.npz: an event of its meta lacks label, start or stop as numbers in s" in err
-
-
-def test_a_model_that_ships_is_taken_by_its_name(tmp_path):
     status, _, err = call("evaluate", "General", tmp_path)
     assert (status, err.count("\n")) == (3, 1)
     assert "General: no such model; name a file, or one that ships: general" in err

@@ -96,13 +96,18 @@ def test_text_has_a_line_for_each_finding_and_says_what_to_type():
     assert line.replace("%", "%25") in github([run])
 
 
-def test_text_states_what_was_expected_and_what_is_missing():
+def test_text_states_what_was_expected_missing_and_ignored_and_counts_runs():
     head, blow, rattle = text([EXPECTED]).splitlines()
     assert head == "expected.npz   ok   by expect.toml"
     assert blow == "    1.00 -   1.50 s   impact         (allowed: the pick)"
     assert rattle.endswith("oscillations   out of distribution (waived: ticket 1)")
     missing = "  missing: impact from 1.10 s to 1.30 s (required: the pick)"
     assert text([LACKING]).splitlines()[1] == missing
+    assert "1 of the bad input ignored" in text([replace(BROKEN, ignored=True), QUIET])
+    assert text(ALL).splitlines()[-1] == (
+        "7 runs: 1 internal error, 1 bad input, 2 with findings, 1 cannot tell, 2 ok;"
+        " findings: 2 failing, 1 missing, 1 allowed, 1 waived"
+    )
 
 
 def repetitions(name, count, *events, **more):
@@ -159,14 +164,6 @@ def test_runs_that_name_a_scenario_are_of_it_in_each_folder():
         ["walk", "ok", "2", "runs"]
     ] * 2
     assert "run:     a/one.npz [no model]" in text(runs, verbose=True).splitlines()
-
-
-def test_text_ends_with_the_counts_of_several_runs_and_says_what_is_ignored():
-    assert "1 of the bad input ignored" in text([replace(BROKEN, ignored=True), QUIET])
-    assert text(ALL).splitlines()[-1] == (
-        "7 runs: 1 internal error, 1 bad input, 2 with findings, 1 cannot tell, 2 ok;"
-        " findings: 2 failing, 1 missing, 1 allowed, 1 waived"
-    )
 
 
 def test_json_is_noise_verdict_3():

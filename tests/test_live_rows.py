@@ -148,12 +148,14 @@ class Trickle(io.RawIOBase):
 
 
 @pytest.mark.parametrize("size", [1, 3, 7, 1000])
-def test_lines_are_whole_and_numbered(size):
+def test_lines_are_whole_and_numbered_and_one_that_never_ends_is_refused(size):
     content = b"".join(b"line %d\n" % number for number in range(1, 30)) + b"line 30"
     for lines, number in chunks(Trickle(content, size)):
         for offset, line in enumerate(lines.splitlines()):
             assert line == b"line %d" % (number + offset)
     assert number + offset == 30
+    with pytest.raises(LiveError, match=f"line 1 is longer than {MAX_LINE_BYTES} bytes"):
+        list(chunks(Trickle(b"x" * (MAX_LINE_BYTES + 2), 1 << 20)))
 
 
 def test_little_waits_for_more_and_much_is_read_at_once(monkeypatch):
@@ -163,11 +165,6 @@ def test_little_waits_for_more_and_much_is_read_at_once(monkeypatch):
     assert naps == [0.0, 0.0]
     list(chunks(Trickle(b"1\n2\n3\n", 2), gather=0.5))
     assert naps[2:] == [0.5, 0.5, 0.5]
-
-
-def test_a_line_that_never_ends_is_refused():
-    with pytest.raises(LiveError, match=f"line 1 is longer than {MAX_LINE_BYTES} bytes"):
-        list(chunks(Trickle(b"x" * (MAX_LINE_BYTES + 2), 1 << 20)))
 
 
 def live(*arguments, text="", **options):
