@@ -398,14 +398,28 @@ def test_a_bad_urdf_is_one_line_that_names_the_file_and_the_problem(tmp_path, ca
             welds(3).replace("</robot>", "<a ixx='1 2'/></robot>"),
             "ixx of <a> is '1 2', expected 1",
         ),
-        (
-            welds(3).replace('<child link="l3"', '<child link="l1"'),
-            "'l1' go round in a circle",
+        *(
+            (
+                welds(3).replace("</robot>", f"{mass}</robot>"),
+                "value of <mass> is '.*', expected 1 f",
+            )
+            for mass in ("<mass/>", "<mass value='1 2'/>")
         ),
+        (welds(3).replace('<child link="l3"', '<child link="l1"'), "'l1' go round in a circle"),
     ],
 )
 def test_numbers_and_trees_that_pinocchio_takes_though_they_are_wrong(tmp_path, text, message):
     path = tmp_path / "arm.urdf"
     path.write_text(text)
     with pytest.raises(RobotError, match=message):
+        checked(path)
+
+
+def test_the_limit_of_joints_is_how_many_there_may_be(tmp_path, monkeypatch):
+    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "3")
+    path = tmp_path / "arm.urdf"
+    path.write_text(welds(3))
+    assert checked(path).get("name") == "chain"
+    path.write_text(welds(4))
+    with pytest.raises(RobotError, match="4 joints; the limit is 3 .--limit joints=N raises it"):
         checked(path)
