@@ -139,11 +139,7 @@ def reading(tmp_path, name, content):
         ("l.csv", "start,stop,label\n1,2\n", "line 2: 2 cells where the header names 3 columns"),
         ("l.csv", 'start,stop,label\n1,2,"a\nb"\n', "line 3: .* is empty or cannot be printed"),
         ("l.csv", 'start,stop,label\n1,2,"a\n', "line 2: not CSV"),
-        (
-            "l.csv",
-            "start,stop,label\n1,2,a\n1.5,3,b\n",
-            "line 3: .* overlap: 'b' .* before 'a'",
-        ),
+        ("l.csv", "start,stop,label\n1,2,a\n1.5,3,b\n", "line 3: .* overlap: 'b' .* before 'a'"),
         ("l.toml", "[data\n", r"not TOML \(.*line 1"),
         ("l.toml", "", "lacks chunk_ranges and chunk_labels, lists"),
         ("l.toml", toml([[0, 1], [2]], ["ok", "ok"]), r"chunk 2: \[2\] with label 'ok', expected"),
@@ -159,9 +155,8 @@ def test_damaged_labels_are_refused_with_their_place(tmp_path, name, content, me
 
 
 def test_unknown_formats_are_refused_with_the_known_ones(tmp_path):
-    with pytest.raises(
-        InspectorError, match=r"no format of labels has this suffix; there are \.toml"
-    ):
+    message = r"no format of labels has this suffix; there are \.toml"
+    with pytest.raises(InspectorError, match=message):
         read_labels(tmp_path / "labels.xlsx", RUN)
     with pytest.raises(InspectorError, match=r"there are \.toml \(noisytest\), \.csv \(csv\)"):
         write_labels((), tmp_path / "labels")
@@ -186,15 +181,11 @@ def test_annotated_blocks_are_written_and_read_by_the_command(tmp_path):
     status, out, err = call("export", demo_run(), "--labels", "annotated", "-o", labels)
     assert (status, err) == (0, "")
     assert "labels.txt: 4 labels" in out
-    bare = Run.load(demo_run())
-    Run(time=bare.time, velocity=bare.velocity, joint_names=bare.joint_names).save(
-        tmp_path / "bare.npz"
-    )
-    status, _, err = call(
-        "export", tmp_path / "bare.npz", "--annotate", labels, "-o", tmp_path / "n.npz"
-    )
+    demo, bare = Run.load(demo_run()), tmp_path / "bare.npz"
+    Run(time=demo.time, velocity=demo.velocity, joint_names=demo.joint_names).save(bare)
+    status, _, err = call("export", bare, "--annotate", labels, "-o", tmp_path / "n.npz")
     assert (status, err) == (0, "")
-    assert Run.load(tmp_path / "n.npz").blocks == bare.blocks
+    assert Run.load(tmp_path / "n.npz").blocks == demo.blocks
 
 
 def test_findings_are_written_by_the_command_and_nothing_is_replaced_unasked(tmp_path):

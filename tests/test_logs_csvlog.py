@@ -8,9 +8,8 @@ from inspector.errors import LogError
 
 def test_the_first_stamp_is_kept_exactly(tmp_path):
     stamps = [f"17000000001234{n:02d}567" for n in range(5)]
-    imported = read_log(
-        write(tmp_path / "log.csv", {"stamp": stamps, "a.velocity": np.ones(5)}), rate=1e6
-    )
+    path = write(tmp_path / "log.csv", {"stamp": stamps, "a.velocity": np.ones(5)})
+    imported = read_log(path, rate=1e6)
     assert imported.run.meta["start"] == "1700000000.123400567"
     assert imported.remarks == (
         "log.csv: stamps are in nanoseconds",
@@ -36,10 +35,7 @@ ROW = HEAD + "0,1,2\n"
         (ROW + "0.1,,2\n", r"row 3: column 'a.velocity' is empty .* \(--desired\)"),
         (ROW + ",,\n", "row 3: column 'time' is empty"),
         (ROW + "0.1,1,off\n", "row 3: column 'b.velocity' holds 'off', which is not a number"),
-        (
-            HEAD.replace(",", ";") + "0;1;2\n0,1s;1;2\n",
-            "row 3: column 'time' holds '0,1s', which is no time",
-        ),
+        ("time;a.velocity\n0;1\n0,1s;1\n", "row 3: column 'time' holds '0,1s', which is no time"),
         (ROW + "0.1,1\n", "row 3: 2 cells where the header names 3 columns"),
         (ROW + "0.1,1,2,3\n", "row 3: 4 cells where the header names 3 columns"),
         ("time,a.velocity,a.velocity\n0,1,2\n", "row 1: two columns are named 'a.velocity'"),
@@ -47,10 +43,7 @@ ROW = HEAD + "0,1,2\n"
             "time,a.velocity,/js/a/velocity\n0,1,2\n0.1,1,2\n",
             "'a.velocity' and '/js/a/velocity' both hold velocity of joint 'a'",
         ),
-        (
-            'time,"a.velocity\n0,1\n',
-            r"row 1: the name 'a.velocity\\n0,1' cannot be printed; is a q",
-        ),
+        ('time,"a.velocity\n0,1\n', r"row 1: the name 'a.velocity\\n0,1' cannot be printed; is a"),
         ("clock,a.velocity\n0,1\n1,1\n", "there are no stamps; give the log's rate"),
         (
             "0,1,2,3,4\n" * 2,

@@ -393,9 +393,8 @@ def test_two_patterns_for_one_column_take_the_more_specific(tmp_path):
 def test_a_quaternion_is_no_four_joints(tmp_path):
     turn = np.column_stack([np.cos(T6), np.sin(T6), 0 * T6, 0 * T6])
     path = written(tmp_path, f"t,{names('q#', 4, 0)}", T6, turn)
-    with pytest.raises(
-        InspectorError, match="q0, q1, q2, q3 hold a quaternion .* name them: --map"
-    ):
+    message = "q0, q1, q2, q3 hold a quaternion .* name them: --map"
+    with pytest.raises(InspectorError, match=message):
         read_log(path)
     assert len(read_log(path, mapping=["position.joint_{joint}=q{joint}"]).run.joint_names) == 4
 
@@ -489,9 +488,8 @@ def test_a_mat_file_that_holds_no_numbers_is_one_line(tmp_path, variables, damag
 def test_dates_that_no_clock_has_are_one_line(tmp_path, day):
     path = tmp_path / "log.csv"
     path.write_text(f"time,q1\n{day} 00:00:00.0,1\n{day} 00:00:00.1,2\n")
-    with pytest.raises(
-        InspectorError, match=f"row 2: column .time. holds .{day} .*, which is no time"
-    ):
+    message = f"row 2: column .time. holds .{day} .*, which is no time"
+    with pytest.raises(InspectorError, match=message):
         read_log(path)
 
 

@@ -48,9 +48,8 @@ def test_columns_of_lists_are_arrays_of_joints(tmp_path):
 
 def test_what_does_not_fit_is_an_error_of_one_line(tmp_path):
     ragged = [row[: 2 + n % 2] for n, row in enumerate(POSITION)]
-    with pytest.raises(
-        LogError, match="column 'joint_pos' has 1000 numbers in 400 rows of any length"
-    ):
+    message = "column 'joint_pos' has 1000 numbers in 400 rows of any length"
+    with pytest.raises(LogError, match=message):
         read_log(wide(tmp_path, time=TIMES, joint_pos=ragged))
     path = wide(tmp_path, joint_pos=list(POSITION))
     with pytest.raises(LogError, match=r"there are no stamps; give the log's rate"):

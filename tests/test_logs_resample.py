@@ -37,9 +37,8 @@ def test_a_rate_within_5_percent_of_a_round_one_becomes_that(tmp_path, nominal, 
 
 def test_a_declared_rate_is_the_rate(tmp_path):
     assert read_log(log(tmp_path), rate=125).run.rate == pytest.approx(125.0)
-    with pytest.raises(
-        LogError, match="the rate of the stamps is 100 Hz; a run of 1000 Hz cannot be made"
-    ):
+    message = "the rate of the stamps is 100 Hz; a run of 1000 Hz cannot be made"
+    with pytest.raises(LogError, match=message):
         read_log(log(tmp_path), rate=1000)
     with pytest.raises(InspectorError, match="the rate is 0 Hz; expected 0.001 to 1e[+]09 Hz"):
         read_log(log(tmp_path), rate=0)

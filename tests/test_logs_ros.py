@@ -107,9 +107,8 @@ def test_of_two_robots_one_is_chosen_by_its_topic(tmp_path):
         read_log(path)
     run = read_log(path, topics=["/right/joint_states"]).run
     assert np.array_equal(run.position, VELOCITY)
-    with pytest.raises(
-        LogError, match="no topic '/up' of a type that is read .*; the bag has /left/"
-    ):
+    message = "no topic '/up' of a type that is read .*; the bag has /left/"
+    with pytest.raises(LogError, match=message):
         read_log(path, topics=["/up"])
 
 

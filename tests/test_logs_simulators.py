@@ -45,10 +45,10 @@ def savez(path, **arrays):
     return path
 
 
-def isaac_lab(path, *, rate=50):
+def isaac_lab(path):
     """What Isaac Lab's recorder writes of a Franka in its cube-stacking task."""
-    _, position, velocity = moved(rate, 9)
-    target = np.roll(position, -2, axis=0) if rate < 100 else position
+    _, position, velocity = moved(50, 9)
+    target = np.roll(position, -2, axis=0)
     target[-2:] = position[-1]
     still = np.tile([0.5, 0, 0, 1, 0, 0, 0], (STEPS, 1))
     robot = {

@@ -90,9 +90,8 @@ def test_a_run_that_equals_another_is_no_more_evidence(classifier):
 def test_names_that_repeat_and_runs_without_blocks_are_refused(classifier):
     run = fresh()[0]
     short = replace(run, signal=run.signal[:100], blocks=(), sha256="")
-    with pytest.raises(
-        nc.DatasetError, match="none of 1 recordings has a verdict; panda/swing-010: .* too short"
-    ):
+    message = "none of 1 recordings has a verdict; panda/swing-010: .* too short"
+    with pytest.raises(nc.DatasetError, match=message):
         nc.assess(classifier, [short])
     with pytest.raises(nc.DatasetError, match="two recordings are called 'panda/swing-010'"):
         nc.assess(classifier, [run, replace(run, signal=run.signal + 1.0, sha256="")])

@@ -18,6 +18,7 @@ TOML = """
 chunk_ranges = [[0, 0.5], [1.25, -1]]
 chunk_labels = ["ok", "impact"]
 """
+CHUNK = "[data]\nchunk_ranges = [[{}]]\nchunk_labels = [{}]"
 
 
 @pytest.fixture
@@ -117,17 +118,11 @@ def test_annotations_take_integers_and_open_ends(log):
         ("[simulation]\n", "lacks chunk_ranges and chunk_labels, lists of one"),
         ("data = 3\n", "lacks chunk_ranges and chunk_labels, lists of one"),
         ("[data]\nchunk_ranges = 3\nchunk_labels = []", "lacks chunk_ranges and chunk_labels"),
-        (
-            '[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = ["ok", "ok"]',
-            "lacks chunk_ranges and chunk_labels, lists of one",
-        ),
-        ('[data]\nchunk_ranges = [[0]]\nchunk_labels = ["ok"]', r"chunk 1: \[0\] with label 'ok'"),
-        ("[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = [1]", r"chunk 1: \[0, 1\] with label 1"),
-        (
-            f'[data]\nchunk_ranges = [[0, {10**400}]]\nchunk_labels = ["ok"]',
-            "an integer of more than 20",
-        ),
-        (f'[data]\nchunk_ranges = [[0, {10**15}]]\nchunk_labels = ["ok"]', "chunk 1: .* expected"),
+        (CHUNK.format("0, 1", '"ok", "ok"'), "lacks chunk_ranges and chunk_labels, lists of one"),
+        (CHUNK.format("0", '"ok"'), r"chunk 1: \[0\] with label 'ok'"),
+        (CHUNK.format("0, 1", "1"), r"chunk 1: \[0, 1\] with label 1"),
+        (CHUNK.format(f"0, {10**400}", '"ok"'), "an integer of more than 20"),
+        (CHUNK.format(f"0, {10**15}", '"ok"'), "chunk 1: .* expected"),
     ],
 )
 def test_what_is_wrong_with_annotations_is_named(log, text, reason):
