@@ -109,15 +109,13 @@ def ur5(folder, frozen=False):
 
 
 def rtde(folder, doubled=False):
-    columns = ["actual_q", "actual_qd", "actual_TCP_pose", *["target_current"] * doubled]
-    header = ",".join(names(f"{each}_#", 6, 0) for each in columns)
-    extra = [Q6] if not doubled else [Q6, Q6]
-    if doubled:
-        header = header.replace("target_current_1", "target_current_0")
+    header = ",".join(names(f"actual_{each}_#", 6, 0) for each in ("q", "qd", "TCP_pose"))
     time, position, velocity = motion(6, 125.0 if doubled else 50.0)
-    if doubled:
-        return csv(folder / "rtde.csv", f"timestamp,{header}", time, position, velocity, *extra)
-    return csv(folder / "rtde.csv", header, position, velocity, *extra)
+    if not doubled:
+        return csv(folder / "rtde.csv", header, position, velocity, Q6)
+    twice = names("target_current_#", 6, 0).replace("current_1", "current_0")
+    header = f"timestamp,{header},{twice}"
+    return csv(folder / "rtde.csv", header, time, position, velocity, Q6, Q6)
 
 
 def bare(header, joints, rate=100.0, after=0):
