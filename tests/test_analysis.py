@@ -281,18 +281,17 @@ def test_a_finding_lies_within_its_frames(text):
         assert span.start - 1e-9 <= finding.start < finding.stop <= span.stop + 1e-9
 
 
-def test_a_run_file_is_analysed_by_its_path_and_a_shipped_model_by_its_name(tmp_path):
+def test_a_file_is_analysed_by_its_path_with_its_links_unless_told(tmp_path):
     run = moving(tone=1.0)
     run.save(tmp_path / "shaken.npz")
-    library = load_library(["general"])
-    found = analyse(tmp_path / "shaken.npz", library)
-    (path,) = model_files(["general"])
-    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-    assert (found.name, found.model, found.model_sha256) == ("shaken", "general", sha256)
+    library, (path,) = load_library(["general"]), model_files(["general"])
+    found, sha256 = analyse(tmp_path / "shaken.npz", library), hashlib.sha256(path.read_bytes())
+    assert (found.name, found.model, found.model_sha256) == (
+        "shaken",
+        "general",
+        sha256.hexdigest(),
+    )
     assert found.findings == analyse(run, library).findings
-
-
-def test_a_file_is_analysed_with_its_links_unless_told():
     found = analyse_file(demo_run(), {})
     assert found.links is not None
     assert found.sha256 == hashlib.sha256(demo_run().read_bytes()).hexdigest()
@@ -327,6 +326,8 @@ def test_what_a_run_lacks_and_what_was_computed_in_its_place_is_said():
         (moving(valid=np.arange(5000) >= 3), (none, gap)),
     ):
         assert with_links(analysed(".", run=each), "").missing == missing
+    up = np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (3, 1))  # a base that floats makes noise
+    assert (estimate(replace(run, base_pose=pose, base_velocity=up), "normal").pressure > 0).all()
 
 
 def still_and_fast(**changes):

@@ -45,6 +45,7 @@ def test_logs_that_a_profile_cannot_be_trained_on_are_left_out_and_counted(tmp_p
     assert (status, err) == (0, "")
     counts = "left out: 1 run without annotated blocks, 1 below 1000 Hz, e.g. bare"
     assert f"\n{counts}\n" in out
+    assert "Subset accuracy" in out
     assert set(nc.load(tmp_path / "m.npz").runs) == {"good0", "good1"}
     alone = log(tmp_path / "missing.npz", desired="missing")  # the noise can be trained on
     status, out, _ = train(alone, output=tmp_path / "alone.npz")

@@ -30,12 +30,9 @@ def test_the_version_is_that_of_the_distribution_and_0_without_one(monkeypatch):
         assert (result.exit_code, result.output) == (0, f"inspector {shown}\n")
 
 
-def test_the_names_of_the_package_are_the_public_ones_and_can_be_imported():
+def test_names_are_the_public_ones_that_can_be_imported_and_kinds_those_of_the_model():
     assert dir(inspector) == sorted(inspector.__all__)
     assert all(hasattr(inspector, name) for name in inspector.__all__)
-
-
-def test_kinds_are_those_of_the_noise_model():
     assert set(get_args(Kinds)) == set(noisemodel.KINDS)
 
 
