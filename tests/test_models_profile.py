@@ -153,7 +153,10 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
         ({"classes": ("ok", "ok")}, "expected 'ok' and others"),
         ({"classes": "ok"}, "classes is 'ok', expected a tuple of str"),
         *(
-            ({"bands": "log", "edges": each}, rf"edges are {re.escape(str(each))}, expected two or")
+            (
+                {"bands": "log", "edges": each},
+                rf"edges are {re.escape(str(each))}, expected two or more, ascending",
+            )
             for each in ((), (10.0, float("nan")), (-1.0, 100.0), (9.0, 9.0))
         ),
         (
@@ -161,7 +164,10 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
             r"\(10.0, 6000.0\), expected two or more, ascending, from 0 to half the rate, 5000 Hz",
         ),
         ({"bands": "log", "edges": (1, 2)}, r"edges is \(1, 2\), expected a tuple of float"),
-        ({**LOG, **QUICK, "quick_window": 5000}, "window of 5000 samples is longer than a frame"),
+        (
+            {**LOG, **QUICK, "quick_window": 5000},
+            "window of 5000 samples is longer than a frame of 4000",
+        ),
         ({"quick_window": -1}, "quick_window is -1, expected 0 or more"),
         (
             {"signals": ()},
