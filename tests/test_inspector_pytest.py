@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from inspector.noisecheck import name_of
+from inspector.pytest_plugin.noisecheck import name_of
 
 ROOT = Path(__file__).parents[1]
 RUNS = """

@@ -1,4 +1,4 @@
-"""The plugin of pytest: its options, and the fixture `noise`, which `inspector.noisecheck` has.
+"""The plugin of pytest: its options, and the fixture `noise`, which `noisecheck` has.
 
 Every run of pytest imports this module: it imports nothing that takes long.
 """
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from inspector.noisecheck import Noise
+    from inspector.pytest_plugin.noisecheck import Noise
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -30,6 +30,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture
 def noise(request: pytest.FixtureRequest) -> "Noise":
     """An assertion on the noise of runs: `check`."""
-    from inspector.noisecheck import Noise
+    from inspector.pytest_plugin.noisecheck import Noise
 
     return Noise(request)
