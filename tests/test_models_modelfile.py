@@ -193,12 +193,14 @@ def test_an_array_of_another_size_than_its_header_declares_is_refused(
 
 
 def test_a_version_that_is_not_installed_is_said(monkeypatch):
+    from importlib import metadata
+
     from noiseclassifier import modelfile
 
     def lacking(name):
-        raise modelfile.metadata.PackageNotFoundError(name)
+        raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr(modelfile.metadata, "version", lacking)
+    monkeypatch.setattr(metadata, "version", lacking)
     assert modelfile.versions()["noise-inspector"] == "not installed"
 
 
