@@ -31,6 +31,9 @@ POLL = 0.5  # time after which a worker looks whether its parent is still there,
 REACHED, STAFFED = 10.0, 60.0  # in [s]: until a Dask scheduler answers, and until it has a worker
 SOFTWARE = ("noise-inspector", "numpy")  # of the client's versions, so that results are the same
 DIED = "the worker died, of lack of memory or a crash"  # what to say of an item that ended a worker
+# What a process calls with each item. It comes once: a model that comes anew with each item has to
+# be prepared anew, too.
+_work: list[Callable[[Any], Any]] = []
 
 
 def in_order(
@@ -125,9 +128,9 @@ def _in_processes(
         def calls(todo: list[int] = todo, running: list[int] = running) -> Iterator[Any]:
             for index in todo:
                 running.append(index)
-                yield call(function, items[index], index)
+                yield call(items[index], index)
 
-        begin = {"initializer": _begin, "initargs": (os.getpid(),)}
+        begin = {"initializer": _begin, "initargs": (os.getpid(), function)}
         with parallel_config(backend="loky", n_jobs=jobs, **begin):
             parallel = Parallel(batch_size=1, return_as="generator_unordered")
         broken = False
@@ -150,12 +153,13 @@ def _in_processes(
             waiting = todo[len(running) :]
 
 
-def _called(function: Callable[[Any], Any], item: Any, index: int) -> tuple[int, Any]:
-    return index, function(item)
+def _called(item: Any, index: int) -> tuple[int, Any]:
+    return index, _work[-1](item)
 
 
-def _begin(parent: int) -> None:
+def _begin(parent: int, function: Callable[[Any], Any]) -> None:
     """Prepare a process, which ends with its parent, and leaves interrupts to it."""
+    _work.append(function)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
