@@ -98,13 +98,9 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
         run = nm.decimated(run, rate)
         left = f"nothing above {rate / 2:g} Hz is left"
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}: {left}."
-    start = float(run.time[0])
-    lasting, bursts = (
-        nc.Lasting(run.rate, start=start),
-        nc.Bursts(run.rate, start=start, whole=True),
-    )
+    lasting, bursts = _line_detectors(run)
     pieces = _watched(run, lasting, bursts)
-    labels = classifier.classify_pieces(pieces, run.rate, start=start, whole=True)
+    labels = classifier.classify_pieces(pieces, run.rate, start=float(run.time[0]), whole=True)
     if not (lasting.examined or len(labels.events())) and nc.lasting.MEASURED in signal_names(run):
         raise CannotTellError(
             f"no stretch of {nc.lasting.SHORTEST:g} s without a gap, as it takes to tell what lasts"
@@ -124,14 +120,15 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
 
 def lines(run: nm.Run) -> tuple[Events, Events]:
     """What lasts in a run, and its bursts."""
-    start = float(run.time[0])
-    lasting, bursts = (
-        nc.Lasting(run.rate, start=start),
-        nc.Bursts(run.rate, start=start, whole=True),
-    )
+    lasting, bursts = _line_detectors(run)
     for _ in _watched(run, lasting, bursts):
         pass
     return lasting.events, bursts.events
+
+
+def _line_detectors(run: nm.Run) -> tuple[nc.Lasting, nc.Bursts]:
+    start = float(run.time[0])
+    return nc.Lasting(run.rate, start=start), nc.Bursts(run.rate, start=start, whole=True)
 
 
 def _watched(

@@ -12,7 +12,6 @@ from math import inf, isfinite
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
-from xml.etree import ElementTree as ET
 
 import numpy as np
 
@@ -493,9 +492,7 @@ def _limits_in(name: str, path: Path, _modified: int) -> Mapping[str, Limits]:
     if path.suffix.lower() != ".urdf":
         return MappingProxyType(limits_of(Robot.load(name)))
     found = {}  # without Pinocchio, which takes long to import
-    listed = name in ROBOTS and path.is_file()  # as installed: needs no checks
-    root = ET.parse(path).getroot() if listed else urdf.checked(path)  # noqa: S314
-    for joint in root.findall("joint"):
+    for joint in urdf.checked(path).findall("joint"):
         if (kind := joint.get("type", "")) in SINGLE:
             limit = joint.find("limit")
             known = {} if limit is None else limit.attrib
