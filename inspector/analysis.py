@@ -40,6 +40,7 @@ from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
+    from inspector.localisation.order import Order
     from inspector.localisation.stage import Localisation
     from noisemodel.noise import LinkNoise
 
@@ -95,6 +96,14 @@ class Analysis:
         events = zip(self.spans, self.findings, strict=True)
         named: dict[Event | nm.Block, Event] = dict(events)
         return {named.get(failure, failure): each for failure, each in found.items()}
+
+    @cached_property
+    def orders(self) -> "dict[Event, Order]":
+        """Findings whose vibration goes with the speed of a joint."""
+        from inspector.localisation.order import order
+
+        found = ((event, order(self.run, event)) for event in self.findings)
+        return {event: known for event, known in found if known is not None}
 
     @cached_property
     def lane(self) -> tuple[tuple[float, float, str], ...]:

@@ -27,6 +27,7 @@ import noisemodel as nm
 from inspector.analysis import Analysis, analyse
 from inspector.errors import EXIT, FileError, InspectorError, Status, Unknown, without_path, worst
 from inspector.library import Library
+from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.logs.read import Reading, Source, open_source
 from inspector.text import program_version
@@ -160,6 +161,7 @@ class Finding(Event):
     """An event of a run, where it comes from, what it is known by, and what became of it."""
 
     localisation: Localisation | None = None
+    order: Order | None = None
     evidence: Evidence = GENERAL
     ruling: Ruling = Ruling.FOUND
     reason: str = ""  # of the ruling, in a few words
@@ -182,13 +184,14 @@ class Finding(Event):
 
     def as_dict(self) -> dict[str, Any]:
         """The finding as JSON can hold it."""
-        known = self.localisation
+        known, of = self.localisation, self.order
         written: dict[str, Any] = {
             "label": self.label,
             "start": round(self.start, 6),
             "stop": round(self.stop, 6),
             "score": round(self.score, 6),
             "novel": self.novel,
+            "order": of and {"joint": of.joint, "periods_per_turn": round(of.periods_per_turn, 1)},
             "fails": self.fails,
             "ruling": self.ruling.value,
             "reason": self.reason,
@@ -208,7 +211,7 @@ class Finding(Event):
     def from_dict(cls, content: Mapping[str, Any]) -> "Finding":
         """Read what `as_dict` wrote."""
         start, stop, score = (float(content[name]) for name in ("start", "stop", "score"))
-        known = content.get("localisation")
+        order, known = content["order"], content.get("localisation")
         return cls(
             str(content["label"]),
             start,
@@ -224,6 +227,7 @@ class Finding(Event):
                 joints=tuple((str(name), float(share)) for name, share in known["joints"].items()),
                 band=_pair(known["band"]),
             ),
+            None if order is None else Order(str(order["joint"]), float(order["periods_per_turn"])),
             Evidence.from_dict(content["evidence"]),
             Ruling(content["ruling"]),
             str(content["reason"]),
@@ -315,7 +319,11 @@ class Verdict:
             analysis.status,
             analysis.model,
             tuple(
-                Finding.of(event, localisation=analysis.localisations.get(event))
+                Finding.of(
+                    event,
+                    localisation=analysis.localisations.get(event),
+                    order=analysis.orders.get(event),
+                )
                 for event in analysis.findings
             ),
             analysis.message,

@@ -17,6 +17,7 @@ from commandline import call
 from inspector import verdict
 from inspector.errors import InspectorError, Status, Unknown
 from inspector.library import demo_run, load_library, model_files
+from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.read import Reading, Source, open_source
@@ -179,7 +180,7 @@ WHOLE = Verdict(
     "general",
     (
         Finding("impact", 1.0, 1.5, 0.9, False, Localisation(), evidence=KNOWN),
-        Finding("oscillations", 2.0, 3.0, 0.8, True, FOUND),
+        Finding("oscillations", 2.0, 3.0, 0.8, True, FOUND, Order("b", 3.0)),
     ),
     "a message",
     Unknown.IGNORE,

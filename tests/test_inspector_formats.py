@@ -172,7 +172,7 @@ def test_json_is_noise_verdict_3():
     loud, slow = verdicts["runs"]
     assert loud["events"][1] == {
         "label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8, "novel": True,
-        "fails": True, "ruling": "found", "reason": "",
+        "order": None, "fails": True, "ruling": "found", "reason": "",
         "evidence": Evidence("general").as_dict(),
     }  # fmt: skip
     assert loud["events"][0]["novel"] is False

@@ -299,6 +299,7 @@ class Gate:
         self.failed = self.failed or event.fails
         if self._as_json:
             line = {"event": "end" if over else "begin", **event.as_dict()}
+            del line["order"]
             if not over:
                 line["stop"] = None
             if self._reference is None:

@@ -232,7 +232,7 @@ def _events(
         start = min(near, default=each.start)
         named = _named(labels, each, absorbed)
         if (named.start, named.stop) != (start, stop):  # it was localised for another stretch
-            named = replace(named, start=start, stop=stop, localisation=None)
+            named = replace(named, start=start, stop=stop, localisation=None, order=None)
         found.append(replace(named, evidence=each.evidence))
     references = "other motions of this robot"
     if comparison.scenarios:

@@ -162,7 +162,7 @@ def classes_of(analysis: Analysis) -> tuple[str, ...]:
 
 
 def localised(analysis: Analysis, failure: Event | Block) -> tuple[str, str, str, str]:
-    """Localisation of a failure in words: stage, joints, band and links."""
+    """Localisation of a failure in words: stage, joints, band (with its order), and links."""
     if failure.label == "ok":
         return "", "", "", ""
     if isinstance(failure, Block):  # what was found is localised once
@@ -174,7 +174,8 @@ def localised(analysis: Analysis, failure: Event | Block) -> tuple[str, str, str
         named = fault_links(analysis.links, failure, failures, known=known)
         links = ", ".join(f"{link} {share:.0%}" for link, share in named)
     stage, joints, band = words(known)
-    return stage, joints, band, links
+    order = analysis.orders.get(failure) if isinstance(failure, Event) else None
+    return stage, joints, "; ".join(str(part) for part in (band, order) if part), links
 
 
 def note(analysis: Analysis) -> str:
@@ -197,8 +198,8 @@ def row(event: Finding, beside: Beside | None, runs: str = "") -> tuple[str, ...
         over = f"{by.db:+.0f} dB over {of}"
         joints = joints or by.joint
         band = band or (f"{by.octave[0]:.0f}-{by.octave[1]:.0f} Hz" if by.octave else "")
-    ruled = event.became and f"({event.became})"
-    rest = _listed(event.novelty.removeprefix(", "), over, runs, ruled)
+    order, ruled = str(event.order or ""), event.became and f"({event.became})"
+    rest = _listed(event.novelty.removeprefix(", "), order, over, runs, ruled)
     return f"{event.start:6.2f} - {event.stop:6.2f} s", event.label, joints, band, rest
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 WIDTH, DPI = 9.6, 120
 INK, LINE = "#24292f", "#0072b2"
 POINTS = 4000
+ORDERS = 3  # most orders that are written
 ROW = 0.24  # height of a class, a joint or a link, in [inch]
 # Between panels, above one with a title, below and at the right of all, in [inch].
 GAP, TITLE, BELOW, RIGHT = 0.14, 0.22, 0.55, 0.95
@@ -49,8 +50,9 @@ def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
     beside = None if beside is None or beside.empty else beside
     over = [] if beside is None else beside.loudest(SHOWN)
     alarmed = analysis.labels is not None and analysis.alarm is not None and beside is None
+    told = _told(analysis)
     panels = {
-        "classes": (ROW * len(names), TITLE),
+        "classes": (ROW * len(names), TITLE * len(told)),
         "noise": (1.2, 0.0),
         "level": (1.1, 0.0),
         "probability": (0.8 * alarmed, 0.0),
@@ -61,7 +63,7 @@ def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
     }
     figure, axes = _panels(panels, (*names, *strips[0][2], *strips[-1][2]))
     if "classes" in axes:
-        _classes(axes["classes"], analysis, names)
+        _classes(axes["classes"], analysis, names, told)
     _noise(axes["noise"], analysis)
     _level(axes["level"], analysis, beside)
     if alarmed:
@@ -144,7 +146,7 @@ def _shade(color: colors.Color) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _classes(axes: "Axes", analysis: Analysis, names: Sequence[str]) -> None:
+def _classes(axes: "Axes", analysis: Analysis, names: Sequence[str], told: Sequence[str]) -> None:
     """Draw a row for each class: findings filled, annotations hatched."""
     shades = colors.of_classes(tuple(names))
     for row, name in enumerate(names):
@@ -159,8 +161,14 @@ def _classes(axes: "Axes", analysis: Analysis, names: Sequence[str]) -> None:
     axes.set_yticks(range(len(names)), list(map(_short, names)), parse_math=False)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(axis="x", alpha=0.3)
+    axes.set_title("\n".join(told), fontsize=9, loc="left", parse_math=False)
+
+
+def _told(analysis: Analysis) -> list[str]:
+    """What is drawn, and what goes with the speed of a joint: a line for each order."""
+    lines = [f"at {event.start:.2f} s: {order}" for event, order in analysis.orders.items()]
     hatched = "; hatched: annotated" if analysis.run.blocks else ""
-    axes.set_title(f"filled: found{hatched}", fontsize=9, loc="left", parse_math=False)
+    return [f"filled: found{hatched}", *lines[:ORDERS], *["…"] * (len(lines) > ORDERS)]
 
 
 def _shaded(axes: "Axes", analysis: Analysis) -> None:
