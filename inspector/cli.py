@@ -21,7 +21,7 @@ from inspector.text import printable, program_version
 # The commands, each with what the help says of it.
 PANELS = {
     "Inspect": {
-        "view": "Show a run, or two: before and after a change.",
+        "view": "Show a run, or several side by side.",
         "noise": "Print noise levels by joint and link.",
         "listen": "Write the noise of runs as sound.",
         "live": "Show samples from standard input as they arrive.",

@@ -270,20 +270,3 @@ def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(tmp_path):
     assert "/class/after/annotated/oscillations" in entities(tmp_path / "ab.rrd")
     status, out, _ = inspector("view", *runs, *save, "--align", "start", "--overwrite")
     assert (status, "aligned from the start, as requested" in out) == (0, True)
-
-
-@pytest.mark.parametrize(
-    ("names", "options", "status", "text"),
-    [
-        ("aaa", [], 2, "name one run or two; `classify --report` draws several"),
-        ("a", ["--align", "start"], 2, "--align takes two runs"),
-        ("ax", [], 3, "x.npz: cannot be read"),
-    ],
-)
-def test_what_view_does_not_show_together_is_one_line(tmp_path, names, options, status, text):
-    panda(robot=None).save(tmp_path / "a.npz")
-    runs = [tmp_path / f"{name}.npz" for name in names]
-    found, out, err = inspector("view", *runs, *options, "-o", tmp_path / "out.rrd")
-    assert (found, out) == (status, "")
-    assert text in " ".join(err.split())
-    assert not (tmp_path / "out.rrd").exists()

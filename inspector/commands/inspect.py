@@ -22,6 +22,7 @@ from inspector.analysis import (
 from inspector.audit.audit import text
 from inspector.commands import shared
 from inspector.commands.shared import argument, opened, option
+from inspector.errors import EXIT, InspectorError, Status
 from inspector.export import sound as sonification
 from inspector.library import Library, demo_run, load_library
 from inspector.logs.read import Opened, Reading
@@ -31,7 +32,7 @@ from inspector.reference.verdicts import References, seen
 from inspector.report import findings, html
 from inspector.report.picture import require
 from inspector.text import progress
-from inspector.verdict import Verdict
+from inspector.verdict import EXPECTED, Verdict
 from noisemodel.compare import COMPARED
 from noisemodel.files import refuse_existing, write_whole
 
@@ -41,7 +42,7 @@ SUFFIXES = ("", ".rrd", ".png", ".html")  # of what is written; without a suffix
 
 Shown = Annotated[
     list[Path] | None,
-    argument("A run file or log, or one before and one after; else the demo."),
+    argument("Run files or logs; else the demo."),
 ]
 Target = Annotated[
     Path | None, option("Write a recording .rrd, a picture .png or a .html.", "--output", "-o")
@@ -51,7 +52,7 @@ Web = Annotated[bool, option("Serve it to a browser on this machine until Ctrl-C
 Port = Annotated[int, option("Port of --web; 0 takes a free one.", min=0, max=65535)]
 Align = Annotated[
     Literal["auto", "start", "none"] | None,
-    option("Align two runs by motion (auto), start or clocks (none)."),
+    option("Align two runs by motion (auto), or several by start."),
 ]
 GoodRuns = Annotated[
     Path | None, option("Show where one run is louder than these good ones.", "--reference")
@@ -84,9 +85,12 @@ def view(
     reference: GoodRuns = None,
     overwrite: shared.Overwrite = False,
 ) -> None:
-    """Show a run, or two: before and after a change.
+    """Show a run, or several side by side.
 
-    A picture needs a Vulkan driver (Debian: mesa-vulkan-drivers libvulkan1), a page matplotlib.
+    Two runs are before and after a change. A picture needs a Vulkan driver (Debian:
+    mesa-vulkan-drivers libvulkan1), a page matplotlib.
+
+    Runs that cannot be read are named, and the others shown (exit status 3).
     """
     from inspector.recording import viewer
 
@@ -94,8 +98,8 @@ def view(
     shared.one_at_a_time(ctx.obj, len(paths))
     if web and output:
         raise typer.BadParameter("name one of --web and -o")
-    stem = "-and-".join(path.stem for path in paths)
-    target = output or viewer.scratch_path(paths[0].with_name(f"{stem}.npz"))
+    together = f"{paths[0].stem}-and-{len(paths) - 1}" if len(paths) > 1 else paths[0].stem
+    target = output or viewer.scratch_path(paths[0].with_name(f"{together}.npz"))
     library = load_library(model)
     overwrite = overwrite or output is None
     request = Request(ctx.obj, library, kind, at, align, reference, overwrite)
@@ -105,9 +109,12 @@ def view(
         write = _picture if target.suffix.lower() == ".png" else _page
         write(paths[0], target, request)
         return
-    found = [opened(path, request.reading, said=False) for path in paths]
-    (_two if len(found) > 1 else _one)(found, target, request)
+    found = _read(paths, request.reading)
+    write_recording = _one if len(found) == 1 else _two if len(paths) == 2 else _several
+    write_recording(found, target, request)
     _show(target, web=web, port=port, saved=output is not None)
+    if len(found) < len(paths):
+        raise typer.Exit(EXIT[Status.BAD_INPUT])
 
 
 def _check(paths: list[Path], target: Path, asked: Request) -> None:
@@ -118,10 +125,8 @@ def _check(paths: list[Path], target: Path, asked: Request) -> None:
     of_one = "--reference" if asked.reference else suffix if suffix in (".png", ".html") else ""
     if of_one and several:
         raise typer.BadParameter(f"{of_one} takes one run")
-    if asked.align and not several:
-        raise typer.BadParameter("--align takes two runs")
-    if len(paths) > 2:
-        raise typer.BadParameter("name one run or two; `classify --report` draws several")
+    if asked.align and (not several or (asked.align == "auto" and len(paths) > 2)):
+        raise typer.BadParameter("--align takes two runs or more, --align auto two")
     if suffix != ".png" and asked.at is not None:
         raise typer.BadParameter("--at takes -o FILE.png")
 
@@ -158,6 +163,21 @@ def _page(run: Path, output: Path, request: Request) -> None:
         overwrite=request.overwrite,
     )
     typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
+
+
+def _read(paths: list[Path], reading: Reading) -> list[Opened]:
+    """Open the runs that can be read, and name the others; their remarks are printed later."""
+    found = []
+    for path in paths:
+        try:
+            found.append(opened(path, reading, said=False))
+        except EXPECTED as error:
+            if len(paths) == 1:
+                raise
+            typer.echo(f"inspector: {error}", err=True)
+    if not found:
+        raise InspectorError(f"none of {len(paths)} runs can be read")
+    return found
 
 
 def _analysed(run: Opened, request: Request) -> tuple[Analysis, Verdict | None, Comparison | None]:
@@ -202,6 +222,17 @@ def _two(runs: list[Opened], target: Path, request: Request) -> None:
     typer.echo(f"  aligned {pair.alignment}")
     for each in (*changes(pair), *pair.remarks):
         typer.echo(f"  {each}")
+
+
+def _several(runs: list[Opened], target: Path, request: Request) -> None:
+    """Write the recording of several runs, side by side."""
+    from inspector.compare.many import lay, write
+
+    several = lay(runs, request.library, from_start=request.align != "none")
+    write(several, target, overwrite=request.overwrite)
+    for index, (name, side) in enumerate(zip(several.names, several.sides, strict=True)):
+        mark = " (worst)" if index == several.worst else ""
+        typer.echo(f"{name}: {side.headline}{mark}")
 
 
 def _show(target: Path, *, web: bool, port: int, saved: bool) -> None:

@@ -1,0 +1,265 @@
+"""Several runs as one rerun recording: a row for each, of classes and of level; curves; a table."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+
+from inspector import colors, levels
+from inspector.analysis import Analysis, analyse
+from inspector.levels import FLOOR_DB, velocity_levels
+from inspector.library import Library
+from inspector.logs.read import Opened
+from inspector.recording import axes, panels, unstable
+from inspector.recording.axes import Label, Panel, Timed
+from inspector.recording.panels import HIGH_DB, LOW_DB
+from inspector.recording.run import log_report, writing
+from inspector.report.findings import spoken
+from noiseclassifier import Event
+from noisemodel import Block, Run
+from noisemodel.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Several:
+    """Runs that are laid side by side, by the names of their files."""
+
+    names: tuple[str, ...]
+    sides: tuple[Analysis, ...]
+
+    @cached_property
+    def levels(self) -> tuple[tuple[Array, Array], ...]:
+        """Of each run, starts of steps of 50 ms in [s], and levels above 10 Hz; NaN in gaps."""
+        found = []
+        for side in self.sides:
+            run, noise = side.run, side.noise[:, None]
+            time, level = velocity_levels(noise, run.mask, run.rate, start=float(run.time[0]))
+            found.append((time, level[:, 0]))
+        return tuple(found)
+
+    @cached_property
+    def peaks(self) -> tuple[float, ...]:
+        """Highest level of each run, in [dB re 1 rad/s]."""
+        return tuple(float(np.nanmax(level, initial=FLOOR_DB)) for _, level in self.levels)
+
+    @cached_property
+    def order(self) -> tuple[int, ...]:
+        """Indices of the runs: those with findings for longest first, then the loudest."""
+        return tuple(sorted(range(len(self.sides)), key=lambda i: (-self.found(i), -self.peaks[i])))
+
+    def found(self, index: int) -> float:
+        """How long a run has findings, in [s]."""
+        return sum(event.stop - event.start for event in self.sides[index].findings)
+
+    @property
+    def longest(self) -> Event | None:
+        """The longest finding of the worst run."""
+        found = () if self.worst is None else self.sides[self.worst].findings
+        return max(found, key=lambda event: event.stop - event.start, default=None)
+
+    @property
+    def worst(self) -> int | None:
+        """Index of the run that is worst; None if none has a finding."""
+        return self.order[0] if self.found(self.order[0]) > 0.0 else None
+
+
+def lay(runs: Sequence[Opened], library: Library, *, from_start: bool = True) -> Several:
+    """Lay runs side by side, and analyse each."""
+    shown = [opened.source.shown for opened in runs]
+    unique = len({path.stem for path in shown}) == len(shown)
+    names = [path.stem if unique else str(path) for path in shown]
+    sides = []
+    for opened, name in zip(runs, names, strict=True):
+        run = _from_start(opened.run) if from_start else opened.run
+        found = analyse(run, library, name=name, sha256=opened.sha256)
+        sides.append(replace(found, assumed=opened.assumed))
+    return Several(tuple(names), tuple(sides))
+
+
+def _from_start(run: Run) -> Run:
+    start = float(run.time[0])
+    blocks = tuple(Block(b.start - start, b.stop - start, b.label) for b in run.blocks)
+    return replace(run, time=run.time - start, blocks=blocks)
+
+
+CURVES = 8  # runs whose level is drawn as a curve, the worst; more lines cannot be told apart
+COLUMNS = 1500  # columns of the levels; of long runs, the highest level in each is shown
+# Height of all parts, of the table with the verdict at least, of the curves, and of a row of tabs,
+# in points, at 1440 x 900.
+WHOLE, TABLE, CURVE, TITLES = 832.0, 200.0, 190.0, 28.0
+# Height of a run's row; below it, classes and levels lie behind each other in tabs.
+LOWEST, HIGHEST = 20.0, 36.0
+NAMED = 16.0  # least distance of two names
+# Most height of a line, in points: thick ones have round ends, so a row is several of them.
+LINE = 8.0
+LETTERS = 16  # most letters of a name beside a row
+SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"  # the markers of `panels.MARKERS` as text
+
+
+def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
+    """Write the recording of several runs, whole or not at all."""
+    identity = " ".join(f"{side.name} {side.sha256}" for side in several.sides)
+    key = hashlib.sha256(identity.encode()).hexdigest()
+    with writing(path, key, overwrite=overwrite) as recording:
+        begin = min(float(side.run.time[0]) for side in several.sides)
+        end = max(float(side.run.time[-1]) for side in several.sides)
+        axes.log_span(recording, begin, end)
+        failing = sum(bool(side.findings) for side in several.sides)
+        told = f"FAIL   {failing} of {len(several.names)} runs" if failing else "PASS   no finding"
+        axes.log_verdict(recording, "findings" if failing else "ok", told)
+        count = len(several.names)
+        room = WHOLE - TABLE - CURVE
+        row = min((room / 2 - axes.AXIS) / count, HIGHEST)
+        apart = row >= LOWEST
+        tall = row * count + axes.AXIS if apart else room - TITLES
+        rows = [
+            _log_classes(recording, several, Panel("class", tall)),
+            _log_levels(recording, several, Panel("levels", tall), (begin, end)),
+        ]
+        if not apart:
+            rows = [(unstable.tabs(*(part for part, _ in rows)), tall + TITLES)]
+        rows.append(_log_curves(recording, several, Panel("curves", CURVE)))
+        properties = {"runs": len(several.names), "model": several.sides[0].model}
+        title = f"{several.names[0]} and {len(several.names) - 1} more"
+        log_report(recording, title, report(several), properties)
+        rest = WHOLE - axes.VERDICT - sum(size for _, size in rows)
+        verdict = (unstable.drawing("/verdict"), axes.VERDICT)
+        table = (unstable.text("Runs", "/report", titled=False), rest)
+        whole = unstable.above(verdict, table, *rows)
+        event = several.longest
+        loop = None if event is None else (event.start, event.stop)
+        recording.send_blueprint(unstable.blueprint(whole, loop))
+
+
+def report(several: Several) -> str:
+    """Write the table of several runs in Markdown, in the order given, the worst marked."""
+    failing = sum(bool(side.findings) for side in several.sides)
+    lines = [f"### {len(several.names)} runs, {failing} with findings"]
+    if several.worst is not None and (event := several.longest) is not None:
+        when = f"{event.start:.2f} s to {event.stop:.2f} s"
+        name = several.names[several.worst]
+        lines += ["", f"Worst: **{name}**, {spoken(event.label)} from {when}"]
+    lines += ["", "| run | findings | peak [dB] |", "|---|---|---|"]
+    for index, (name, side) in enumerate(zip(several.names, several.sides, strict=True)):
+        shown = f"**{name}** (worst)" if index == several.worst else name
+        count = Counter(spoken(event.label) for event in side.findings)
+        found = ", ".join(f"{number} {label}" for label, number in count.items())
+        lines.append(f"| {shown} | {found or side.status} | {several.peaks[index]:.0f} |")
+    lines += ["", "Peak of the level above 10 Hz, in dB re 1 rad/s."]
+    remarks: dict[str, list[str]] = {}
+    for name, side in zip(several.names, several.sides, strict=True):
+        for remark in dict.fromkeys(map(spoken, side.remarks)):
+            remarks.setdefault(remark, []).append(name)
+    told = [
+        f"- {remark} ({f'{len(who)} runs' if len(who) > 1 else who[0]})"
+        for remark, who in remarks.items()
+    ]
+    return "\n".join([*lines, *(["", "**Remarks**", "", *told] if told else [])]) + "\n"
+
+
+def shortened(names: Sequence[str]) -> list[str]:
+    """Names of runs, as long as they may stand beside a row."""
+    return [name if len(name) <= LETTERS else f"\u2026{name[1 - LETTERS :]}" for name in names]
+
+
+def _lines(several: Several, panel: Panel) -> tuple[float, int]:
+    """Width and number of the lines that make a run's row."""
+    height = (panel.height - axes.AXIS) / len(several.names)
+    lines = max(1, int(height / LINE))
+    return 0.8 * height if lines == 1 else height / (lines + 1) + 1.0, lines
+
+
+def _names(several: Several, panel: Panel) -> list[Label]:
+    """Names of the rows, as many as there is room for; the worst is marked."""
+    step = int(np.ceil(NAMED * len(several.names) / (panel.height - axes.AXIS)))
+    labels = []
+    for index, label in enumerate(axes.row_labels(shortened(several.names))):
+        worst = index == several.worst
+        if index % step == 0 or worst:
+            text = f"{label.text}\nworst" if worst and step == 1 else label.text
+            color = panels.readable(colors.CLASSES["impact"]) if worst else axes.INK
+            labels.append(Label(label.place, text, color=color))
+    return labels
+
+
+def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) -> Timed:
+    colours = panels.colours_of(*several.sides)
+    lanes = [[each for each in side.lane if each[2]] for side in several.sides]
+    edges = np.unique([0.0, *(time for lane in lanes for each in lane for time in each[:2])])
+    if len(edges) < 2:
+        edges = np.array([0.0, 1.0])
+    rgba = np.tile(np.array(axes.EMPTY, dtype=np.uint8), (len(lanes), len(edges) - 1, 1))
+    for row, lane in enumerate(lanes):
+        for start, stop, name in lane:
+            first, last = np.searchsorted(edges, (start, stop))
+            rgba[row, first:last] = (*colours[name], 255)
+    width, lines = _lines(several, panel)
+    path, names = "/class/found", several.names
+    axes.log_rows(recording, path, edges, rgba, names=names, width=width, lines=lines)
+    failing = list(dict.fromkeys(e.label for side in several.sides for e in side.findings))
+    places = axes.middles(len(lanes))
+    for number, name in enumerate(failing):
+        marks = [
+            (event.start, places[row])
+            for row, side in enumerate(several.sides)
+            for event in side.findings
+            if event.label == name
+        ]
+        time, place = zip(*sorted(marks), strict=True)
+        panels.log_marks(recording, name, number, axes.INK, time, place)
+    shown = [*failing, "ok"]
+    key = [
+        Label(
+            1.0 - (row + 0.5) / max(len(shown), 3),
+            spoken(name)
+            if name == "ok"
+            else f"{SIGNS[row % len(SIGNS)]} {spoken(name)}".replace("high ", "high\n"),
+            color=panels.readable(colours.get(name, colors.CLASSES["ok"])),
+        )
+        for row, name in enumerate(shown)
+    ]
+    axes.log_beside(recording, panel, _names(several, panel), key)
+    return axes.timed(panel, name="Classes")
+
+
+def _log_levels(
+    recording: rr.RecordingStream, several: Several, panel: Panel, span: tuple[float, float]
+) -> Timed:
+    step = max(levels.STEP, (span[1] - span[0]) / COLUMNS)
+    columns = int(np.ceil((span[1] - span[0]) / step))
+    edges: Array = span[0] + step * np.arange(columns + 1, dtype=np.float64)
+    if len(edges) < 2:
+        edges = np.array([span[0], span[0] + step])
+    found = np.stack([_columns(time, level, edges) for time, level in several.levels])
+    scale = levels.JOINTS.following(found)
+    width, lines = _lines(several, panel)
+    left, names = _names(several, panel), [f"{name} [{scale.unit}]" for name in several.names]
+    return axes.log_levels(
+        recording, panel, edges, found, scale, left,
+        title="Level above 10 Hz", names=names, width=width, lines=lines,
+    )  # fmt: skip
+
+
+def _columns(time: Array, level: Array, edges: Array) -> Array:
+    """Highest level in each column, NaN where there is none."""
+    column = np.clip(np.searchsorted(edges, time + 1e-9, side="right") - 1, 0, len(edges) - 2)
+    found: Array = np.full(len(edges) - 1, -np.inf)
+    np.maximum.at(found, column, np.nan_to_num(level, nan=-np.inf))
+    return np.where(np.isfinite(found), found, np.nan)
+
+
+def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -> Timed:
+    chosen: Sequence[int] = sorted(several.order[:CURVES])
+    for index, color in zip(chosen, colors.of_series(len(chosen)), strict=True):
+        time, level = several.levels[index]
+        path, name = f"/curves/{index:03d}", several.names[index]
+        axes.log_line(recording, path, time, level, color, name=name)
+    told = f"the worst\n{CURVES} runs" if len(several.names) > len(chosen) else "all runs"
+    axes.log_beside(recording, panel, panels.level_axis(), [Label(0.5, told)])
+    paths, ends = ("$origin/**",), (LOW_DB, HIGH_DB)
+    return axes.timed(panel, title="", between=ends, paths=paths, legend=True)
