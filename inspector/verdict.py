@@ -97,6 +97,11 @@ class Missing:
         return "MISSING" if self.scenario else "CUT" if self.label == END else "FAIL"
 
     @property
+    def rule(self) -> str:
+        """Its kind, for programs that count them."""
+        return f"missing-{'log' if self.scenario else self.label.replace(' ', '-')}"
+
+    @property
     def told(self) -> str:
         """What is said of it beside its scenario and the word."""
         return str(self) if self.words == "FAIL" else self.reason

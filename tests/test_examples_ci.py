@@ -1,5 +1,6 @@
 """What teams copy into their jobs, run as far as it can be without the hosts."""
 
+import json
 import os
 import re
 import shlex
@@ -83,6 +84,7 @@ def test_the_action_annotates_summarises_and_keeps_a_page(job):
     status, report, begin, first, *_, end = outputs.splitlines()
     assert (status, report, begin) == ("status=1", "report=noise-report", f"findings<<{end}")
     assert first.startswith("logs/demo.npz   FAIL")
+    assert json.loads((job.folder / "temp" / "noise-noise.sarif").read_text())["version"] == "2.1.0"
     # What is misspelt shows no verdict of this earlier use.
     done, outputs = check(job, OPTIONS="--fail-on-clas impact")
     assert done.returncode == 2

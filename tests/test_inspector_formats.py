@@ -11,7 +11,9 @@ from inspector.localisation.stage import Localisation
 from inspector.report.formats import ANNOTATIONS, COMMENT, FORMATS, MARKER, as_json, text
 from inspector.verdict import Evidence, Finding, Missing, Ruling, Verdict, exit_status
 
-github, junit, markdown = (FORMATS[name] for name in ("github", "junit", "markdown"))
+github, junit, markdown, sarif = (
+    FORMATS[name] for name in ("github", "junit", "markdown", "sarif")
+)
 BLOW, RATTLE = Finding("impact", 1.0, 1.5, 0.9), Finding("oscillations", 2.0, 3.0, 0.8, novel=True)
 QUIET = Verdict(Path("quiet.npz"), Status.OK, "general")
 LOUD = Verdict(
@@ -89,7 +91,7 @@ def test_text_has_a_line_for_each_finding_and_says_what_to_type():
     line = (
         "impact from 1.00 s to 1.50 s, wrist_1 71%, wrist_2 28%, 32-35 Hz, +24 dB over repetitions"
     )
-    for write in (junit, markdown):
+    for write in (junit, sarif, markdown):
         assert line in write([run])
     assert line.replace("%", "%25") in github([run])
 
@@ -296,6 +298,49 @@ def test_bad_input_hides_no_finding_from_github():
     errors = [line for line in github(many).splitlines() if "error" in line]
     assert sum("broken" in line for line in errors) == ANNOTATIONS // 2
     assert sum("loud" in line for line in errors) == ANNOTATIONS // 2
+
+
+def test_sarif_has_a_result_for_each_finding_that_fails_its_run():
+    log = json.loads(sarif(ALL))
+    assert log["version"] == "2.1.0"
+    (run,) = log["runs"]
+    results = run["results"]
+    rules = ["impact", "oscillations", "missing-impact"]
+    assert [each["ruleId"] for each in results] == rules
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == rules
+    for result in results:
+        assert result["message"]["text"]
+        (location,) = result["locations"]
+        place = location["physicalLocation"]
+        assert place["artifactLocation"]["uri"] in ("loud.npz", "lacking.npz")
+        assert place["region"]["startLine"] == 1
+    prints = {each["partialFingerprints"]["primaryLocationLineHash"] for each in results}
+    assert len(prints) == len(results)
+    (invocation,) = run["invocations"]
+    assert (invocation["executionSuccessful"], invocation["exitCode"]) == (False, 70)
+    notes = [each["message"]["text"] for each in invocation["toolExecutionNotifications"]]
+    assert [note.split(":")[0] for note in notes] == ["internal-error", "bad-input", "cannot-tell"]
+    assert run["properties"]["counts"]["findings"]["allowed"] == 1
+
+
+def test_sarif_names_files_by_addresses_and_keeps_fingerprints_when_findings_move():
+    odd = replace(LOUD, path=Path("a folder/50%.npz"))
+    far = replace(LOUD, path=Path("/elsewhere/run.npz"))
+    moved = replace(far, events=(replace(BLOW, start=1.01), RATTLE))
+    first, *_, last = json.loads(sarif([odd, far]))["runs"][0]["results"]
+    places = [
+        each["locations"][0]["physicalLocation"]["artifactLocation"] for each in (first, last)
+    ]
+    assert [place["uri"] for place in places] == [
+        "a%20folder/50%25.npz", "file:///elsewhere/run.npz",
+    ]  # fmt: skip
+    before, after = (json.loads(sarif([e]))["runs"][0]["results"][0] for e in (far, moved))
+    assert before["partialFingerprints"] == after["partialFingerprints"]
+    missing = tuple(Missing(f"log of {name}") for name in ("pick", "place"))
+    absent = replace(LACKING, missing=missing)
+    results = json.loads(sarif([absent]))["runs"][0]["results"]
+    prints = [each["partialFingerprints"]["primaryLocationLineHash"] for each in results]
+    assert len(prints) == len(set(prints)) == 2
 
 
 def test_markdown_is_a_table_with_the_worst_first_and_one_picture():

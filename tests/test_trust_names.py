@@ -18,7 +18,7 @@ HOSTILE = "a\n::error::b\x1b[31m\r"
 SHOWN = r"a\n::error::b\x1b[31m\r"
 
 
-@pytest.mark.parametrize("form", ["text", "json", "github", "junit", "markdown"])
+@pytest.mark.parametrize("form", ["text", "json", "github", "junit", "markdown", "sarif"])
 def test_a_file_whose_name_has_control_characters_is_bad_input_and_named_without_them(
     tmp_path, form
 ):

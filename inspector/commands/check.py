@@ -28,7 +28,9 @@ from inspector.verdict import UNREAD, Verdict, classify_files, exit_status, read
 from noisemodel.files import refuse_existing, write_whole
 from noisemodel.types import hint
 
-Format = Annotated[Literal["text", "json", "junit", "github", "markdown"], option("Output format.")]
+Format = Annotated[
+    Literal["text", "json", "junit", "github", "sarif", "markdown"], option("Output format.")
+]
 
 # --- classify
 

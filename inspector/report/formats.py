@@ -1,9 +1,10 @@
-"""Verdicts and differences as text, JSON, JUnit XML, GitHub annotations and Markdown.
+"""Verdicts and differences as text, JSON, JUnit XML, GitHub annotations, SARIF and Markdown.
 
-JUnit, GitHub and Markdown are written from a job of cases: a run, a scenario, or a file that
+JUnit, GitHub, SARIF and Markdown are written from a job of cases: a run, a scenario, or a file that
 cannot be read, of verdicts and of differences alike.
 """
 
+import hashlib
 import json
 import re
 import shlex
@@ -14,6 +15,7 @@ from enum import StrEnum
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 from inspector.analysis import NOTHING
@@ -34,13 +36,19 @@ from inspector.report.findings import (
     told,
 )
 from inspector.text import counted, program_version
-from inspector.verdict import UNREAD, Verdict, counts, exit_status
+from inspector.verdict import UNREAD, Finding, Verdict, counts, exit_status
 
 ANNOTATIONS = 10  # GitHub silently drops what goes beyond ten of a kind per step
 COMMENT = 60_000  # most characters of the Markdown: GitHub refuses comments of more than 65,536
 # First line of the Markdown, by which a script finds its own comment to replace it: a job may have
 # one of verdicts and one of a difference.
 MARKER, DIFF_MARKER = "<!-- noise-inspector -->", "<!-- noise-inspector diff -->"
+RESULTS = 5000  # GitHub shows no more results of one SARIF file
+SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+RULES = {
+    "missing-log": "A scenario that was accepted has no log.",
+    "louder": "A joint is louder than in accepted runs.",
+}
 # Findings of a scenario that are listed, and of a difference those of each kind.
 MOST, MOST_OF_KIND = 20, 5
 REPEATED = r"\d+% by \d+ repetitions? of "  # what the line on the reference says for all runs
@@ -84,6 +92,7 @@ class Case:
     seconds: float = 0.0  # that it took
     quiet: bool = False  # whether tables leave it out
     picture: Path | None = None
+    rules: tuple[tuple[str, dict[str, float]], ...] = ()  # of each sentence, and when, in [s]
 
     @property
     def told(self) -> str:
@@ -194,6 +203,81 @@ def _annotation(kind: str, case: Case) -> str:
 
 def _escaped(value: str) -> str:
     return value.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def sarif(job: Job) -> str:
+    """Write what fails cases as SARIF 2.1.0, the worst first.
+
+    A result lies in the first line of its case's file: GitHub shows no result without a location.
+    Files that cannot be read and what cannot be told are notifications of the tool.
+    """
+    results = [result for case in job.ranked for result in _results(case)][:RESULTS]
+    rules = [
+        {
+            "id": rule,
+            "shortDescription": {"text": RULES.get(rule) or _described(rule)},
+            "defaultConfiguration": {"level": "error"},
+        }
+        for rule in dict.fromkeys(result["ruleId"] for result in results)
+    ]
+    notes = [
+        {
+            "level": "error" if case.outcome is Outcome.ERROR else "warning",
+            "message": {"text": f"{case.status}: {case.message}"},
+            "locations": [_location(case.path)],
+        }
+        for case in job.ranked
+        if case.outcome in (Outcome.ERROR, Outcome.SKIPPED)
+    ]
+    invocation = {
+        "executionSuccessful": all(case.outcome is not Outcome.ERROR for case in job.cases),
+        "exitCode": job.exit_status,
+        "toolExecutionNotifications": notes,
+    }
+    driver = {"name": "noise-inspector", "version": program_version(), "rules": rules}
+    remark = {"remark": job.remarks[0]} if job.remarks else {}
+    run = {
+        "tool": {"driver": driver},
+        "invocations": [invocation],
+        "results": results,
+        "properties": {"counts": job.counts, **remark},
+    }
+    return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
+
+
+def _results(case: Case) -> Iterator[dict[str, Any]]:
+    """What fails a case, as results of SARIF."""
+    known = _uri(case.path) if case.name == str(case.path) else case.name
+    number = Counter[str]()
+    for sentence, (rule, span) in zip(case.sentences, case.rules, strict=True):
+        number[rule] += 1
+        same = hashlib.sha256(f"{known}:{rule}:{number[rule]}".encode()).hexdigest()[:16]
+        yield {
+            "ruleId": rule,
+            "level": "error",
+            "message": {"text": f"{case.name}: {sentence}"},
+            "locations": [_location(case.path)],
+            "partialFingerprints": {"primaryLocationLineHash": same},
+            "properties": span,
+        }
+
+
+def _location(path: Path) -> dict[str, object]:
+    place = {"artifactLocation": {"uri": _uri(path)}, "region": {"startLine": 1}}
+    return {"physicalLocation": place}
+
+
+def _uri(path: Path) -> str:
+    """Address of a file, relative to the folder of the job if it lies there."""
+    full, here = path.absolute(), Path.cwd()
+    return quote(full.relative_to(here).as_posix()) if full.is_relative_to(here) else full.as_uri()
+
+
+def _described(rule: str) -> str:
+    label = rule.removeprefix("missing-")
+    if label != rule:
+        return f"A required finding of class {label.replace('-', ' ')} was not found."
+    return f"The noise of the joints shows a failure of class {label}."
 
 
 def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
@@ -368,6 +452,10 @@ def _case(verdict: Verdict) -> Case:
         rank=verdict.severity,
         kind=kind,
         sentences=tuple(failing(verdict)),
+        rules=(
+            *((each.label, _span(each)) for each in verdict.failing),
+            *((each.rule, {}) for each in verdict.missing),
+        ),
         message=verdict.message,
         notes=tuple(excused(verdict)),
         trace=verdict.trace,
@@ -375,6 +463,10 @@ def _case(verdict: Verdict) -> Case:
         quiet=verdict.status is Status.OK,
         picture=verdict.picture,
     )
+
+
+def _span(event: Finding) -> dict[str, float]:
+    return {"start": round(event.start, 6), "stop": round(event.stop, 6)}
 
 
 def _of_group(group: Group) -> Case:
@@ -408,6 +500,7 @@ FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
     "json": as_json,
     "junit": lambda verdicts: junit(_by_run(verdicts)),
     "github": lambda verdicts: github(_by_scenario(verdicts)),
+    "sarif": lambda verdicts: sarif(_by_run(verdicts)),
     "markdown": lambda verdicts: markdown(
         _by_scenario(verdicts),
         head="| scenario | status | findings |",
