@@ -1,7 +1,8 @@
 """Names of columns and arrays, and the signals and joints that they stand for.
 
 ``PATTERNS`` is the table of names, read in any case and without the unit at their end. Names that
-leave a question open are decided beside the log's other names, by `Naming`.
+leave a question open are decided beside the log's other names, by `Naming`. Patterns are texts,
+which `re` compiles where they are first used: run files need none of them.
 """
 
 import re
@@ -18,10 +19,9 @@ SIGNALS = (*JOINT_SIGNALS, *BASE_SIGNALS)
 # Names of a time column, in any case; the first of these that a log has is used.
 TIMES = ("time", "timestamp", "t", "__time", "stamp", "ts", "elapsed", "sec", "secs", "seconds")
 # ``field.header.stamp``, ``ros_time``, ``elapsed_time``.
-TIME = re.compile(
+TIME = (
     r"(?:.*[./])?(?:(?:elapsed|ros|rosbag|system|sys|robot|host|pc|unix|wall|sim|log)[_ ]?)?"
-    r"(?P<name>__time|time[_ ]?stamp|time|stamp|t|ts|elapsed|secs?|seconds)",
-    re.IGNORECASE,
+    r"(?P<name>__time|time[_ ]?stamp|time|stamp|t|ts|elapsed|secs?|seconds)"
 )
 # Units of stamps, as names of columns have them.
 TIME_UNITS = {
@@ -50,11 +50,10 @@ UNITS = {
     **dict.fromkeys(("nm", "n m", "n*m", "n.m", "n·m", "n", "a"), ("effort", 1.0)),
 }
 # ``Time [sec]``, ``timestamp_ms``, ``Joint1 Velocity (deg/s)``, ``q1_deg``.
-UNIT = re.compile(
+UNIT = (
     r"(?P<name>.*?)(?:\s*+[\[(]\s*+(?P<bracketed>(?=[^\])]*[^\d\s\])])[^\])]*+)[\])]"
     r"|[_ ](?P<suffix>m?s|sec|secs|seconds|msec|us|usec|ns|nsec"
-    r"|rad|rads|radps|rad_s|deg|degs|degps|deg_s|dps|rpm|nm))",
-    re.IGNORECASE,
+    r"|rad|rads|radps|rad_s|deg|degs|degps|deg_s|dps|rpm|nm))"
 )
 # Words of a quantity. ``qd`` is a velocity, ``q_d`` a desired position.
 QUANTITIES = {
@@ -87,39 +86,36 @@ ALONE = (
 )
 
 # A joint, then the signal of a run file, as it is written there
-FIRST = re.compile(
-    r"(?:.*/)?(?P<joint>[^/]+)[./](?P<quantity>position|velocity|effort)"
-    r"(?P<after>(?<!effort)_desired)?"
+FIRST = (
+    r"(?-i:(?:.*/)?(?P<joint>[^/]+)[./](?P<quantity>position|velocity|effort)"
+    r"(?P<after>(?<!effort)_desired)?)"
 )
 # A quantity of all joints, or of the only one
-WHOLE = re.compile(RECORD + BEFORE + WHOSE + ALONE + AFTER, re.IGNORECASE)
+WHOLE = RECORD + BEFORE + WHOSE + ALONE + AFTER
 
 NUMBERED = QUANTITY + AFTER + GAP + "?" + NUMBER + LAST
 # Names of columns and arrays; the first that matches counts.
 PATTERNS = (
     FIRST,
-    re.compile(RECORD + WORD + BEFORE + WORD + NUMBERED, re.IGNORECASE),  # q_d[0], joint_pos_1
+    RECORD + WORD + BEFORE + WORD + NUMBERED,  # q_d[0], joint_pos_1
     WHOLE,
-    re.compile(RECORD + LIMB + GAP + WORD + BEFORE + NUMBERED, re.IGNORECASE),  # left_q_1
-    re.compile(  # a joint, then a quantity: elbow_target_vel
-        RECORD + BEFORE + r"(?P<joint>[^/]+?)" + GAP + WITHIN + QUANTITY + AFTER, re.IGNORECASE
-    ),
+    RECORD + LIMB + GAP + WORD + BEFORE + NUMBERED,  # left_q_1
+    # a joint, then a quantity: elbow_target_vel
+    RECORD + BEFORE + r"(?P<joint>[^/]+?)" + GAP + WITHIN + QUANTITY + AFTER,
 )
 # Things before a quantity that are no joints.
-NOT_JOINTS = re.compile(
+NOT_JOINTS = (
     rf"(?:.*{GAP})?(?:tcp|eef?|end_?effector|cartesian|cart|linear|angular|lin|ang|com|imu|odom|gps"
     rf"|gravity|friction|external|ext|contact|inertia|bias|residual|disturbance)"
-    rf"(?:{GAP}.*)?|base|root|body|tool|object|robot|max|min|mean|x|y|z|roll|pitch|yaw|wind",
-    re.IGNORECASE,
+    rf"(?:{GAP}.*)?|base|root|body|tool|object|robot|max|min|mean|x|y|z|roll|pitch|yaw|wind"
 )
 # Names of what a controller computes: ``/state/error/positions[0]``, ``PositionError1``.
-NOT_MOTION = re.compile(
+NOT_MOTION = (
     r"(?:.*[/._ ])?(?:errors?|err)(?:[/._ \[(].*)?|(?:.*/)?output/.*"
-    r"|.*(?-i:(?<=[a-z0-9])E(?:rr|rror)s?)[_\[(]?\d*[\])]?",
-    re.IGNORECASE,
+    r"|.*(?-i:(?<=[a-z0-9])E(?:rr|rror)s?)[_\[(]?\d*[\])]?"
 )
 # ``joint1``, ``J1``, ``axis 1``: names that number the joints.
-GENERIC = re.compile(rf"(?:{JOINT_WORD}|servo|j|a)[ _]?(?P<number>\d+)", re.IGNORECASE)
+GENERIC = rf"(?:{JOINT_WORD}|servo|j|a)[ _]?(?P<number>\d+)"
 LIMBS = r"left|right|front|rear|hind|back|l|r|fl|fr|rl|rr|lf|rf|lh|rh|hl|hr|bl|br|arm|leg|hand"
 PARTS = (
     r"shoulder|elbow|wrist|hip|knee|ankle|thigh|calf|shank|waist|torso|neck|upper_?arm|fore_?arm"
@@ -127,17 +123,12 @@ PARTS = (
 )
 # Names of joints without a quantity: ``Joint1``, ``FL_0``, ``shoulder_lift``, ``wrist_1``. What
 # repeats has one reading or a bound: ``rrrr`` is `r` four times or `rr` twice.
-BARE = re.compile(
+BARE = (
     rf"(?:(?:{LIMBS}){GAP}?){{0,4}}(?:(?:{JOINT_WORD}|servo|j|(?-i:A))[ _]?\d+|(?<=[a-z][ _.-])\d+)"
     rf"|(?=.*(?:{PARTS}))(?:(?:{LIMBS}|{PARTS}|{JOINT_WORD}|lift|pan|tilt|flex|rotate|rotation"
-    rf"|roll|pitch|yaw|[xyz]|\d+(?!\d))(?:{GAP}|(?=\d)|$))+",
-    re.IGNORECASE,
+    rf"|roll|pitch|yaw|[xyz]|\d+(?!\d))(?:{GAP}|(?=\d)|$))+"
 )
-SIDED = re.compile(
-    rf"(?:(?P<before>{DESIRED}|{MEASURED}){GAP})?(?P<joint>.+?)"
-    rf"(?:{GAP}(?P<after>{DESIRED}|{MEASURED}))?",
-    re.IGNORECASE,
-)
+SIDED = rf"{BEFORE}(?P<joint>.+?)(?:{GAP}(?P<after>{DESIRED}|{MEASURED}))?"
 
 LONGEST = 300  # characters of a name from which on it names no signal: patterns take their square
 
@@ -158,21 +149,18 @@ class Naming:
     def of(cls, columns: Iterable[str], joints: Collection[str] = ()) -> "Naming":
         """Naming of some columns; ``joints`` are names that the robot is known to have."""
         columns = [*columns]
-        known = {column: column_signal(column) for column in columns}
-        named = {column: what for column, what in known.items() if what}
+        named = {column: what for column in columns if (what := column_signal(column))}
         bare, remark = _bare(columns, named, joints)
-        numbers, words = set[int](), set[str]()
-        for column, (_, joint) in (named | bare).items():
-            name = without_unit(column)[0]
-            if (number := number_of(joint)) is not None and not name.endswith("]"):
-                numbers.add(number)
-        for column in columns:
-            match = _match(without_unit(column)[0])
-            if match and not any(_sides(match.groupdict())):
-                words.add(match["quantity"].lower())
-        moves = any(
-            signal.startswith(("position", "velocity")) for signal, _ in (named | bare).values()
-        )
+        known = named | bare
+        numbers = {
+            number
+            for column, (_, joint) in known.items()
+            if (number := number_of(joint)) is not None
+            and not without_unit(column)[0].endswith("]")
+        }
+        matches = filter(None, (_match(without_unit(column)[0]) for column in columns))
+        words = {match["quantity"].lower() for match in matches if not any(_sides(match))}
+        moves = any(signal.startswith(("position", "velocity")) for signal, _ in known.values())
         is_pose = {"x", "y"} <= {column.lower() for column in columns}  # beside x, y, an angle
         return cls(
             first=int(min(numbers, default=0) == 1),
@@ -190,30 +178,29 @@ def _bare(
     found: dict[str, tuple[str, str, str]] = {}  # signal, joint, and what says so
     for column in columns:
         name, unit = without_unit(column)
-        if column in named or len(name) > LONGEST or NOT_MOTION.fullmatch(name):
+        if column in named or len(name) > LONGEST or _fits(NOT_MOTION, name):
             continue
-        match = SIDED.fullmatch(name)
-        joint, side = name, ""
-        if match and name not in joints:
-            joint, side = match["joint"], match["before"] or match["after"] or ""
-        if joint in joints or BARE.fullmatch(joint):
-            found[column] = (UNITS.get(unit, ("position", 1.0))[0], joint, side.lower())
+        match = None if name in joints else _fits(SIDED, name)
+        joint = match["joint"] if match else name
+        side = next(filter(None, _sides(match)), "") if match else ""
+        if joint in joints or _fits(BARE, joint):
+            found[column] = (UNITS.get(unit, ("position", 1.0))[0], joint, side)
     measured = {
-        key_of(joint): joint
+        _key(joint): joint
         for signal, joint, side in found.values()
         if signal != "effort" and not _is_desired(side)
     }
-    taken = {key_of(joint) for signal, joint in named.values() if signal == "position"}
-    moving = {key_of(joint) for signal, joint in named.values() if signal == "velocity"}
-    certain = [joint for joint in measured.values() if joint in joints or GENERIC.fullmatch(joint)]
+    taken = {_key(joint) for signal, joint in named.values() if signal == "position"}
+    moving = {_key(joint) for signal, joint in named.values() if signal == "velocity"}
+    certain = [joint for joint in measured.values() if joint in joints or _fits(GENERIC, joint)]
     if taken or (moving and moving != set(measured)) or not (certain or len(measured) > 1):
         return {}, ""
-    sided = {key_of(joint) for _, joint, side in found.values() if side and not _is_desired(side)}
+    sided = {_key(joint) for _, joint, side in found.values() if side and not _is_desired(side)}
     bare: dict[str, Meaning] = {}
     for column, (signal, joint, side) in found.items():
-        if _is_desired(side) and signal != "effort" and key_of(joint) in measured:
+        if _is_desired(side) and signal != "effort" and _key(joint) in measured:
             bare[column] = (f"{signal}_desired", joint)
-        elif not _is_desired(side) and (side or key_of(joint) not in sided):
+        elif not _is_desired(side) and (side or _key(joint) not in sided):
             bare[column] = (signal, joint)  # `FR_0_actual` counts more than `FR_0`
     plain = [c for c in bare if without_unit(c)[1] not in UNITS and bare[c][0] == "position"]
     if not plain:
@@ -226,11 +213,16 @@ def _bare(
     )
 
 
+def _fits(pattern: str, name: str) -> re.Match[str] | None:
+    """Match of all of a name, in any case."""
+    return re.fullmatch(pattern, name, re.IGNORECASE) if len(name) <= LONGEST else None
+
+
 def _is_desired(side: str) -> bool:
-    return bool(re.fullmatch(DESIRED, side, re.IGNORECASE))
+    return _fits(DESIRED, side) is not None
 
 
-def key_of(joint: str | int) -> str | int:
+def _key(joint: str | int) -> str | int:
     """What two names of one joint share: its number, or its name in small letters."""
     number = number_of(joint)
     return str(joint).lower() if number is None else number
@@ -238,7 +230,7 @@ def key_of(joint: str | int) -> str | int:
 
 def without_unit(name: str) -> tuple[str, str]:
     """Name of a column, and the unit at its end in small letters, or an empty text."""
-    match = UNIT.fullmatch(name.strip()) if len(name) <= LONGEST else None
+    match = _fits(UNIT, name.strip()) if len(name) <= LONGEST else None
     unit = (match["bracketed"] or match["suffix"]).strip().lower() if match else ""
     if match and (unit in UNITS or unit in TIME_UNITS):
         return match["name"].rstrip(), unit
@@ -258,17 +250,16 @@ def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
     name, unit = without_unit(column)
     match = _match(name if unit in UNITS else column.strip())
     if match is None:
-        number = GENERIC.fullmatch(name) if unit in UNITS else None
-        return (UNITS[unit][0], name) if number else None
+        return (UNITS[unit][0], name) if unit in UNITS and _fits(GENERIC, name) else None
     found = match.groupdict()
     joint: str | int = found.get("joint") or ""
-    number_text = found.get("index") or found.get("round") or found.get("number")
-    if number_text is not None:
-        joint = f"{joint}_{number_text}" if joint else int(number_text)
+    number = found.get("index") or found.get("round") or found.get("number")
+    if number is not None:
+        joint = f"{joint}_{number}" if joint else int(number)
     # A word for desired motion within a joint's name: no set point is read as a measured signal.
-    if match.re is not FIRST and any(map(_is_desired, re.split(GAP, str(joint)))):
+    if match.re.pattern != FIRST and any(map(_is_desired, re.split(GAP, str(joint)))):
         return None
-    signal = _signal(found, naming, name)
+    signal = _signal(match, naming, name)
     if not signal or joint == "" or not signal.startswith(UNITS.get(unit, (signal, 1.0))[0]):
         return None
     return signal, joint
@@ -276,20 +267,21 @@ def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
 
 def array_signal(name: str) -> str | None:
     """Signal of an array by its name, without the folders in it; None for an unknown name."""
-    bare = without_unit(name)[0].rpartition("/")[2].lower()
+    whole = without_unit(name)[0]
+    bare = whole.rpartition("/")[2].lower()
     if bare in SIGNALS:
         return bare
-    if len(name) > LONGEST or NOT_MOTION.fullmatch(without_unit(name)[0]):
+    if len(name) > LONGEST or _fits(NOT_MOTION, whole):
         return None
-    match = WHOLE.fullmatch(bare)
-    return _signal(match.groupdict(), Naming(), name) if match else None
+    match = _fits(WHOLE, bare)
+    return _signal(match, Naming(), name) if match else None
 
 
 def number_of(joint: str | int) -> int | None:
     """Number of a joint that a column tells by its number, or by a name that is one."""
     if isinstance(joint, int):
         return joint
-    match = GENERIC.fullmatch(joint) if len(joint) <= LONGEST else None
+    match = _fits(GENERIC, joint)
     return int(match["number"]) if match else None
 
 
@@ -299,15 +291,14 @@ def says_twice(column: str) -> bool:
     Such a one is the command beside the desired motion that a controller followed.
     """
     match = _match(without_unit(column)[0])
-    return match is not None and sum(map(bool, _sides(match.groupdict()))) > 1
+    return match is not None and sum(map(bool, _sides(match))) > 1
 
 
 def time_column(names: Sequence[str]) -> str:
     """Name of the column or array that holds the stamps; empty if there is none."""
     found: dict[str, str] = {}
     for name in names:
-        bare = without_unit(name)[0]
-        if len(bare) <= LONGEST and (match := TIME.fullmatch(bare)):
+        if match := _fits(TIME, without_unit(name)[0]):
             word = re.sub("[_ ](?=stamp)", "", match["name"].lower())
             plain = "/" not in name and "." not in name
             found.setdefault(word if plain else f"{word} of a record", name)
@@ -322,23 +313,22 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _match(name: str) -> re.Match[str] | None:
-    if len(name) > LONGEST or NOT_MOTION.fullmatch(name):
+    """Match of the first pattern that fits a name, unless it tells of no joint's motion."""
+    if _fits(NOT_MOTION, name):
         return None
-    found = next((match for each in PATTERNS if (match := each.fullmatch(name))), None)
-    if found is None or found.re is FIRST:
+    found = next(filter(None, (_fits(each, name) for each in PATTERNS)), None)
+    if found is None or found.re.pattern == FIRST:
         return found
     joint = found.groupdict().get("joint")
     side = rf"(?:(?:{DESIRED}|{MEASURED}){GAP}?)+"
-    if joint and (NOT_JOINTS.fullmatch(joint) or re.fullmatch(side, joint, re.IGNORECASE)):
-        return None
-    return found
+    return None if joint and (_fits(NOT_JOINTS, joint) or _fits(side, joint)) else found
 
 
-def _signal(found: dict[str, str | None], naming: Naming, name: str) -> str | None:
+def _signal(match: re.Match[str], naming: Naming, name: str) -> str | None:
     """Signal of the parts of a name; None for a desired effort, which runs do not have."""
-    word = re.sub(r"^(?:joint|dof|applied)_", "", (found["quantity"] or "").lower())
+    word = re.sub(r"^(?:joint|dof|applied)_", "", match["quantity"].lower())
     signal = next(each for each, words in QUANTITIES.items() if re.fullmatch(words, word))
-    sides = _sides(found)
+    sides = _sides(match)
     if word == "qd" and naming.qd_is_desired and not any(sides):
         return "position_desired"
     desired = any(side == "d" or _is_desired(side) for side in sides)
@@ -349,6 +339,7 @@ def _signal(found: dict[str, str | None], naming: Naming, name: str) -> str | No
     return None if signal == "effort" else f"{signal}_desired"
 
 
-def _sides(found: dict[str, str | None]) -> list[str]:
+def _sides(match: re.Match[str]) -> list[str]:
     """What the parts of a name say on whether it is desired or measured; empty where nothing."""
+    found = match.groupdict()
     return [(found.get(place) or "").lower().strip("_") for place in SIDES]
