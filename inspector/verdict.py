@@ -1,6 +1,6 @@
 """Verdicts on files: what `classify` prints of an analysis, in batch, and resumed.
 
-A verdict is written as a run of ``noise-verdict/3`` (`as_dict`) and read again (`from_dict`): by
+A verdict is written as a run of ``noise-verdict/3`` (`as_dict`) and read again (`read_as`): by
 `classify --resume`, whose state is a header and a line of JSON for each verdict, by `merge` and by
 `history`. A state's line without its end was being written when the process was killed: it is
 dropped. Of several verdicts on a run the last one of its present content counts. Internal errors
@@ -11,16 +11,18 @@ import fcntl
 import hashlib
 import json
 import os
+import reprlib
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from enum import StrEnum
 from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
-from typing import IO, Any
+from types import NoneType
+from typing import IO, Any, get_args, get_origin, get_type_hints
 
 import noiseclassifier as nc
 import noisemodel as nm
@@ -83,7 +85,8 @@ class Missing:
     reason: str = ""
 
     def __str__(self) -> str:
-        when = "" if self.start is None else f" from {self.start:.2f} s to {self.stop:.2f} s"
+        known = self.start is not None and self.stop is not None
+        when = f" from {self.start:.2f} s to {self.stop:.2f} s" if known else ""
         return f"missing: {self.label}{when}{self.reason and f' (required: {self.reason})'}"
 
     @property
@@ -109,53 +112,23 @@ class Missing:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a finding is known by."""
+    """What a finding is known by, named as in JSON."""
 
     kind: str  # "repetitions", "other motions" of this robot, or the "general" model
-    db: float | None = None  # loudest exceedance over the reference; None by the general model
+    over_db: float | None = None  # loudest exceedance over the reference; None by the general model
     peak: float | None = None  # when that is, in [s]
-    joint: str = ""
-    signal: str = ""  # "velocity" or "tracking error"
-    octave: tuple[float, float] | None = None  # [Hz]
-    level: float | None = None  # [dB re 1 rad/s]
+    joint: str | None = None
+    signal: str | None = None  # "velocity" or "tracking error"
+    band_hz: tuple[float, float] | None = None
+    level_db: float | None = None  # [dB re 1 rad/s]
     excused: str = ""  # why the finding does not count; empty if it does
 
     def __str__(self) -> str:
-        if self.db is None or self.octave is None:
+        if self.over_db is None or self.peak is None or self.band_hz is None:
             return "by the general model"
-        low, high = self.octave
-        return (
-            f"{self.db:.1f} dB over {self.kind} at {self.peak:.2f} s ({self.joint}, {self.signal},"
-            f" {low:.0f} to {high:.0f} Hz)"
-        )
-
-    def as_dict(self) -> dict[str, Any]:
-        """The evidence as JSON can hold it."""
-        return {
-            "kind": self.kind,
-            "over_db": self.db,
-            "peak": self.peak,
-            "joint": self.joint or None,
-            "signal": self.signal or None,
-            "band_hz": list(self.octave) if self.octave else None,
-            "level_db": self.level,
-            "excused": self.excused,
-        }
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> "Evidence":
-        """Read what `as_dict` wrote."""
-        numbers = (content[name] for name in ("over_db", "peak", "level_db"))
-        db, peak, level = (None if each is None else float(each) for each in numbers)
-        joint, signal = (str(content[name] or "") for name in ("joint", "signal"))
-        excused = str(content.get("excused", ""))
-        band = _pair(content["band_hz"])
-        return cls(str(content["kind"]), db, peak, joint, signal, band, level, excused)
-
-
-def _pair(band: Any) -> tuple[float, float] | None:
-    """A band of JSON, in [Hz]."""
-    return (float(band[0]), float(band[1])) if band else None
+        low, high = self.band_hz
+        where = f"{self.joint}, {self.signal}, {low:.0f} to {high:.0f} Hz"
+        return f"{self.over_db:.1f} dB over {self.kind} at {self.peak:.2f} s ({where})"
 
 
 GENERAL = Evidence("general")
@@ -200,7 +173,7 @@ class Finding(Event):
             "fails": self.fails,
             "ruling": self.ruling.value,
             "reason": self.reason,
-            "evidence": self.evidence.as_dict(),
+            "evidence": asdict(self.evidence),
         }
         if known is not None:
             written["localisation"] = {
@@ -212,31 +185,15 @@ class Finding(Event):
             }
         return written
 
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> "Finding":
-        """Read what `as_dict` wrote."""
-        start, stop, score = (float(content[name]) for name in ("start", "stop", "score"))
-        order, known = content["order"], content.get("localisation")
-        return cls(
-            str(content["label"]),
-            start,
-            stop,
-            score,
-            bool(content["novel"]),
-            None
-            if known is None
-            else Localisation(
-                str(known["stage"] or ""),
-                str(known["following"] or ""),
-                float(known["lag"] or 0.0),
-                joints=tuple((str(name), float(share)) for name, share in known["joints"].items()),
-                band=_pair(known["band"]),
-            ),
-            None if order is None else Order(str(order["joint"]), float(order["periods_per_turn"])),
-            Evidence.from_dict(content["evidence"]),
-            Ruling(content["ruling"]),
-            str(content["reason"]),
-        )
+    @staticmethod
+    def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
+        """The fields of what `as_dict` wrote, for `read_as`."""
+        known = content.get("localisation")
+        if known is not None:
+            texts = {name: known[name] or "" for name in ("stage", "following")}
+            joints = [list(each) for each in known["joints"].items()]
+            known = {**known, **texts, "lag": known["lag"] or 0.0, "joints": joints, "onset": None}
+        return {**content, "localisation": known}
 
 
 @dataclass(frozen=True)
@@ -253,13 +210,6 @@ class Beside:
     quieter_db: float = 0.0  # than each repetition; 0 if it is not
     failures: tuple[tuple[str, str], ...] = ()  # what it lacks of its scenario, and why
     words: str = ""  # the evidence, in a line
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> "Beside":
-        """Read what a verdict has as its reference."""
-        scenarios = tuple(map(str, content["scenarios"]))
-        failures = tuple((str(what), str(why)) for what, why in content["failures"])
-        return cls(**{**content, "scenarios": scenarios, "failures": failures})
 
 
 TEXTS = ("model", "model_sha256", "message", "assumed", "scenario", "expectations")
@@ -358,29 +308,41 @@ class Verdict:
             **{name: round(getattr(self, name), 6) for name in NUMBERS},
         }
 
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> "Verdict":
-        """Read what `as_dict` wrote."""
-        missing = tuple(
-            Missing(str(each["label"]), each["start"], each["stop"], str(each["reason"]))
-            for each in content["missing"]
-        )
-        " ".join(map(str, missing))  # a number that is none fails here
-        if not all(isinstance(content[name], str) for name in ("run", *TEXTS)):
-            raise TypeError("expected text")
-        plain: dict[str, Any] = {name: content[name] for name in TEXTS}
-        return cls(
-            Path(content["run"]),
-            Status(content["status"]),
-            events=tuple(map(Finding.from_dict, content["events"])),
-            unknown=Unknown(content["unknown"]),
-            beside=Beside.from_dict(content["reference"]) if content.get("reference") else None,
-            missing=missing,
-            joints=int(content["joints"]),
-            ignored=not content["counted"],
-            picture=None if content["picture"] is None else Path(content["picture"]),
-            **plain | {name: float(content[name]) for name in NUMBERS},
-        )
+    @staticmethod
+    def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
+        """The fields of what `as_dict` wrote, for `read_as`."""
+        named = {"path": content["run"], "beside": content["reference"]}
+        named["ignored"] = not read_as(bool, content["counted"])
+        return {"lost": [], "trace": "", **content, **named}
+
+
+hints_of = cache(get_type_hints)
+
+
+def read_as(kind: Any, value: Any) -> Any:
+    """A value of JSON as a type; of a dataclass, all fields of it must be there.
+
+    Raises:
+        TypeError, KeyError, ValueError, AttributeError: If it is of another type.
+    """
+    of, inner = get_origin(kind), get_args(kind)
+    if isinstance(kind, type) and is_dataclass(kind):
+        named = getattr(kind, "fields_of", dict)(value)
+        return kind(**{name: read_as(each, named[name]) for name, each in hints_of(kind).items()})
+    if NoneType in inner:
+        return None if value is None else read_as(inner[0], value)
+    if of is tuple and isinstance(value, list):
+        kinds = inner[:1] * len(value) if inner[-1] is ... else inner
+        return tuple(read_as(*each) for each in zip(kinds, value, strict=True))
+    if of is Mapping and isinstance(value, dict):
+        return {name: read_as(inner[1], each) for name, each in value.items()}
+    if kind is float and type(value) is int and abs(value) < 1e300:
+        return float(value)
+    if kind in (Path, Status, Unknown, Ruling) and isinstance(value, str):
+        return kind(value)
+    if type(value) is not kind:
+        raise TypeError(f"{reprlib.repr(value)} is no {kind.__name__}")
+    return value
 
 
 def classify_file(
@@ -541,7 +503,7 @@ def read_results(path: Path) -> list[Verdict]:
         form = content.get("format") if isinstance(content, dict) else None
         if form != RESULTS:
             raise InspectorError(f"{path}: of format {form!r}, expected {RESULTS!r}")
-        return [Verdict.from_dict(each) for each in content["runs"]]
+        return list(read_as(tuple[Verdict, ...], content["runs"]))
     except OSError as error:
         raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
     except InspectorError:
@@ -571,8 +533,7 @@ def kept(
         for number, row in enumerate(rows, start=2):
             try:
                 content = from_json(row)
-                verdict = replace(Verdict.from_dict(content), lost=tuple(content["lost"]))
-                " ".join(verdict.lost)  # what is no text fails here
+                verdict = read_as(Verdict, content)
                 verdicts[verdict.path, content["sha256"]] = verdict
             except (ValueError, KeyError, TypeError, AttributeError) as error:
                 raise refused(f"is damaged in line {number}") from error

@@ -1,6 +1,6 @@
 import json
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -175,7 +175,7 @@ def test_json_is_noise_verdict_3():
     assert loud["events"][1] == {
         "label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8, "novel": True,
         "order": None, "fails": True, "ruling": "found", "reason": "",
-        "evidence": Evidence("general").as_dict(),
+        "evidence": asdict(Evidence("general")),
     }  # fmt: skip
     assert loud["events"][0]["novel"] is False
     assert (loud["run"], loud["status"], loud["unknown"]) == ("loud.npz", "findings", "finding")

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from commandline import call
 
-from inspector.errors import Status
+from inspector.errors import InspectorError, Status
 from inspector.library import demo_run
+from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.report import history
-from inspector.report.formats import as_json
-from inspector.verdict import Beside, Finding, Verdict
+from inspector.report.formats import FORMATS, as_json
+from inspector.report.html import index_page
+from inspector.verdict import Beside, Evidence, Finding, Missing, Verdict, read_results
 
 
 @pytest.fixture
@@ -117,6 +119,58 @@ def test_what_is_no_result_is_one_line(tmp_path, content, problem):
     assert (status, out, err.count("\n")) == (3, "", 1)
     assert err.startswith(f"inspector: {tmp_path}/a.json: ")
     assert problem in err
+
+
+WHOLE = Verdict(
+    Path("pick-1.npz"),
+    Status.FINDINGS,
+    "general",
+    (
+        Finding(
+            "impact", 1.0, 1.5, 0.9, False,
+            Localisation("measured", "desired", 0.01, (("a", 0.7), ("b", 0.3)), band=(9.0, 30.0)),
+            Order("a", 3.0),
+            Evidence("repetitions", 24.0, 1.1, "a", "velocity", (16.0, 32.0), -20.0),
+        ),
+    ),
+    missing=(Missing("impact", 1.1, 1.3, "the pick"),),
+    beside=Beside(
+        "reference", ("pick",), 3, {"repetitions": 1.0}, {"repetitions": 4.0}, 9.0, {"a": 9.0},
+        failures=(("end of the run", "1.0 of 2.0 s"),), words="100% by 3 repetitions of pick",
+    ),
+    picture=Path("pick.png"),
+)  # fmt: skip
+
+
+def test_whatever_stands_in_a_result_is_shown_or_refused_in_one_line(tmp_path):
+    whole = json.loads(as_json([WHOLE]))
+    assert read_results(results(tmp_path / "a.json", WHOLE)) == [WHOLE]
+
+    def places(value, path=()):
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, each in items:
+            yield (*path, key)
+            if isinstance(each, (dict, list)):
+                yield from places(each, (*path, key))
+
+    refused = []
+    for *above, last in places(whole["runs"]):
+        for odd in (None, 0, -1.5, 10**19, True, "", "x", [], [1], {}, {"a": "b"}):
+            changed = json.loads(json.dumps(whole))
+            parent = changed["runs"]
+            for key in above:
+                parent = parent[key]
+            parent[last] = odd
+            (tmp_path / "1-a.json").write_text(json.dumps(changed))
+            try:
+                found = read_results(tmp_path / "1-a.json")
+            except InspectorError as error:
+                refused.append(str(error))
+                continue
+            for write in (*FORMATS.values(), index_page):
+                assert isinstance(write(found), str)
+    assert len(refused) > 500
+    assert all("no results of classify" in each for each in refused)
 
 
 def test_a_run_of_two_jobs_is_refused(tmp_path):

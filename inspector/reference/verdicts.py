@@ -353,7 +353,7 @@ def _ruled(
     """What becomes of a finding by what the first scenario that is about it waives or wants."""
     if event.evidence.excused:
         return Ruling.AS_REFERENCE, event.evidence.excused
-    joint, level = event.evidence.joint, event.evidence.level
+    joint, level = event.evidence.joint, event.evidence.level_db
     for scenario in scenarios:
         span = _span(event, begin, scenario)
         for each in reversed(scenario.waive):

@@ -99,7 +99,7 @@ def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "", found:
         measured = analysis.labels is not None and analysis.labels.novel is not None
         sure = f", score {event.score:.2f}"
         sure += event.novelty or (", in distribution" if measured else "")
-    if isinstance(event, Finding) and event.evidence.db is not None:
+    if isinstance(event, Finding) and event.evidence.over_db is not None:
         sure += f", {event.evidence}"
     when = f"{interval(event.start, event.stop)}{found}{sure}"
     return f"{bold}{spoken(event.label)}{bold}, {when}{where and f': {where}'}"
@@ -192,12 +192,12 @@ def row(event: Finding, beside: Beside | None, runs: str = "") -> tuple[str, ...
     by = event.evidence
     _, joints, band = words(event.localisation) if event.localisation else ("", "", "")
     over = "by the general model" if beside is not None and not by.excused else ""
-    if by.db is not None and not by.excused:
+    if by.over_db is not None and not by.excused:
         several = beside is not None and beside.repetitions and by.kind == "repetitions"
         of = counted(beside.repetitions, "repetition") if beside and several else by.kind
-        over = f"{by.db:+.0f} dB over {of}"
-        joints = joints or by.joint
-        band = band or (f"{by.octave[0]:.0f}-{by.octave[1]:.0f} Hz" if by.octave else "")
+        over = f"{by.over_db:+.0f} dB over {of}"
+        joints = joints or by.joint or ""
+        band = band or (f"{by.band_hz[0]:.0f}-{by.band_hz[1]:.0f} Hz" if by.band_hz else "")
     order, ruled = str(event.order or ""), event.became and f"({event.became})"
     rest = _listed(event.novelty.removeprefix(", "), order, over, runs, ruled)
     return f"{event.start:6.2f} - {event.stop:6.2f} s", event.label, joints, band, rest
@@ -278,9 +278,9 @@ def folded(
         run, event = of(item)
         for group in groups:
             path, other = of(group[0])
-            joint = event.evidence.joint == other.evidence.joint and event.evidence.joint != ""
+            joint = event.evidence.joint
             near = abs(event.start - other.start) <= TOGETHER
-            same = event.label == other.label or joint
+            same = event.label == other.label or joint == other.evidence.joint is not None
             if same and near and run != path and event.became == other.became:
                 group.append(item)
                 break
@@ -291,7 +291,8 @@ def folded(
         (label, _), *_ = Counter(of(each)[1].label for each in group).most_common(1)
         named = [each for each in group if of(each)[1].label == label]
         number = len({of(each)[0] for each in group})
-        worst = max(named, key=lambda each: (of(each)[1].evidence.db or 0.0, of(each)[1].score))
+        ranks = [(of(each)[1].evidence.over_db or 0.0, of(each)[1].score) for each in named]
+        worst = named[ranks.index(max(ranks))]
         result.append((worst, f"{number} of {counted(runs, 'run')}" if runs > 1 else ""))
     return result
 

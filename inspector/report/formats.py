@@ -534,7 +534,7 @@ def _told(of: diff.Row) -> list[str]:
     """What is new in a scenario, a line each; without levels there, what became of it first."""
     found = [*_folded(of, NEW), *_folded(of, LOUDER)]
     worse = of.outcome is diff.Outcome.WORSE
-    if worse and any(each.event.evidence.db is not None for each in of.new):
+    if worse and any(each.event.evidence.over_db is not None for each in of.new):
         return found
     return [of.reason, *(str(each) for each in of.changes[:1] if worse), *found]
 
@@ -609,8 +609,8 @@ def _finding_as_dict(each: diff.ChangedFinding) -> dict[str, Any]:
         "label": each.event.label,
         "start": round(each.event.start, 6),
         "stop": round(each.event.stop, 6),
-        "level_db": each.event.evidence.level,
-        "change_db": each.event.evidence.db,
+        "level_db": each.event.evidence.level_db,
+        "change_db": each.event.evidence.over_db,
     }
 
 
