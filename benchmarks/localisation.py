@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import noisemodel as nm
-from inspector.localisation.localise import fault_links, localise
+from inspector.localisation import fault_links, localise
 from noiseclassifier.scenarios import ROBOTS, ScenarioError, SimulationError, simulate
 from noisemodel.noise import LinkNoise, link_noise
 

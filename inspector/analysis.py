@@ -15,8 +15,7 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector.audit.audit import Audit, audit, shortcomings, summary
-from inspector.audit.signals import without_placeholder
+from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.errors import IGNORED, InspectorError, Status, Unknown
 from inspector.levels import FLOOR_DB, STEP, velocity_levels
 from inspector.library import (
@@ -26,9 +25,10 @@ from inspector.library import (
     label_run,
     load_library,
 )
-from inspector.localisation.localise import extent
+from inspector.localisation import extent
 from inspector.logs.clocks import without_hold
 from inspector.logs.read import Opened, open_run
+from inspector.signals import without_placeholder
 from noiseclassifier import Event
 from noiseclassifier.lasting import joined
 from noisemodel import Block, Run
@@ -40,8 +40,8 @@ from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
-    from inspector.localisation.order import Order
-    from inspector.localisation.stage import Localisation
+    from inspector.order import Order
+    from inspector.stage import Localisation
     from noisemodel.noise import LinkNoise
 
 
@@ -89,7 +89,7 @@ class Analysis:
     @cached_property
     def localisations(self) -> "dict[Event | nm.Block, Localisation]":
         """The localisation of each finding, and of each annotated failure."""
-        from inspector.localisation.localise import localise
+        from inspector.localisation import localise
 
         frame = 0.0 if self.labels is None else float(self.labels.stop[0] - self.labels.start[0])
         found = localise(self.run, self.spans, frame=frame)
@@ -100,7 +100,7 @@ class Analysis:
     @cached_property
     def orders(self) -> "dict[Event, Order]":
         """Findings whose vibration goes with the speed of a joint."""
-        from inspector.localisation.order import order
+        from inspector.order import order
 
         found = ((event, order(self.run, event)) for event in self.findings)
         return {event: known for event, known in found if known is not None}

@@ -25,7 +25,7 @@ import numpy as np
 
 import noiseclassifier as nc
 from inspector.text import progress
-from inspector.training.train import ANY_RATE, evaluate, train
+from inspector.training import ANY_RATE, evaluate, train
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
 from noiseclassifier.scenarios.dataset import Folder, Side, Task, scenario_tasks, wide_tasks

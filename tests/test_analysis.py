@@ -29,14 +29,14 @@ from inspector.analysis import (
     worst,
     write_csv,
 )
-from inspector.audit.audit import audit
-from inspector.audit.signals import without_placeholder
+from inspector.audit import audit
 from inspector.errors import InspectorError, Status, Unknown
 from inspector.levels import STEP
 from inspector.library import demo_run, load_library, model_files
 from inspector.report import findings, html
 from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
+from inspector.signals import without_placeholder
 from inspector.verdict import Verdict, classify_file, exit_status, work_of
 from noiseclassifier import Event, Labels
 from noisemodel import Block, NoiseModelError, Robot, Run

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, savgol_filter, sosfilt
 
-from inspector.audit.signals import (
+from inspector.logs.clocks import hold_length
+from inspector.signals import (
     CENTRAL,
     ENCODER_NOISE,
     SMOOTH,
@@ -13,7 +14,6 @@ from inspector.audit.signals import (
     spectrum,
     step_of,
 )
-from inspector.logs.clocks import hold_length
 from noisemodel import Run
 
 RATES = [200.0, 1000.0, 10_000.0]

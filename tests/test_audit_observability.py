@@ -4,7 +4,7 @@ from generalmodel import fixed
 from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.audit.audit import (
+from inspector.audit import (
     OSCILLATIONS,
     Observability,
     audit,

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.audit.audit import audit, excerpt
-from inspector.audit.signals import copies, unit_warnings
+from inspector.audit import audit, excerpt
+from inspector.signals import copies, unit_warnings
 
 
 def warnings(velocity, position=None, rate=1000.0):

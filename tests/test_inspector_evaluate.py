@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-from inspector.training import train
+from inspector import training
 from noiseclassifier.recording import group_of
 
 
@@ -110,7 +110,7 @@ def test_findings_are_those_that_classify_reports(folder, tmp_path):
     from inspector.library import load_library
 
     path = simulated(tmp_path / "fast.npz", 30, robot="panda")
-    report = train.evaluate(folder / "model.npz", [path])
+    report = training.evaluate(folder / "model.npz", [path])
     (outcome,) = report.protocol.outcomes
     expected = analyse(path, load_library([folder / "model.npz"]))
     assert outcome.run.findings == expected.findings
@@ -133,7 +133,7 @@ def test_the_first_motion_after_standing_is_no_false_alarm_of_a_file(tmp_path):
     signals = signals_of(walk)
     model = load_library()["general"].at(1000.0, signals)
     assert model.classify(signals, 1000.0).events()
-    report = train.evaluate(Path(__file__).parents[1] / "models/general.npz", [tmp_path])
+    report = training.evaluate(Path(__file__).parents[1] / "models/general.npz", [tmp_path])
     assert report.protocol.counts["false_alarms"] == 0
 
 
@@ -156,7 +156,7 @@ def test_runs_of_one_name_in_two_folders_are_told_apart(folder, tmp_path):
         simulated(tmp_path / place / "run.npz", 50 + number)
         simulated(tmp_path / place / "panda" / "soft-007.npz", 60 + number, robot="panda")
     inputs = tmp_path / "one", tmp_path / "two"
-    report = train.evaluate(folder / "model.npz", inputs)
+    report = training.evaluate(folder / "model.npz", inputs)
     names = [outcome.run.name for outcome in report.protocol.outcomes]
     assert names == ["panda/soft-007", "run", "panda/two/soft-007", "run (two)"]
     assert [group_of(name) for name in names] == ["panda-007", "run", "panda-007", "run (two)"]
@@ -168,7 +168,7 @@ def test_a_run_with_injected_faults_needs_no_blocks(folder, tmp_path):
     with np.load(path) as archive:
         arrays = {name: archive[name] for name in archive.files if "block" not in name}
     np.savez(path, **arrays)
-    report = train.evaluate(folder / "model.npz", [path, folder / "test"])
+    report = training.evaluate(folder / "model.npz", [path, folder / "test"])
     first = report.protocol.outcomes[0]
     assert (first.found.tolist(), first.faults[0].felt) == ([True], False)
     assert first.counts["ok_hours"] == 0.0

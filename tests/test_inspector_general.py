@@ -10,12 +10,12 @@ from scipy.signal import butter, sosfilt
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import analyse
-from inspector.audit.audit import Observability, audit
+from inspector.audit import Observability, audit
 from inspector.errors import Status
 from inspector.library import CannotTellError, label_run, signals_of
 from inspector.logs.clocks import without_hold
 from inspector.report.findings import report
-from inspector.training.train import classified
+from inspector.training import classified
 
 
 def library():

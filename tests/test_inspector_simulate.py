@@ -9,7 +9,7 @@ import pytest
 from commandline import call as inspector
 from simulated import nothing, stub
 
-from inspector.training.train import classified
+from inspector.training import classified
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios.dataset import Task
 from noisemodel import Run, decimated

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from inspector.localisation.localise import extent
+from inspector.localisation import extent
 from noisemodel import Run
 
 START, STOP = 2.0, 3.2

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from inspector.analysis import Analysis
-from inspector.audit.audit import audit
+from inspector.audit import audit
 from inspector.errors import Status
-from inspector.localisation.order import Order, best_lines, order
+from inspector.order import Order, best_lines, order
 from inspector.report.findings import report, sentence
 from inspector.report.formats import FORMATS, as_json, text
 from inspector.report.picture import picture

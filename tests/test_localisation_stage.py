@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from inspector.localisation.stage import (
+from inspector.stage import (
     Localisation,
     first_stage,
     onset,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from inspector import verdict
+from inspector import tune, verdict
 from inspector.errors import InspectorError
 from inspector.export.labels import read_labels
 from inspector.live import LiveError, LiveSession
@@ -17,7 +17,6 @@ from inspector.logs.names import column_signal, time_column
 from inspector.logs.read import read_log
 from inspector.reference import store
 from inspector.text import counted, natural, plain, toml_shown
-from inspector.training import tune
 from noiseclassifier import jsontext, noisytest
 from noiseclassifier.scenarios import DatasetError
 from noiseclassifier.scenarios.dataset import Folder

@@ -22,7 +22,7 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector import verdict
+from inspector import tune, verdict
 from inspector.analysis import analyse
 from inspector.errors import InspectorError
 from inspector.export.labels import read_labels
@@ -43,7 +43,6 @@ from inspector.logs.read import listing, read_logs
 from inspector.reference.judging import Expected
 from inspector.reference.levels import levels
 from inspector.reference.store import Reference, of_runs, save
-from inspector.training import tune
 from noiseclassifier import noisytest
 from noiseclassifier.scenarios import ScenarioError
 from noiseclassifier.scenarios.dataset import Folder

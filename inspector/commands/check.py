@@ -311,7 +311,7 @@ def audit(
     Exit status: 0 every log can show a failure class, 2 wrong usage, 3 bad input, 4 cannot tell: a
     log can show no failure class.
     """
-    from inspector.audit import audit as audits
+    from inspector import audit as audits
 
     found, failed, assumed, others = audits.audit_all(logs, load_library(model), ctx.obj)
     if others:

@@ -19,7 +19,7 @@ from inspector.analysis import (
     noise_level,
     write_csv,
 )
-from inspector.audit.audit import text
+from inspector.audit import text
 from inspector.commands import shared
 from inspector.commands.shared import argument, opened, option
 from inspector.errors import EXIT, InspectorError, Status

@@ -6,11 +6,11 @@ from typing import Annotated, Literal
 
 import typer
 
+from inspector import training
+from inspector import tune as tuning
 from inspector.commands import shared
 from inspector.commands.shared import argument, option
 from inspector.library import model_files
-from inspector.training import train as training
-from inspector.training import tune as tuning
 from noiseclassifier.assessment import table
 
 

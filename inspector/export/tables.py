@@ -22,7 +22,7 @@ import numpy as np
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import Analysis, analyse, estimate, robot_known
-from inspector.audit.audit import summary
+from inspector.audit import summary
 from inspector.errors import InspectorError, OptionError
 from inspector.library import Library
 from inspector.text import cell, counted

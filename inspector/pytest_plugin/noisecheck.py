@@ -17,7 +17,6 @@ from typing import TypeAlias
 import pytest
 
 from inspector.analysis import Analysis, analyse, with_links
-from inspector.audit.signals import without_placeholder
 from inspector.errors import Status
 from inspector.library import Library, load_library
 from inspector.reference import store
@@ -26,6 +25,7 @@ from inspector.reference.levels import Levels, levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, classes_found, judge
 from inspector.report.findings import told
+from inspector.signals import without_placeholder
 from inspector.text import counted
 from inspector.verdict import EXPECTED, Finding, Verdict
 from noiseclassifier import Event

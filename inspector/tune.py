@@ -19,7 +19,7 @@ from typing import Any, NoReturn
 import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.text import progress
-from inspector.training.train import LeftOut, classified, profile_at
+from inspector.training import LeftOut, classified, profile_at
 from inspector.verdict import resumed
 from noiseclassifier.jsontext import from_json
 from noiseclassifier.modelfile import versions
@@ -62,7 +62,7 @@ class Search:
     validation: Sequence[Path] = ()  # without any, the training set is folded
     part: str = "all"  # of all these recordings
     folds: int = 5
-    profile: str = "noisytest-rbf"  # one of ``inspector.training.train.PROFILES``
+    profile: str = "noisytest-rbf"  # one of ``inspector.training.PROFILES``
     rate: float = 10_000.0  # of the model, in [Hz], to which faster runs are decimated
     grid: Sequence[str] = ("paper",)  # texts that `Grid.of` reads
 

@@ -14,7 +14,7 @@ of waves (Maeda 1985), and of a change of variance in general (Inclan & Tiao 199
 counts. Samples of a vibration are not independent: a time of `INDEPENDENT` counts as one sample.
 The mean of the log likelihoods of two powers is taken: of the tracking error (of the motion,
 if no velocity is desired) above 10 Hz, and of the sudden changes of the motion, as
-`inspector.localisation.stage` has them. Both filters are causal, so that nothing rises before
+`inspector.stage` has them. Both filters are causal, so that nothing rises before
 it happens.
 
 The frame before the first was not labelled, so that the failure sets in during the first frame's
@@ -33,7 +33,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from inspector.localisation.stage import (
+from inspector.stage import (
     Localisation,
     first_stage,
     quiet_statistics,

@@ -8,11 +8,11 @@ from pathlib import Path
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import extents
-from inspector.audit.signals import without_placeholder
 from inspector.errors import InspectorError, OptionError
 from inspector.library import lines
 from inspector.logs.clocks import without_hold
 from inspector.logs.plausibility import check_joints
+from inspector.signals import without_placeholder
 from inspector.text import progress
 from noiseclassifier import Assessment
 from noiseclassifier.profile import HIGHEST, LOWEST, NOMINAL

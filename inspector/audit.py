@@ -27,12 +27,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import noiseclassifier as nc
-from inspector.audit.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library, nearest, signal_names
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.plausibility import check_joints, limit_warnings
 from inspector.logs.read import Reading, left_out, open_source, sources
+from inspector.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.text import counted, plain
 from noiseclassifier import Profile
 from noiseclassifier.profile import FEWEST, HIGHEST, LOWEST

@@ -1,1 +1,0 @@
-"""What a log can show: rates, quantisation, bands, copies."""

@@ -1,1 +1,0 @@
-"""Training, evaluation and tuning of models on files."""
