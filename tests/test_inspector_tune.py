@@ -6,7 +6,7 @@ import pytest
 import workers
 from commandline import call
 
-import inspector.tune
+import inspector.training
 import noiseclassifier as nc
 from noisemodel import parallel
 
@@ -77,7 +77,7 @@ def counted(monkeypatch):
         points.extend(profiles)
         return nc.tuning.measure(profiles, trial)
 
-    monkeypatch.setattr(inspector.tune, "measure", measure)
+    monkeypatch.setattr(inspector.training, "measure", measure)
     return points
 
 
@@ -152,7 +152,7 @@ def test_two_jobs_give_the_same_results(data, whole, tmp_path):
 def test_a_point_that_kills_its_worker_is_named_and_the_search_resumes(
     data, whole, tmp_path, monkeypatch
 ):
-    output, measure = tmp_path / "tuned.jsonl", inspector.tune.measure
+    output, measure = tmp_path / "tuned.jsonl", inspector.training.measure
 
     def die(profiles, trial):
         if profiles[0].stride == 50:
@@ -160,7 +160,7 @@ def test_a_point_that_kills_its_worker_is_named_and_the_search_resumes(
         return measure(profiles, trial)
 
     with monkeypatch.context() as patch:
-        patch.setattr(inspector.tune, "measure", die)
+        patch.setattr(inspector.training, "measure", die)
         workers.simulate(patch)
         status, _, err = tune(data, output, "-j", 2)
     assert status == 3

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from inspector import tune, verdict
+from inspector import training, verdict
 from inspector.errors import InspectorError
 from inspector.export.labels import read_labels
 from inspector.live import LiveError, LiveSession
@@ -32,7 +32,7 @@ def read_state(path):
 
 
 def read_tuning(path):
-    with tune.opened(path, {}, [{"C": 1.0}]):
+    with training.opened(path, {}, [{"C": 1.0}]):
         pass
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector import tune, verdict
+from inspector import training, verdict
 from inspector.analysis import analyse
 from inspector.errors import InspectorError
 from inspector.export.labels import read_labels
@@ -452,7 +452,7 @@ def _read_resume(path: Path) -> None:
 
 
 def _read_tuning(path: Path) -> None:
-    with tune.opened(path, _header(path), [{"regularization": 1.0}, {"regularization": 10.0}]):
+    with training.opened(path, _header(path), [{"regularization": 1.0}, {"regularization": 10.0}]):
         pass
 
 

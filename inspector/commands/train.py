@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from inspector import training
-from inspector import tune as tuning
+from inspector import training as learning
 from inspector.commands import shared
 from inspector.commands.shared import argument, option
 from inspector.library import model_files
@@ -35,7 +34,7 @@ def train(
     overwrite: shared.Overwrite = False,
 ) -> None:
     """Train a model on annotated runs."""
-    measures, left_out = training.train(
+    measures, left_out = learning.train(
         inputs, profile, rate, output, part=part, overwrite=overwrite
     )
     typer.echo(f"{measures}\n{left_out}")
@@ -83,7 +82,7 @@ def tune(
     """Tune a profile's settings by grid search; resumes if killed."""
     if validation and folds:
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
-    search = tuning.Search(
+    search = learning.Search(
         training=training,
         validation=validation or (),
         part=part,
@@ -93,7 +92,7 @@ def tune(
         grid=grid or ("paper",),
     )
     where = shared.jobs_or_dask(jobs, dask)
-    tuned = tuning.tune(search, output, model=train, jobs=where, overwrite=overwrite)
+    tuned = learning.tune(search, output, model=train, jobs=where, overwrite=overwrite)
     typer.echo(dumps(tuned.as_dict(), indent=2) if as_json else tuned.table())
     if train:
         tuned.train(train, overwrite=overwrite)
@@ -116,7 +115,7 @@ def evaluate(
 ) -> None:
     """Evaluate a model on annotated runs that it was not trained on."""
     (file,) = model_files([model])
-    report = training.evaluate(file, inputs, part=part, seen_too=seen_too)
+    report = learning.evaluate(file, inputs, part=part, seen_too=seen_too)
     document = {"model": file.name, **report.as_dict()}
     shown = dumps(document, indent=1, allow_nan=False) if as_json else table(report, by or "")
     typer.echo(shown)
