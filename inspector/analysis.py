@@ -40,8 +40,8 @@ from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
+    from inspector.localisation import Localisation
     from inspector.order import Order
-    from inspector.stage import Localisation
     from noisemodel.noise import LinkNoise
 
 

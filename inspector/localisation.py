@@ -1,54 +1,25 @@
-"""Localisation of failures: stage of the control flow, joints, frequency band, links.
-
-Onset and end of a finding: change points of its power in its first and its last frame.
-
-A classifier labels frames (0.4 s, every 0.1 s). A finding begins with its first frame, most of
-which the failure has not reached yet. The onset is the time t in the first frame that splits the
-power into two levels best. For n samples of mean power p, of which n1 before t have p1 and n2
-after it p2, the log likelihood of two levels exceeds the one of a single level by
-
-    (n log p - n1 log p1 - n2 log p2) / 2
-
-if samples are independent and normal. This is the criterion by which seismologists pick the onset
-of waves (Maeda 1985), and of a change of variance in general (Inclan & Tiao 1994). Only a rise
-counts. Samples of a vibration are not independent: a time of `INDEPENDENT` counts as one sample.
-The mean of the log likelihoods of two powers is taken: of the tracking error (of the motion,
-if no velocity is desired) above 10 Hz, and of the sudden changes of the motion, as
-`inspector.stage` has them. Both filters are causal, so that nothing rises before
-it happens.
-
-The frame before the first was not labelled, so that the failure sets in during the first frame's
-last hop. This is the prior: a normal distribution with `ONSET` and `DEVIATION`. Its mean is the
-result where nothing stands out. Where no frame fits in before the first one, because the run
-begins or a gap ends there, the mean is the frame's start, and the deviation a frame's.
-
-The end is the onset of the same stretch reversed in time, with the prior `END`.
-
-Neither likelihood nor prior depends on scale. A scalar noise is a run of one joint.
-"""
+"""Where a finding comes from: onset and end, stage of the control flow, joints, band and links."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
-from inspector.stage import (
-    Localisation,
-    first_stage,
-    quiet_statistics,
-    quiet_stretches,
-    sudden,
-)
 from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.noise import FAST, LinkNoise, in_both
 from noisemodel.types import Array, Indices, Mask, Real
 
-BIN = 0.001  # time over which power is taken, in [s], or one sample if that is longer
+Failure: TypeAlias = Event | Block  # a finding, or an annotated block
+
+
+# --- onset and end
+
+FINE = 0.001  # time over which power is taken, in [s], or one sample if that is longer
 # Time of the past mean that is subtracted, twice, in [s]: what is slower than 10 Hz is motion.
 PAST = 0.05
-WARM = 0.02  # time after the start of the run or the end of a gap whose power is not used, in [s]
+SETTLED = 0.02  # time after a start or the end of a gap whose power is not used, in [s]
 SHORTEST_LEVEL = 0.005  # shortest time that has a level, in [s]
 BEYOND = 0.05  # time after the first frame that counts towards the level after an onset, in [s]
 INDEPENDENT = 0.02  # time that counts as one independent sample, in [s]
@@ -63,7 +34,29 @@ LEAST = 1e-6
 def extent(
     run: Run, start: float, stop: float, *, frame: float = 0.4, hop: float = 0.1
 ) -> tuple[float, float]:
-    """Estimate when a finding sets in and when it ends.
+    """Estimate when a finding sets in and when it ends: change points of its power.
+
+    A classifier labels frames (0.4 s, every 0.1 s). A finding begins with its first frame, most of
+    which the failure has not reached yet. The onset is the time t in the first frame that splits
+    the power into two levels best. For n samples of mean power p, of which n1 before t have p1 and
+    n2 after it p2, the log likelihood of two levels exceeds the one of a single level by
+
+        (n log p - n1 log p1 - n2 log p2) / 2
+
+    if samples are independent and normal. This is the criterion by which seismologists pick the
+    onset of waves (Maeda 1985), and of a change of variance in general (Inclan & Tiao 1994). Only a
+    rise counts. Samples of a vibration are not independent: a time of `INDEPENDENT` counts as one.
+    The mean of the log likelihoods of two powers is taken: of the tracking error (of the motion, if
+    no velocity is desired) above 10 Hz, and of the `sudden` changes of the motion. Both filters are
+    causal, so that nothing rises before it happens.
+
+    The frame before the first was not labelled, so that the failure sets in during the first
+    frame's last hop. This is the prior: a normal distribution with `ONSET` and `DEVIATION`. Its
+    mean is the result where nothing stands out. Where no frame fits in before the first one,
+    because the run begins or a gap ends there, the mean is the frame's start, and the deviation a
+    frame's. The end is the onset of the same stretch reversed in time, with the prior `END`.
+
+    Neither likelihood nor prior depends on scale. A scalar noise is a run of one joint.
 
     Args:
         run: The run, or a scalar noise as a run of one joint; desired velocities are optional.
@@ -98,7 +91,7 @@ def _rise(
     backwards: bool = False,
 ) -> float:
     """Time from an outer edge of a finding to the rise of its power, up to ``room``, in [s]."""
-    samples, size = len(run.time), max(1, round(BIN * run.rate))
+    samples, size = len(run.time), max(1, round(FINE * run.rate))
     step = size / run.rate
     at = round((edge - float(run.time[0])) * run.rate)
     at = samples - at if backwards else at
@@ -117,11 +110,11 @@ def _rise(
     return float(offset[np.argmax(score)])
 
 
-def _powers(run: Run, first: int, bins: int, size: int, *, backwards: bool) -> tuple[Array, Mask]:
+def _powers(run: Run, start: int, bins: int, size: int, *, backwards: bool) -> tuple[Array, Mask]:
     """Power of error and sudden changes, shape (bins, 2), and where they can be used."""
-    part = slice(first, first + bins * size)
+    part = slice(start, start + bins * size)
     if backwards:
-        part = slice(len(run.time) - part.stop, len(run.time) - first)
+        part = slice(len(run.time) - part.stop, len(run.time) - start)
     order = slice(None, None, -1) if backwards else slice(None)
     velocity = motion = error = run.velocity[part][order]
     if run.base_velocity is not None:
@@ -135,21 +128,15 @@ def _powers(run: Run, first: int, bins: int, size: int, *, backwards: bool) -> t
     last = np.arange(1, bins + 1)
     begin = np.maximum.accumulate(np.where(valid, 0, last))  # of the stretch without a gap
     middle = error.mean(axis=1, dtype=np.float64)
-    # What is left of a steady acceleration is constant: the second time removes that.
-    fast = _high_passed(_high_passed(middle, begin, rate), begin, rate)
+    fast, first = middle, np.maximum(begin, last - round(PAST * rate))
+    for _ in range(2):  # what is left of a steady acceleration is constant: the second removes that
+        sums = np.concatenate((np.zeros((1, fast.shape[1])), np.cumsum(fast, axis=0)))
+        fast = fast - (sums[1:] - sums[first]) / np.maximum(last - first, 1)[:, None]
     within = error.var(axis=1, dtype=np.float64) if size > 1 else np.zeros_like(middle)
     changes = sudden(motion.mean(axis=1, dtype=np.float64), valid, rate)
-    known = valid & (last - begin > round(WARM * rate))
+    known = valid & (last - begin > round(SETTLED * rate))
     power = ((np.square(fast) + within).sum(axis=1), np.square(changes).sum(axis=1))
     return np.stack(power, axis=1), known
-
-
-def _high_passed(signal: Array, begin: Indices, rate: float) -> Array:
-    """Signal of shape (bins, joints), less its mean over the past, which ``begin`` limits."""
-    last = np.arange(1, len(signal) + 1)
-    first = np.maximum(begin, last - round(PAST * rate))
-    sums = np.concatenate((np.zeros((1, signal.shape[1])), np.cumsum(signal, axis=0)))
-    return np.asarray(signal - (sums[1:] - sums[first]) / np.maximum(last - first, 1)[:, None])
 
 
 def _gain(power: Array, known: Mask, shortest: int) -> Array:
@@ -166,48 +153,401 @@ def _gain(power: Array, known: Mask, shortest: int) -> Array:
     return np.asarray(np.where(enough & (high > low), gain, 0.0).mean(axis=1))
 
 
-ANNOTATED = 0.1  # how long after the start of an annotation its failure may set in, in [s]
+# --- stage and joints
+
+MOST = 16  # most stretches that are picked; a long run is not read whole
 
 
-def localise(
-    run: Run, found: Sequence[Event], *, frame: float = 0.0
-) -> dict[Event | Block, Localisation]:
-    """Localise each failure of a run.
+def quiet_stretches(
+    run: Run, failures: Sequence[Failure], *, length: float, most: int = MOST
+) -> list[slice]:
+    """Pick stretches without failures or gaps, spread evenly over a run.
 
     Args:
-        frame: Duration of the frames that they consist of, in [s]: a finding may set in at any
-            time of its first.
+        length: Length of a stretch, in [s].
     """
-    annotated = [block for block in run.blocks if block.label != "ok"]
-    failures: list[Event | Block] = [*found, *annotated]
-    if not failures:
-        return {}
-    quiet = quiet_statistics(run, failures) if has_stages(run) else None
-    localised = {}
+    size = max(1, round(length * run.rate))
+    free = run.mask.copy()
     for failure in failures:
-        reach = max(ANNOTATED, frame) if failure in found else ANNOTATED
-        stage = Localisation() if quiet is None else first_stage(run, quiet, failure, reach=reach)
-        localised[failure] = replace(stage, band=band(run, failure, failures))
-    return localised
+        first, last = np.searchsorted(run.time, (failure.start, failure.stop))
+        free[first:last] = False
+    count = len(free) // size
+    starts = size * np.flatnonzero(free[: count * size].reshape(count, size).all(axis=1))
+    if len(starts) > most:
+        starts = starts[np.linspace(0, len(starts) - 1, most).astype(int)]
+    return [slice(start, start + size) for start in starts.tolist()]
 
 
-def has_stages(run: Run) -> bool:
-    """Whether a run has a stage to compare the measured motion with."""
-    return bool(run.stages) or run.velocity_desired is not None
+DESIRED, MEASURED = "desired", "measured"
 
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """The velocities of a stretch of a run at each stage of the control flow."""
+
+    # Of the stages: those that the run names, in its order, then desired and measured.
+    names: tuple[str, ...]
+    joints: tuple[str, ...]
+    velocity: Array  # shape (stages, samples, joints), in [rad/s] or [m/s]
+    time: Array  # shape (samples,), in [s]
+    valid: Mask  # False in gaps, shape (samples,)
+    rate: float  # samples per second, in [Hz]
+
+
+def flow(run: Run, part: slice) -> Flow:
+    """Gather the stages of a run, for the joints that all of them have."""
+    own = list(range(len(run.joint_names)))
+    stages = [(name, signal, own) for name, signal in run.stages.items()]
+    joints = own
+    if run.velocity_desired is not None:
+        places = {name: index for index, name in enumerate(run.desired_joint_names)}
+        joints = [index for index in own if run.joint_names[index] in places]
+        wanted = [places[run.joint_names[index]] for index in joints]
+        stages.append((DESIRED, run.velocity_desired, wanted))
+    stages.append((MEASURED, run.velocity, own))
+    return Flow(
+        names=tuple(name for name, _, _ in stages),
+        joints=tuple(run.joint_names[index] for index in joints),
+        velocity=np.array(
+            [
+                signal[part][:, columns if name == DESIRED else joints]
+                for name, signal, columns in stages
+            ],
+            dtype=np.float64,
+        ),
+        time=run.time[part],
+        valid=run.mask[part],
+        rate=run.rate,
+    )
+
+
+SPAN = 0.001  # time over which a velocity's change is taken, in [s]
+TRAIL = 0.02  # time of the mean that is subtracted from changes, in [s]
+# Lags of the prediction, in [s].
+LAGS = (0.0, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.006, 0.008, 0.012)
+LENGTH = 0.1  # length of a quiet stretch, in [s]
+WARM = TRAIL + LAGS[-1] + SPAN  # transient of filters and prediction, in [s]
+PARTS = 16  # most quiet stretches that the prediction is fitted to
+ROWS = 3000  # most samples of the least squares
+RIDGE = 1e-3  # regularisation of the least squares, as a share of the mean power
+
+
+@dataclass(frozen=True, eq=False)
+class Innovation:
+    """Innovation of a stretch of a run."""
+
+    change: Array  # sudden changes, shape (stages, samples, joints), in [rad/s²]
+    residual: Array  # their prediction residual, of the same shape
+    total: Array  # norm of the changes over the joints, shape (stages, samples), in [rad/s²]
+    # Norm of the residual, but no more than ``total``, shape (stages, samples), in [rad/s²]: a
+    # change that was predicted and does not occur is no innovation.
+    level: Array
+
+
+@dataclass(frozen=True, eq=False)
+class QuietStatistics:
+    """Prediction and innovation of a run's stages in its quiet stretches."""
+
+    # Of the linear prediction of each stage but the first, shape (stages - 1, joints, lags).
+    weights: Array
+    lags: Indices  # of the prediction, in samples
+    # 90th percentile over the stretches of the innovation's mean square, shape (stages,), in
+    # [rad²/s⁴].
+    power: Array
+    peak: Array  # 90th percentile of its peak, shape (stages,), in [rad/s²]
+
+
+def quiet_statistics(run: Run, failures: Sequence[Failure]) -> QuietStatistics:
+    """Fit the prediction to the quiet stretches of a run, and measure its residual there."""
+    parts = quiet_stretches(run, failures, length=LENGTH + WARM, most=PARTS)
+    stretches = [flow(run, part) for part in parts]
+    first = stretches[0] if stretches else flow(run, slice(0, 1))
+    stages, _, joints = first.velocity.shape
+    lags = np.unique(np.round(np.array(LAGS) * run.rate).astype(np.int64))
+    zeros = np.zeros(stages)
+    if not stretches:
+        return QuietStatistics(np.zeros((stages - 1, joints, len(lags))), lags, zeros, zeros)
+    velocity = np.stack([each.velocity for each in stretches])
+    size = velocity.shape[2]
+    warm = min(max(1, round(WARM * run.rate)), size - 1)
+    change = sudden(velocity, first.valid, run.rate)
+    step = max(1, (size - warm) * len(change) // ROWS)
+    # By stage, joint, stretch and sample, and then with all samples in a row.
+    moved = np.ascontiguousarray(change.transpose(1, 3, 0, 2))
+    target = moved[1:, ..., warm::step].reshape(stages - 1, joints, -1)
+    past = np.stack(
+        [moved[:-1, ..., warm - lag : size - lag : step] for lag in lags.tolist()], axis=2
+    ).reshape(stages - 1, joints, len(lags), -1)
+    square = past @ past.swapaxes(2, 3)
+    mean = np.trace(square, axis1=2, axis2=3)[..., None, None] / len(lags)
+    square = square + (RIDGE * mean + np.finfo(float).tiny) * np.eye(len(lags))
+    weights = np.linalg.solve(square, past @ target[..., None])[..., 0]
+    level = _innovation(change, weights, lags, first.valid).level[..., warm:]
+    return QuietStatistics(  # over stretches; levels have the shape (stretches, stages, samples)
+        weights,
+        lags,
+        power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
+        peak=np.percentile(level.max(axis=2), 90.0, axis=0),
+    )
+
+
+def _innovation(change: Array, weights: Array, lags: Indices, valid: Mask) -> Innovation:
+    """Innovation of changes of shape (..., stages, samples, joints), by their prediction."""
+    residual = change.copy()
+    for place, own in enumerate(weights):
+        for column, lag in enumerate(lags.tolist()):
+            past = change[..., place, : change.shape[-2] - lag, :]
+            residual[..., place + 1, lag:, :] -= own[:, column] * past
+    residual[..., ~valid, :] = 0.0
+    total, rest = np.linalg.norm(change, axis=-1), np.linalg.norm(residual, axis=-1)
+    return Innovation(change, residual, total, np.minimum(total, rest))
+
+
+def sudden(velocity: Array, valid: Mask, rate: float) -> Array:
+    """Change over 1 ms, less the mean of such changes over the past 20 ms: both are causal.
+
+    Args:
+        velocity: Shape (..., samples, joints), in [rad/s].
+        valid: False in gaps, shape (samples,).
+        rate: Samples per second, in [Hz].
+
+    Returns:
+        Of the same shape, in [rad/s²]; 0 next to gaps.
+    """
+    step = max(1, round(SPAN * rate))
+    trail = max(1, round(TRAIL * rate), 2 * step)
+    change = np.zeros_like(velocity)
+    together = valid[step:] & valid[:-step]
+    change[..., step:, :] = (velocity[..., step:, :] - velocity[..., :-step, :]) * rate / step
+    change[..., step:, :][..., ~together, :] = 0.0
+    sums = np.cumsum(change, axis=-2)
+    past = sums.copy()
+    past[..., trail:, :] -= sums[..., :-trail, :]
+    change -= past / np.minimum(np.arange(1, past.shape[-2] + 1), trail)[:, None]
+    change[..., ~valid, :] = 0.0
+    return change
+
+
+EARLY = 0.015  # how long before its start a failure may have set in, in [s]
+BEFORE, AFTER = 0.1 + WARM, 0.05  # time before and after a failure that is used, in [s]
+LONGEST = 1.0  # time of a failure that is used, in [s]
+BIN = 0.05  # time over which a vibration's power is taken, in [s]
+LOUD = 0.25  # share of the loudest bin's power from which a bin counts: -6 dB
+LASTING = 0.3  # loud time of a lasting vibration, in [s]
+# Least share of the innovation in a stage's changes; with less it passes on the stage before.
+PASSED_ON = 0.2
+EXCEEDS = 1.5  # factor by which the first stage's peak has to exceed that in quiet stretches
+RESPONSE = 0.003  # time within which the second stage else has to follow the first, in [s]
+ADDS = 0.25  # share of the largest excess power from which a stage counts as adding to a vibration
+MORE = 2.0  # factor by which the power of a stage that adds exceeds that in quiet stretches
+JOINTS = 3  # most joints that are named
+SPREAD = 0.005  # time after its onset in which a blow or jump has not spread over the robot, in [s]
+SLOWEST = 0.02  # longest lag between two stages that vibrate together, in [s]
+AHEAD, BACK = 0.01, 0.05  # times after and before a moment that are compared, in [s]
+# Times before and after the steepest rise in which the onsets of stages lie, in [s].
+AROUND = (0.02, 0.03)
+STEEP = 0.25  # least steepness of a rise, as a share of the steepest
+PEAK = 4.0  # least peak of a stage that shows a failure, in multiples of the level before
+CLEAR = 2.0  # level at the onset, in multiples of the level before
+SHARE = 0.2  # level at the onset, as a share of the peak
+
+
+@dataclass(frozen=True)
+class Localisation:
+    """Where a failure enters the control flow, and its frequencies."""
+
+    # First stage of the control flow in which it shows; empty if no stage shows it, or if the run
+    # has the measured one alone.
+    stage: str = ""
+    following: str = ""  # next stage in which it shows; empty if it is in no other
+    lag: float = 0.0  # time from the first of these stages to the next, in [s]
+    # Up to three joints and their shares of the innovation's power in that stage, the largest
+    # first.
+    joints: tuple[tuple[str, float], ...] = ()
+    # When a blow or jump sets in, in [s]; None of a vibration that lasts.
+    onset: float | None = None
+    # Lowest and highest frequency of its vibration, in [Hz]; None if it is not louder than quiet
+    # stretches.
+    band: tuple[float, float] | None = None
+
+
+def first_stage(
+    run: Run, quiet: QuietStatistics, failure: Failure, *, reach: float
+) -> Localisation:
+    """Find the stage in which a failure shows first.
+
+    There is no run without the failure to compare with; the innovation of each stage shows where it
+    enters. Two kinds of failures are distinguished:
+
+    - A *blow or jump* passes one stage after the other, so these are ordered by onset. It is looked
+      for where the innovation of a stage, relative to its peak in quiet stretches, first rises
+      steeply. The onset in a stage is the first time at which the innovation exceeds a fifth of its
+      peak and twice its level in the 50 ms before. A stage has no onset if that peak is less than
+      four times the level before, or less than a fifth of all changes there: it passes on what the
+      stage before it did. The first stage has no prediction, hence its peak also has to exceed 1.5
+      times that in quiet stretches, or the next stage has to follow within 3 ms. The earliest onset
+      wins; of simultaneous ones, the stage that a motion passes first.
+    - A *lasting vibration* has gone round the control loop many times, and its onset, such as the
+      touch that starts a limit cycle, is not its source. It lies in the first stage that adds to
+      it: whose innovation has at least a quarter of the largest excess power of any stage, and more
+      than twice the power in quiet stretches.
+
+    A failure lasts if its vibration is within 6 dB of its loudest 50 ms for 0.3 s in all, of the
+    first second. A failure without an onset is treated as if it lasted.
+
+    The *innovation* of a stage is its `sudden` changes less their linear prediction, by least
+    squares over quiet stretches of the same run, from the changes of the joint at the stage before,
+    now and up to 12 ms ago. The first stage has no prediction.
+
+    Args:
+        reach: How long after its start it may have set in, in [s].
+
+    Returns:
+        The stage, its lag to the next and its joints, without the band; empty if no stage shows
+        the failure.
+    """
+    stop = min(failure.stop, failure.start + LONGEST)
+    edges = (failure.start - BEFORE, max(stop, failure.start + reach) + AFTER)
+    first, last = (int(index) for index in np.searchsorted(run.time, edges))
+    stages = flow(run, slice(first, last))
+    start, end = (int(index) for index in np.searchsorted(stages.time, (failure.start, stop)))
+    if end <= start or not stages.valid[start:end].any():
+        return Localisation()
+    change = sudden(stages.velocity, stages.valid, stages.rate)
+    innovation = _innovation(change, quiet.weights, quiet.lags, stages.valid)
+    found, during = None, slice(start, end)
+    level, size = innovation.level[-1, during], max(1, round(BIN * run.rate))
+    power = np.add.reduceat(np.square(level), np.arange(0, len(level), size)) / size
+    loud = power > max(LOUD * power.max(), MORE * float(quiet.power[-1]))
+    if not loud.sum() * BIN >= LASTING:
+        edges = (failure.start - EARLY, failure.start + reach)
+        first, last = np.searchsorted(stages.time, edges).tolist()
+        found = _earliest(stages, innovation, quiet, first, last)
+    return found or _adding(stages, innovation, quiet, during) or Localisation()
+
+
+def _earliest(
+    stages: Flow, innovation: Innovation, quiet: QuietStatistics, first: int, last: int
+) -> Localisation | None:
+    """Order the stages by the onset of a blow or jump."""
+    rate, samples = stages.rate, len(stages.time)
+    # A stage without innovation in quiet stretches would exceed its peak at once.
+    scale = quiet.peak + PASSED_ON * (float(quiet.peak.max()) or 1.0)
+    relative = (innovation.level / scale[:, None]).max(axis=0)
+    moment = rise(relative, first, last, rate=rate)
+    early, late = (max(1, round(time * rate)) for time in AROUND)
+    around = slice(max(0, moment - early), min(samples, moment + late))
+    onsets = [
+        (onset(level, moment, around, rate=rate, least=PASSED_ON * float(peak)), place)
+        for place, (level, peak) in enumerate(
+            zip(innovation.level, innovation.total[:, around].max(axis=1), strict=True)
+        )
+    ]
+    found = sorted((at, place) for at, place in onsets if at is not None)
+    if found and found[0][1] == 0 and len(innovation.level) > 1:
+        common = float(innovation.level[0, around].max()) <= EXCEEDS * quiet.peak[0]
+        responses = [at for at, place in found if place == 1]
+        if common and not any(at - found[0][0] <= RESPONSE * rate for at in responses):
+            found = found[1:]
+    if not found:
+        return None
+    earliest, place = found[0]
+    at, other = next((later for later in found if later[0] > earliest), (earliest, None))
+    fresh = slice(earliest, earliest + max(1, round(SPREAD * rate)))
+    return Localisation(
+        stage=stages.names[place],
+        following="" if other is None else stages.names[other],
+        lag=(at - earliest) / rate,
+        joints=_joints(stages, innovation.residual[place, fresh]),
+        onset=float(stages.time[earliest]),
+    )
+
+
+def _adding(
+    stages: Flow, innovation: Innovation, quiet: QuietStatistics, during: slice
+) -> Localisation | None:
+    """Find the first stage that adds to a vibration."""
+    power = np.square(innovation.level[:, during]).mean(axis=1)
+    total = np.square(innovation.total[:, during]).mean(axis=1)
+    least = np.maximum(MORE * quiet.power, PASSED_ON**2 * total)
+    excess = np.where(power > least, power - quiet.power, 0.0)
+    if not excess.max() > 0.0:
+        return None
+    place = int(np.argmax(excess >= ADDS * excess.max()))
+    joints = _joints(stages, innovation.residual[place, during])
+    if place == len(excess) - 1:
+        return Localisation(stages.names[place], joints=joints)
+    cause, effect = innovation.change[place, during], innovation.change[-1, during]
+    # The lag, up to the slowest, at which one follows the other best, all joints together.
+    most = max(1, round(SLOWEST * stages.rate))
+    waves = [np.fft.rfft(signal, len(cause) + most, axis=0) for signal in (effect, cause)]
+    together = np.fft.irfft((waves[0] * waves[1].conj()).sum(axis=1), len(cause) + most)
+    lag = int(np.argmax(together[: most + 1])) / stages.rate
+    return Localisation(stages.names[place], stages.names[-1], lag, joints=joints)
+
+
+def _joints(stages: Flow, residual: Array) -> tuple[tuple[str, float], ...]:
+    """Joints of the largest residual, shape (samples, joints), and their shares of its power."""
+    power = np.square(residual).sum(axis=0)
+    shares = power / (power.sum() or 1.0)
+    ranked = np.argsort(-shares, kind="stable")[:JOINTS].tolist()
+    return tuple((stages.joints[i], float(shares[i])) for i in ranked if shares[i] > 0.0)
+
+
+def rise(level: Array, first: int, last: int, *, rate: float) -> int:
+    """Find where a level first rises: 10 ms against the 50 ms before, both as mean squares.
+
+    Args:
+        rate: Samples per second, in [Hz].
+    """
+    ahead, back = (max(1, round(time * rate)) for time in (AHEAD, BACK))
+    energy = np.concatenate(([0.0], np.cumsum(np.square(level))))
+    first = min(max(first, 1), len(level) - 1)
+    at = np.arange(first, max(min(last, len(level) - ahead), first + 1))
+    behind = np.maximum(0, at - back)
+    after = (energy[np.minimum(at + ahead, len(level))] - energy[at]) / ahead
+    before = (energy[at] - energy[behind]) / (at - behind)
+    reference = before + np.median(level) ** 2 + np.finfo(float).tiny
+    steep = (after - before) / np.sqrt(reference)
+    enough = steep >= STEEP * steep.max()
+    begin = int(np.argmax(enough))
+    length = int(np.argmin(enough[begin:])) or len(enough) - begin
+    return int(at[begin + np.argmax(steep[begin : begin + length])])
+
+
+def onset(
+    level: Array, moment: int, around: slice, *, rate: float, least: float = 0.0
+) -> int | None:
+    """Find the onset of a blow or jump.
+
+    Args:
+        moment: Sample of the steepest rise, and the samples around it in which the onset lies.
+        rate: Samples per second, in [Hz].
+        least: Peak that has to be exceeded in any case, in the same unit.
+
+    Returns:
+        The sample; None if the level hardly exceeds that before.
+    """
+    back, ahead = (round(time * rate) for time in (BACK, AHEAD))
+    before = level[max(0, moment - back - ahead) : max(1, moment - ahead)]
+    reference = max(float(np.sqrt(np.mean(np.square(before)))), float(np.median(level)))
+    peak = float(level[around].max(initial=0.0))
+    if not peak > max(PEAK * reference, least):
+        return None
+    return int(around.start + np.argmax(level[around] > max(SHARE * peak, CLEAR * reference)))
+
+
+# --- band
 
 # Windows of the spectrum, in [s]: as long as the failure, between these.
-SHORTEST, LONGEST = 0.1, 0.4
-MOST = 16  # most windows of a failure
+BRIEFEST, WIDEST = 0.1, 0.4
 # Percentile of the quiet stretches' spectra that is subtracted: vibration of a robot that walks
 # comes and goes.
 PERCENTILE = 90.0
-SHARE = 0.7  # share of the excess power that lies in the band
+HELD = 0.7  # share of the excess power that lies in the band
 
 
-def band(
-    run: Run, failure: Event | Block, failures: Sequence[Event | Block]
-) -> tuple[float, float] | None:
+def band(run: Run, failure: Failure, failures: Sequence[Failure]) -> tuple[float, float] | None:
     """Frequency band in which the joints vibrate more than in quiet stretches.
 
     The excess is the power spectrum of the measured velocities above 10 Hz, mean over the failure,
@@ -221,7 +561,7 @@ def band(
         Lowest and highest frequency, in [Hz]; None without excess. The resolution is the inverse
         of the failure's duration, and 2.5 Hz at best.
     """
-    length = min(max(failure.stop - failure.start, SHORTEST), LONGEST, run.duration)
+    length = min(max(failure.stop - failure.start, BRIEFEST), WIDEST, run.duration)
     size = max(2, round(length * run.rate))
     first, last = np.searchsorted(run.time, (failure.start, failure.stop))
     # The window of a shorter failure extends beyond it.
@@ -245,7 +585,7 @@ def band(
         return None
     # The narrowest band: for each first bin, the last one with which it holds enough.
     below = np.concatenate(([0.0], np.cumsum(excess)))
-    stops = np.searchsorted(below, below[:-1] + SHARE * below[-1])
+    stops = np.searchsorted(below, below[:-1] + HELD * below[-1])
     firsts = np.flatnonzero(stops < len(below))
     best = firsts[np.argmin(stops[firsts] - firsts)]
     return float(frequency[best]), float(frequency[stops[best] - 1])
@@ -259,7 +599,8 @@ def _spectrum(velocity: Real) -> Array:
     return np.asarray(np.square(np.abs(waves)).sum(axis=0))
 
 
-Failure: TypeAlias = Event | Block  # a finding, or an annotated block
+# --- links
+
 NAMED = 3  # most links that are named
 # Time after the onset of a blow or jump in which its excess power is measured, in [s].
 BEGINNING = 0.05
@@ -305,3 +646,35 @@ def fault_links(
     named += [index for index in ranked if index not in named]
     largest_first = sorted(named[:NAMED], key=ranked.index)
     return tuple((links.links[i], float(excess[i] / excess.sum())) for i in largest_first)
+
+
+# --- all of a run
+
+ANNOTATED = 0.1  # how long after the start of an annotation its failure may set in, in [s]
+
+
+def localise(
+    run: Run, found: Sequence[Event], *, frame: float = 0.0
+) -> dict[Failure, Localisation]:
+    """Localise each failure of a run.
+
+    Args:
+        frame: Duration of the frames that they consist of, in [s]: a finding may set in at any
+            time of its first.
+    """
+    annotated = [block for block in run.blocks if block.label != "ok"]
+    failures: list[Failure] = [*found, *annotated]
+    if not failures:
+        return {}
+    quiet = quiet_statistics(run, failures) if has_stages(run) else None
+    localised = {}
+    for failure in failures:
+        reach = max(ANNOTATED, frame) if failure in found else ANNOTATED
+        stage = Localisation() if quiet is None else first_stage(run, quiet, failure, reach=reach)
+        localised[failure] = replace(stage, band=band(run, failure, failures))
+    return localised
+
+
+def has_stages(run: Run) -> bool:
+    """Whether a run has a stage to compare the measured motion with."""
+    return bool(run.stages) or run.velocity_desired is not None

@@ -7,8 +7,8 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from inspector.errors import Status, Unknown
+from inspector.localisation import Localisation
 from inspector.report.formats import ANNOTATIONS, COMMENT, FORMATS, MARKER, as_json, text
-from inspector.stage import Localisation
 from inspector.verdict import Evidence, Finding, Missing, Ruling, Verdict, exit_status
 
 github, junit, markdown, sarif = (

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from inspector.localisation import fault_links
-from inspector.stage import Localisation
+from inspector.localisation import Localisation, fault_links
 from noiseclassifier import Event
 from noisemodel import Robot, Run
 from noisemodel.noise import LinkNoise, link_noise

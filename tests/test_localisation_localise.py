@@ -5,9 +5,8 @@ import pytest
 
 from inspector.analysis import analyse_file
 from inspector.library import demo_run, load_library, model_files
-from inspector.localisation import Localisation, band, localise
+from inspector.localisation import Localisation, band, localise, quiet_stretches
 from inspector.report.findings import report, words
-from inspector.stage import quiet_stretches
 from inspector.verdict import Finding, classify_file
 from noisemodel import Block, Run
 

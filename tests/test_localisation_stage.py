@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from inspector.stage import (
+from inspector.localisation import (
     Localisation,
     first_stage,
     onset,

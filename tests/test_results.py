@@ -11,11 +11,11 @@ from commandline import call
 
 from inspector.errors import InspectorError, Status
 from inspector.library import demo_run
+from inspector.localisation import Localisation
 from inspector.order import Order
 from inspector.report import history
 from inspector.report.formats import FORMATS, as_json
 from inspector.report.html import index_page
-from inspector.stage import Localisation
 from inspector.verdict import Beside, Evidence, Finding, Missing, Verdict, read_results
 
 

@@ -12,9 +12,8 @@ from typing import TypeVar
 
 from inspector.analysis import Analysis
 from inspector.errors import Status
-from inspector.localisation import fault_links, has_stages
+from inspector.localisation import Localisation, fault_links, has_stages
 from inspector.reference.store import REPETITION
-from inspector.stage import Localisation
 from inspector.text import counted
 from inspector.verdict import UNREAD, Beside, Finding, Verdict
 from noiseclassifier import UNKNOWN, Event
