@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import recordings
 
-from inspector.compare.pair import (
+from inspector.compare import (
     Align,
     align,
     changes,

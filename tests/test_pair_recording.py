@@ -25,7 +25,7 @@ from recordings import (
 from rerun.chunk import RrdReader
 from test_pair_pair import compared
 
-from inspector.compare.recording import write
+from inspector.compare import write
 from inspector.levels import LINKS as LINK_SCALE
 from inspector.levels import link_levels
 from inspector.recording import panels

@@ -2,8 +2,8 @@ import struct
 
 import pytest
 
+from inspector import compare
 from inspector.analysis import analyse_file
-from inspector.compare import pair, recording
 from inspector.library import demo_run, load_library
 from inspector.recording import viewer
 from inspector.recording.run import write
@@ -23,7 +23,7 @@ def test_the_viewer_draws_the_demo_alone_and_beside_itself_and_reports_no_error(
     if runs == 1:
         write(analyse_file(demo, library), path)
     else:
-        recording.write(pair.compare(demo, demo, library), path)
+        compare.write(compare.compare(demo, demo, library), path)
     for _ in range(2):  # a busy machine may draw too late for the first viewer
         with picture.headless_viewer() as client:
             png = picture.picture(client, path, 2.0)

@@ -207,8 +207,7 @@ def diff(
 
 def _write_worst(found: Difference, folder: Path, library: Library, overwrite: bool) -> None:
     """Write the worst scenario as recording and picture, and all numbers."""
-    from inspector.compare.pair import compare
-    from inspector.compare.recording import write
+    from inspector.compare import compare, write
 
     write_whole(folder / NUMBERS, f"{DIFF_FORMATS['json'](found)}\n", overwrite=overwrite)
     row = next((row for row in found.rows if row.worst is not None and row.before), None)

@@ -211,8 +211,7 @@ def _one(runs: list[Opened], target: Path, request: Request) -> None:
 
 def _two(runs: list[Opened], target: Path, request: Request) -> None:
     """Write the recording of a run before and after a change."""
-    from inspector.compare.pair import Align, changes, compare, summary
-    from inspector.compare.recording import write
+    from inspector.compare import Align, changes, compare, summary, write
 
     before, after = runs
     how = Align(request.align or "auto")
