@@ -6,7 +6,7 @@ import pytest
 from chains import chain
 from commandline import call
 
-from inspector.compare.models import write_csv
+from inspector.commands.inspect import write_numbers
 from noisemodel import ROBOTS, Comparisons, compare
 from noisemodel.compare import excitation
 
@@ -30,7 +30,7 @@ def inspector(*arguments):
 
 
 def test_the_csv_has_a_row_per_robot_and_kind(found, tmp_path):
-    write_csv(Comparisons(found.robots[:2]), tmp_path / "out.csv")
+    write_numbers(Comparisons(found.robots[:2]), tmp_path / "out.csv")
     with (tmp_path / "out.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["kind"] for row in rows] == [*KINDS, *KINDS]

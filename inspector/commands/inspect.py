@@ -1,6 +1,7 @@
 """Commands that inspect runs: `view`, `noise`, `listen`, `live` and `robots`."""
 
 from contextlib import suppress
+from csv import DictWriter
 from dataclasses import dataclass
 from datetime import date
 from functools import partial
@@ -31,10 +32,10 @@ from inspector.reference.store import Reference
 from inspector.reference.verdicts import References, seen
 from inspector.report import findings, html
 from inspector.report.picture import require
-from inspector.text import progress
+from inspector.text import cell, progress
 from inspector.verdict import EXPECTED, Verdict
 from noisemodel.compare import COMPARED
-from noisemodel.files import refuse_existing, write_whole
+from noisemodel.files import refuse_existing, replacing, write_whole
 
 # --- view
 
@@ -283,8 +284,6 @@ def noise(
             raise typer.BadParameter("name one run; --compare takes several")
         _print_levels((runs or [])[0], ctx.obj, kinds, csv, overwrite=overwrite)
         return
-    from inspector.compare.models import write_csv
-
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
     sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
     if not sources:
@@ -302,8 +301,27 @@ def noise(
     if not found:
         raise typer.Exit(3)
     if csv:
-        write_csv(found, csv, overwrite=overwrite)
+        write_numbers(found, csv, overwrite=overwrite)
     typer.echo(found)
+
+
+def write_numbers(found: nm.Comparisons, path: Path, *, overwrite: bool = False) -> None:
+    """Write a row for each robot and kind as CSV, with the columns of ``Comparisons.to_arrow``."""
+    rows = found.to_arrow()
+
+    def shown(name: str, value: str | bool | int | float) -> str | int:
+        if isinstance(value, float):
+            return f"{value:g}" if name == "rate_hz" else f"{value:.4f}"
+        return cell(value) if isinstance(value, str) else int(value)
+
+    with (
+        replacing(path, overwrite=overwrite) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = DictWriter(file, rows.column_names, lineterminator="\n")
+        writer.writeheader()
+        for row in rows.to_pylist():
+            writer.writerow({name: shown(name, value) for name, value in row.items()})
 
 
 def _print_levels(
