@@ -24,6 +24,8 @@ LABELS = {f"Points2D:{part}" for part in ("positions", "labels", "colors", "radi
 STRIP = {f"LineStrips2D:{part}" for part in ("strips", "colors", "radii")}
 MOTION = {f"Transform3D:{part}" for part in ("translation", "quaternion")}
 MOTION |= {"Transform3D:parent_frame", "Transform3D:child_frame"}
+MESH = {f"Asset3D:{part}" for part in ("blob", "media_type", "albedo_factor")}
+MESH |= {"CoordinateFrame:frame"}
 
 
 def panda(scale: float = 1.0, *, seconds: float = 3.0, rate: float = 5000.0, **changes) -> Run:
@@ -57,6 +59,16 @@ def read(path: Path, entity: str, component: str):
     if not timed:
         return None, [value for _, value in rows]
     return np.array([time for time, _ in timed]) / 1e9, [value for _, value in timed]
+
+
+def motion(path: Path, frame: str, origin: str = "/robot"):
+    """Times in [s] at which a frame of a robot moves, and its poses there, shape (samples, 7)."""
+    parts = ("child_frame", "translation", "quaternion")
+    (time, frames), (_, places), (_, turns) = (
+        read(path, f"{origin}/motion", f"Transform3D:{part}") for part in parts
+    )
+    own = [each[0] == frame for each in frames]
+    return time[own], np.hstack((np.array(places)[own, 0], np.array(turns)[own, 0]))
 
 
 def entities(path: Path):
@@ -103,7 +115,7 @@ def stretches(path: Path, entity: str):
 def check_columns(path: Path, columns: dict[str, set[str]]) -> None:
     """Check that entities have the components that their pattern has, and that there is no other.
 
-    What rerun and its URDF reader write is left out.
+    What rerun writes is left out.
 
     Args:
         path: The recording.
@@ -115,8 +127,7 @@ def check_columns(path: Path, columns: dict[str, set[str]]) -> None:
         found.setdefault(column.entity_path, set()).add(column.component)
     seen = set()
     for entity, components in found.items():
-        known = r"/|/__properties.*|/robot(_\w+)?/(panda.*|fixed)"
-        if re.fullmatch(known, entity):
+        if re.fullmatch(r"/|/__properties.*", entity):
             continue
         patterns = [pattern for pattern in columns if re.fullmatch(pattern, entity)]
         assert patterns, entity

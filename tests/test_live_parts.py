@@ -191,39 +191,14 @@ def test_silence_and_gaps_are_dark():
     assert 8.5 < time[0] < time[1] < 8.56
 
 
-@pytest.mark.parametrize("robot", ["panda", "talos", "tiago", "hyq"])
-def test_joints_stand_where_rerun_would_put_them(robot, tmp_path):
-    messages = Messages(rr.RecordingStream("test"))
-    names = nm.Robot.load(robot).joint_names
-    drawn = LiveRobot(messages, robot, names, floating=False)
-    position = np.random.default_rng(1).uniform(-1.0, 1.0, len(names))
-    transforms = drawn.transforms(position)
-    joints = {joint.child_link: joint for joint in scene.load(robot, tmp_path).joints()}
-    checked = 0
-    for transform, child in zip(transforms, drawn.children, strict=True):
-        place, turn, joint = transform[:3], transform[3:], joints[child]
-        leader = joint.mimic.joint if joint.mimic else joint.name
-        angle = position[names.index(leader)]
-        if joint.mimic:
-            angle = angle * joint.mimic.multiplier + joint.mimic.offset
-        wanted = joint.compute_transform(float(angle), clamp=False)
-        np.testing.assert_allclose(
-            place, wanted.translation.as_arrow_array().to_pylist()[0], atol=1e-6
-        )
-        expected = np.array(wanted.quaternion.as_arrow_array().to_pylist()[0])
-        assert abs(expected @ turn) == pytest.approx(1.0, abs=1e-6)
-        checked += 1
-    assert checked >= len(names)
-
-
 @pytest.mark.parametrize("robot", ["panda", "talos"])
 def test_a_robot_is_in_the_picture_with_room_to_move(robot):
     names = nm.Robot.load(robot).joint_names[:7]
-    drawn = LiveRobot(Messages(rr.RecordingStream("test")), robot, names, floating=False)
+    drawn = LiveRobot(Messages(rr.RecordingStream("test")), robot, names, moves=False)
     camera = drawn.camera(np.zeros(7), None)
     right, up, ahead = sight()
-    angles, most = drawn._angles(np.zeros((1, 7))), 0.0
-    for points in scene.reached(drawn._tree, drawn._outermost, angles, None):
+    most, poses = 0.0, drawn._drawn.poses(1, {}, None)
+    for points in scene.reached(drawn._drawn, poses):
         offset = points - camera.eye
         edge = np.tan(FIELD_OF_VIEW / 2) * (offset @ ahead)
         most = max(most, *(np.abs(offset @ across / edge).max() for across in (right, up)))

@@ -10,6 +10,7 @@ from recordings import (
     BAND,
     LABELS,
     LINE,
+    MESH,
     MOTION,
     ROW,
     STRIP,
@@ -71,7 +72,8 @@ COLUMNS = {
     r"/spectrogram/(before|after|change)/\d\d": ROW,
     r"/verdict/band": STRIP,
     r"/verdict/words": LABELS,
-    r"/robot_(before|after)/motion/panda_joint\d": MOTION,
+    r"/robot_(before|after)/motion": MOTION,
+    r"/robot_(before|after)/(_fixed|panda_.*)": MESH,
     r"/axis/\w+/(left|right)": LABELS,
     r"/axis/\w+/right/scale": STRIP,
     r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
@@ -158,14 +160,14 @@ def test_both_robots_are_seen_from_one_place_and_coloured_by_one_scale_of_levels
     every = [link_levels(noise)[1] for noise in pair.links]
     scale = LINK_SCALE.following(np.concatenate(every))
     for side, noise in zip(("before", "after"), pair.links, strict=True):
-        mesh = f"/robot_{side}/panda/visual_geometries/panda_link5/visual_0"
+        mesh = f"/robot_{side}/panda_link5"
         time, rgba = read(path, mesh, "Asset3D:albedo_factor")
         steps, level = link_levels(noise)
         column = int(np.searchsorted(steps, 0.7, side="right")) - 1
         wanted = scale.colours(level[column, noise.links.index("panda_link5")], shades=16)
         at = int(np.searchsorted(time, 0.7, side="right")) - 1
         assert rgba[at][0].to_bytes(4, "big") == bytes(wanted)
-        base = f"/robot_{side}/panda/visual_geometries/panda_link0/visual_0"
+        base = f"/robot_{side}/_fixed"
         time, (still,) = read(path, base, "Asset3D:albedo_factor")
         assert time is None
         assert still[0].to_bytes(4, "big") == bytes(scale.colours(np.array(-np.inf)))

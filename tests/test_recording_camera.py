@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio
 import pytest
+import rerun as rr
 from chains import BAR
-from recordings import layout, read
+from recordings import layout, motion, read
 from test_noisemodel_mjcf import ARM, LEGS, written
 
 from inspector.analysis import analyse_file
@@ -100,12 +101,11 @@ def test_every_link_is_in_the_picture_at_every_time(filmed):
     samples = range(0, len(run.time), 20)
     moved = np.zeros((len(samples), 3))
     if robot.floating_base:
-        time, below = read(recording, "/robot/motion/view", "Transform3D:translation")
+        assert eye["target_frame"] == "robot/_view"
+        time, below = motion(recording, "robot/_view")
         np.testing.assert_allclose(time, run.time[::20], atol=1e-9)
-        moved = np.array(below)[:, 0]
+        moved = below[:, :3]
         assert np.ptp(moved, axis=0)[:2].min() > 1.0  # it walks far out of the first picture
-        _, frames = read(recording, "/robot/motion/view", "Transform3D:child_frame")
-        assert frames[0] == [eye["target_frame"]]
     most = 0.0
     for points, shift in zip(placed(robot, run, samples), moved, strict=True):
         seen = in_picture(points, position + shift, target + shift, 1.0)
@@ -126,7 +126,7 @@ def test_the_floor_is_below_the_robot_at_all_times(filmed):
         for points in places:
             assert (lines.min(axis=(0, 1))[:2] < points.min(axis=0)[:2]).all()
             assert (lines.max(axis=(0, 1))[:2] > points.max(axis=0)[:2]).all()
-        assert read(recording, "/robot/floor", "CoordinateFrame:frame")[1] == [["world"]]
+        assert read(recording, "/robot/floor", "CoordinateFrame:frame")[1] == [["robot/_world"]]
 
 
 def test_a_nearer_camera_would_not_see_all():
@@ -164,10 +164,8 @@ def urdf(folder: Path, shape: str) -> Path:
 
 
 def test_a_link_without_visual_shapes_is_drawn_as_it_collides(tmp_path):
-    (tmp_path / "out").mkdir()
-    tree = scene.load(str(urdf(tmp_path, BAR.replace("visual", "collision"))), tmp_path / "out")
-    shapes = scene.shapes_by_link(tree)
-    assert {link: [kind for _, kind in own] for link, own in shapes.items()} == {
-        "a": ["Boxes3D"],
-        "b": ["Boxes3D"],
-    }
+    path = urdf(tmp_path, BAR.replace("visual", "collision"))
+    drawn = scene.log_robot(rr.RecordingStream("test"), str(path), ["j"])
+    assert drawn.links == ["_fixed", "b"]
+    sizes = [np.ptp(points, axis=0) for points in drawn.outermost.values()]
+    np.testing.assert_allclose(sizes[0], sizes[1])

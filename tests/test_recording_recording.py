@@ -7,6 +7,7 @@ from recordings import (
     BAND,
     LABELS,
     LINE,
+    MESH,
     MOTION,
     POINTS,
     ROW,
@@ -14,6 +15,7 @@ from recordings import (
     check_columns,
     entities,
     layout,
+    motion,
     panda,
     properties,
     read,
@@ -92,7 +94,8 @@ COLUMNS = {
     r"/axis/(spectrogram|joints|links|key)/right/scale": STRIP,
     r"/verdict/band": STRIP,
     r"/verdict/words": LABELS,
-    r"/robot/motion/panda_joint\d": MOTION,
+    r"/robot/motion": MOTION,
+    r"/robot/(_fixed|panda_.*)": MESH,
     r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
     r"/report": {"TextDocument:text", "TextDocument:media_type"},
 }
@@ -379,9 +382,9 @@ def test_properties_name_the_run_and_its_hash(whole):
 
 def test_the_robot_has_the_pose_of_its_joints(whole):
     path, run = whole
-    time, turns = read(path, "/robot/motion/panda_joint1", "Transform3D:quaternion")
+    time, poses = motion(path, "robot/panda_link1")
     angles = np.interp(time, run.time, run.position[:, 0])
-    quaternion = np.array([turn[0] for turn in turns])
+    quaternion = poses[:, 3:]
     np.testing.assert_allclose(quaternion[:, 2], np.sin(angles / 2), atol=1e-5)
     assert len(time) == 150  # 50 frames per second
 
@@ -390,10 +393,9 @@ def test_a_floating_base_moves_in_the_world_and_links_made_of_boxes_are_coloured
     run = one_legged(tmp_path)
     path = tmp_path / "out.rrd"
     write(inspected(run, tmp_path), path)
-    _, places = read(path, "/robot/motion/base", "Transform3D:translation")
-    np.testing.assert_allclose([place[0][0] for place in places], 0.1 * run.time[::20], atol=1e-6)
-    thigh = "/robot/leg/visual_geometries/thigh/visual_0"
-    seconds, colours = read(path, thigh, "Boxes3D:colors")
+    _, poses = motion(path, "robot/thigh")
+    np.testing.assert_allclose(poses[:, 0], 0.1 * run.time[::20], atol=1e-6)
+    seconds, colours = read(path, "/robot/thigh", "Asset3D:albedo_factor")
     assert seconds is not None
     assert len({colour[0] for colour in colours}) > 1
 

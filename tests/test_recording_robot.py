@@ -1,19 +1,24 @@
+"""What is drawn of a robot: the noise model's triangles, where Pinocchio puts them."""
+
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 import numpy as np
+import pinocchio
 import pytest
+import rerun as rr
+from recordings import read
+from test_noisemodel_mjcf import ARM, LEGS, one_body, written
 
 from inspector.errors import InspectorError
-from inspector.recording.robot import FACET, drawable
-from noisemodel import meshes
+from inspector.recording.robot import log_robot
+from noisemodel import Robot, meshes
+from noisemodel.meshes import FACET
 
 TRIANGLE = b"\0" * 80 + (1).to_bytes(4, "little") + b"\0" * 50
 
 
 def robot(folder: Path, mesh: str) -> Path:
-    path = folder / "urdf" / "robot.urdf"
-    path.parent.mkdir(exist_ok=True)
+    path = folder / "robot.urdf"
     path.write_text(
         f"""<robot name="r"><link name="base"><visual><geometry><mesh filename="{mesh}"/></geometry>
         <material name="m"><texture/></material></visual>
@@ -22,14 +27,9 @@ def robot(folder: Path, mesh: str) -> Path:
     return path
 
 
-def test_meshes_get_absolute_addresses_and_what_is_not_drawn_goes(tmp_path):
-    (tmp_path / "pkg").mkdir()
-    (tmp_path / "pkg" / "part.stl").write_bytes(TRIANGLE)
-    path = robot(tmp_path, "package://pkg/part.stl")
-    tree = ET.fromstring(drawable(path, (tmp_path,), tmp_path))
-    assert tree.find(".//mesh").get("filename") == f"file://{tmp_path}/pkg/part.stl"
-    assert tree.find(".//collision") is None
-    assert tree.find(".//texture") is None
+def drawn(path):
+    """Draw a robot into no file."""
+    return log_robot(rr.RecordingStream("test"), str(path), ())
 
 
 @pytest.mark.parametrize(
@@ -44,18 +44,24 @@ def test_meshes_get_absolute_addresses_and_what_is_not_drawn_goes(tmp_path):
 )
 def test_a_mesh_that_cannot_be_read_is_named(tmp_path, name, content, problem):
     (tmp_path / name).write_bytes(content)
-    with pytest.raises(InspectorError, match=f"mesh package://{name}: .*{problem}.*--robot none"):
-        drawable(robot(tmp_path, f"package://{name}"), (tmp_path,), tmp_path)
+    with pytest.raises(InspectorError, match=f"mesh .*{name}: .*{problem}.*--robot none"):
+        drawn(robot(tmp_path, name))
 
 
-@pytest.mark.parametrize("address", ["package://../../secret.stl", "file:///{outside}/secret.stl"])
+def test_a_missing_mesh_is_named_with_the_way_out(tmp_path):
+    head = '<asset><mesh name="m" file="gone.stl"/></asset>'
+    path = written(tmp_path, one_body('<geom type="mesh" mesh="m"/>', head=head))
+    with pytest.raises(InspectorError, match=r"gone\.stl: not found in .*--robot none"):
+        drawn(path)
+
+
+@pytest.mark.parametrize("address", ["../../secret.stl", "file:///{outside}/secret.stl"])
 def test_no_mesh_is_read_outside_of_the_robots_folders(tmp_path, address):
     inner = tmp_path / "a" / "b"
     inner.mkdir(parents=True)
     (tmp_path / "secret.stl").write_bytes(TRIANGLE)
-    path = robot(inner, address.format(outside=tmp_path))
     with pytest.raises(InspectorError, match="lies outside of"):
-        drawable(path, (inner,), tmp_path)
+        drawn(robot(inner, address.format(outside=tmp_path)))
 
 
 COLLADA = """<COLLADA version="{version}"><asset><up_axis>{up}</up_axis></asset>
@@ -74,25 +80,74 @@ POLYGON = """<polylist count="1"><input semantic="VERTEX" source="#v" offset="0"
 
 
 @pytest.mark.parametrize(
-    ("version", "up", "faces", "kept"),
+    ("version", "up", "faces"),
     [
-        ("1.4.1", "Z_UP", TRIANGLES, True),
-        ("1.4.1", "Z_UP", POLYGON, False),
-        ("1.4.1", "Y_UP", TRIANGLES, False),
-        ("1.4.0", "Z_UP", TRIANGLES, False),
+        ("1.4.1", "Z_UP", TRIANGLES),
+        ("1.4.1", "Z_UP", POLYGON),
+        ("1.4.1", "Y_UP", TRIANGLES),
+        ("1.4.0", "Z_UP", TRIANGLES),
     ],
 )
-def test_collada_that_rerun_cannot_draw_is_drawn_by_our_own_triangles(
-    tmp_path, version, up, faces, kept
-):
-    part = tmp_path / "part.dae"
+def test_collada_is_drawn_as_the_noise_model_reads_it(tmp_path, version, up, faces):
+    part, recording = tmp_path / "part.dae", rr.RecordingStream("test")
     part.write_text(COLLADA.format(version=version, up=up, faces=faces))
-    written = tmp_path / "written"
-    written.mkdir()
-    tree = ET.fromstring(drawable(robot(tmp_path, "package://part.dae"), (tmp_path,), written))
-    drawn = Path(tree.find(".//mesh").get("filename").removeprefix("file://"))
-    assert (drawn == part) is kept
-    np.testing.assert_allclose(meshes.read(drawn), meshes.read(part))
-    if not kept:
-        facets = np.frombuffer(drawn.read_bytes()[84:], FACET)
-        np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [0, 0, 1]])
+    recording.save(tmp_path / "out.rrd")
+    log_robot(recording, str(robot(tmp_path, "part.dae")), ())
+    recording.disconnect()
+    _, ((blob,),) = read(tmp_path / "out.rrd", "/robot/_fixed", "Asset3D:blob")
+    facets = np.frombuffer(bytes(blob)[84:], FACET)
+    np.testing.assert_allclose(facets["corners"], meshes.read(part))
+    np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [0, 0, 1]])
+
+
+@pytest.mark.parametrize("name", ["panda", "talos", "tiago", "hyq", "arm.xml", "legs.xml"])
+def test_links_stand_where_pinocchio_puts_them(tmp_path, name):
+    text = {"arm.xml": ARM, "legs.xml": LEGS}.get(name)
+    path = name if text is None else written(tmp_path, text, name)
+    found = drawn(path)
+    assert len(found.outermost) >= 3
+    model, random = found.robot.model, np.random.default_rng(1)
+    names = Robot.load(path, mimic=True).joint_names
+    columns = {joint: random.uniform(-1.0, 1.0, 3) for joint in names}
+    poses = found.poses(3, columns, None)
+    angles = dict(columns)
+    for joint, mimic in found.mimics.items():
+        if not model.existJointName(joint):
+            continue  # a joint that is fixed
+        angles[joint] = mimic.multiplier * columns[mimic.joint] + mimic.offset
+    for sample in range(3):
+        q = pinocchio.neutral(model)
+        for joint, angle in angles.items():
+            first = model.idx_qs[model.getJointId(joint)]
+            if model.nqs[model.getJointId(joint)] == 2:
+                q[first : first + 2] = np.cos(angle[sample]), np.sin(angle[sample])
+            else:
+                q[first] = angle[sample]
+        data = model.createData()
+        pinocchio.forwardKinematics(model, data, q)
+        for index, pose in zip(found.outermost, poses[sample], strict=True):
+            wanted = pinocchio.SE3ToXYZQUAT(data.oMi[index])
+            np.testing.assert_allclose(pose[:3], wanted[:3], atol=1e-9)
+            assert abs(pose[3:] @ wanted[3:]) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_link_without_visual_geometry_is_drawn_as_it_collides(tmp_path):
+    body = '<body name="tip" pos="0.3 0 0"><joint name="wrist" axis="1 0 0"/><geom group="3"'
+    text = ARM.replace(
+        '<body name="tip" pos="0.3 0 0"><joint name="wrist" axis="1 0 0"/><geom', body
+    )
+    assert text != ARM
+    assert drawn(written(tmp_path, text)).links == ["_fixed", "upper", "body3", "tip"]
+
+
+def test_what_belongs_to_the_world_of_a_base_that_floats_is_left_out(tmp_path):
+    door = '<body name="door"><joint name="hinge"/><geom size="1"/></body></worldbody>'
+    path = written(tmp_path, LEGS.replace("</worldbody>", door))
+    assert drawn(path).links == ["trunk", "left", "shin"]
+
+
+def test_links_of_any_name_are_drawn(tmp_path):
+    text = ARM.replace('"tip"', '"_fixed/a b"').replace('"upper"', '"_world"')
+    found = drawn(written(tmp_path, text))
+    paths = [*map(found.path, found.links)]
+    assert paths[1:] == ["robot/_world", "robot/body3", r"robot/_fixed\/a\ b"]

@@ -12,12 +12,10 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import rerun as rr
-from rerun.urdf import UrdfTree
 
 from inspector import colors
 from inspector.analysis import (
@@ -34,7 +32,8 @@ from inspector.library import Library
 from inspector.logs.read import Opened, open_run
 from inspector.recording import axes, panels, robot, unstable
 from inspector.recording.axes import Label, Panel, Timed
-from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Drawn, found_stretches
+from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Plotted, found_stretches
+from inspector.recording.robot import Drawn
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.findings import classes_of, spoken
@@ -637,7 +636,7 @@ def log_joints(
     recording: rr.RecordingStream, pair: Pair, limbs: Mapping[str, tuple[str, ...]]
 ) -> list[Part]:
     """Log the joints' signals of both runs, paler before: tabs of limbs."""
-    plots: dict[str, list[Drawn]] = {}
+    plots: dict[str, list[Plotted]] = {}
     for side, each in pair.sides:
         for signal in panels.signals(each.run):
             name = f"{'desired ' * signal.desired}{signal.kind}"
@@ -664,41 +663,40 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
     identity = hashlib.sha256(" ".join(parts).encode()).hexdigest()
     found, time = changes(pair), pair.time
     loop = largest_change(pair, found)
-    with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
+    with writing(path, identity, overwrite=overwrite) as recording:
         axes.log_span(recording, float(time[0]), float(time[-1]))
-        trees, robots = _log_robots(recording, pair, Path(folder))
+        drawn, robots = _log_robots(recording, pair)
         over_time = [log_changes(recording, pair, found), *log_levels(recording, pair, found)]
-        details = _log_details(recording, pair, trees)
+        details = _log_details(recording, pair, drawn)
         head = unstable.beside((_log_text(recording, pair, found), 34.0), *robots)
         whole = unstable.above((head, ABOVE), *over_time, (details, DETAILS + TITLES))
         recording.send_blueprint(unstable.blueprint(whole, loop))  # instead of an older layout
 
 
-def _log_robots(
-    recording: rr.RecordingStream, pair: Pair, folder: Path
-) -> tuple[dict[str, UrdfTree], list[Timed]]:
+def _log_robots(recording: rr.RecordingStream, pair: Pair) -> tuple[dict[str, Drawn], list[Timed]]:
     """Log the robot before and after, as two robots, coloured by the levels of their links."""
     if pair.links is None:
         return {}, []
     runs = {side: each.run for side, each in pair.sides}
-    robots = dict(zip(runs, robot.log_robots(recording, runs, folder, aspect=ASPECT), strict=True))
+    robots = dict(zip(runs, robot.log_robots(recording, runs, aspect=ASPECT), strict=True))
     views = [
         (unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0)
         for side, (_, camera) in robots.items()
     ]
-    trees = {side: tree for side, (tree, _) in robots.items()}
+    drawn = {side: each for side, (each, _) in robots.items()}
     scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
-    for tree, noise in zip(trees.values(), pair.links, strict=True):
-        panels.log_robot_levels(recording, tree, noise, scale)
+    for each, noise in zip(drawn.values(), pair.links, strict=True):
+        panels.log_robot_levels(recording, each, noise, scale)
     axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
-    return trees, [*views, (unstable.drawing(f"/axis/{KEY.name}/right"), 8.0)]
+    return drawn, [*views, (unstable.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 
-def _log_details(recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree]) -> Part:
+def _log_details(recording: rr.RecordingStream, pair: Pair, drawn: Mapping[str, Drawn]) -> Part:
     """Log what lies behind each other: spectra, noise, signals of joints."""
     parts = [*log_spectra(recording, pair, _joint(pair)), log_noise(recording, pair)]
     names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
-    limbs = panels.limbs(tuple(names), trees.get("after"))
+    after = drawn.get("after")
+    limbs = panels.limbs(tuple(names), after.robot if after else None)
     parts += log_joints(recording, pair, limbs)
     return unstable.tabs(*parts)
 

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from threading import Event as Signal
 from threading import Thread
 from typing import Any, cast
@@ -276,72 +275,44 @@ class SpectrogramStream:
 ROOM = 1.6  # what the camera sees, by the size of the robot as it stands at first
 # How far the floor of a robot that moves its base reaches from the first pose, in [m].
 AROUND = np.array([[-20.0, -20.0], [20.0, 20.0]])
-UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+ROBOT: colors.Color = (190, 192, 198)
 
 
 class LiveRobot:
-    """A robot in a live recording; its base, if it moves, and the camera are its last children."""
+    """A robot in a live recording."""
 
     def __init__(
-        self, messages: Messages, robot: str, joint_names: Sequence[str], *, floating: bool
+        self, messages: Messages, robot: str, joint_names: Sequence[str], *, moves: bool
     ) -> None:
-        self._messages, self._named = messages, tuple(joint_names)
-        with TemporaryDirectory() as folder:
-            tree = self._tree = scene.load(robot, Path(folder), joint_names)
-            self._outermost = scene.outermost(scene.drawn_file(robot, Path(folder)))
-            scene.log_shapes(messages.recording, tree, coloured=True)
-        angles = self._angles(np.zeros((1, len(joint_names))))
-        self._joints = [joint for joint in tree.joints() if joint.name in angles]
-        base = [str(tree.root_link().name), scene.VIEW] if floating else []
-        self.children = [joint.child_link for joint in self._joints] + base
-        self._carriers = [joint.parent_link for joint in self._joints] + len(base) * [scene.WORLD]
+        self._messages, self._names = messages, joint_names
+        recording = messages.recording
+        self._drawn = scene.log_robot(recording, robot, joint_names, moves=moves, color=ROBOT)
 
-    def _angles(self, position: Array) -> dict[str, Array]:
-        """Positions of all joints that move, mimics included, by positions (samples, joints)."""
-        return scene.angles(self._tree, dict(zip(self._named, position.T, strict=True)))
+    def _poses(self, position: Array, base: Array | None) -> Array | None:
+        """Poses of all links; None if one is not known."""
+        if not all(np.isfinite(each).all() for each in (position, base) if each is not None):
+            return None
+        if base is not None and not base[3:].any():
+            return None
+        columns = dict(zip(self._names, position[:, None], strict=True))
+        return self._drawn.poses(1, columns, None if base is None else base[None])
 
-    def camera(self, position: Array, base_pose: Array | None) -> Camera:
+    def camera(self, position: Array, base: Array | None) -> Camera:
         """Place the camera by the first pose, before it is known what will come."""
-        pose = None
-        if base_pose is not None:
-            unknown = np.concatenate((np.zeros(3), UPRIGHT))
-            pose = (base_pose if np.isfinite(base_pose).all() else unknown)[None]
-        angles = self._angles(np.nan_to_num(position)[None])
-        parts = scene.reached(self._tree, self._outermost, angles, pose)
-        seen = scene.standing(scene.fitted(parts, room=ROOM), self._tree, moves=pose is not None)
-        if pose is not None:
-            scene.log_floor(self._messages.recording, self._tree, seen, pose[:, :2] + AROUND)
+        poses = self._poses(position, base)
+        poses = self._drawn.poses(1, {}, None) if poses is None else poses
+        parts = scene.reached(self._drawn, poses)
+        seen = scene.standing(scene.fitted(parts, room=ROOM), self._drawn)
+        if base is not None:
+            around = poses[0, -1, :2] + AROUND
+            scene.log_floor(self._messages.recording, self._drawn, seen, around)
         return seen
 
-    def show(self, time: float, position: Array, base_pose: Array | None) -> None:
+    def show(self, time: float, position: Array, base: Array | None) -> None:
         """Move the robot, if its pose is known, at a time in [s]."""
-        if not all(np.isfinite(each).all() for each in (position, base_pose) if each is not None):
-            return
-        poses = self.transforms(position)
-        if base_pose is not None:
-            below = np.concatenate((base_pose[:3] * scene.ON_FLOOR, UPRIGHT))
-            poses = np.vstack((poses, base_pose, below))
-        index = nanoseconds(np.full(len(poses), time))
-        self._messages.add("/robot/motion", index, poses, self._moved, urgent=True)
-
-    def _moved(self, poses: Array) -> Iterable[Any]:
-        count = len(poses) // len(self.children)
-        return rr.Transform3D.columns(
-            translation=poses[:, :3],
-            quaternion=poses[:, 3:],
-            parent_frame=count * self._carriers,
-            child_frame=count * self.children,
-        )
-
-    def transforms(self, position: Array) -> Array:
-        """Place and quaternion of each link that a joint moves, in the axes of its carrier."""
-        from scipy.spatial.transform import Rotation
-
-        angles = self._angles(position[None])
-        turns, places = zip(
-            *(scene.pose(joint, angles[joint.name][0]) for joint in self._joints), strict=True
-        )
-        return np.hstack((np.stack(places), Rotation.from_matrix(np.stack(turns)).as_quat()))
+        if (poses := self._poses(position, base)) is not None:
+            index = nanoseconds(np.full(poses.shape[1], time))
+            self._messages.add("/robot/motion", index, poses[0], self._drawn.columns, urgent=True)
 
 
 JOINT_POINTS = 400.0  # points of a joint's line in a second, as a recording of ten seconds has
@@ -369,8 +340,8 @@ class Drawing:
         self._spectrogram = SpectrogramStream(rate)
         self._robot: LiveRobot | None = None
         if robot is not None:
-            floating = "base_pose" in widths
-            self._robot = LiveRobot(self._messages, robot, joint_names, floating=floating)
+            moves = "base_pose" in widths
+            self._robot = LiveRobot(self._messages, robot, joint_names, moves=moves)
         self._hop, classes = labeller.hop, labeller.classes
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")

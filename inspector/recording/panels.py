@@ -13,19 +13,19 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 from rerun.components import MarkerShapeLike
-from rerun.urdf import UrdfTree
 
 from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps
 from inspector.levels import WINDOW, Scale, Spectrogram, extremes, in_bands
-from inspector.recording import axes, robot, unstable
+from inspector.recording import axes, unstable
 from inspector.recording.axes import Label, Panel, Timed
+from inspector.recording.robot import Drawn, log_colours
 from inspector.recording.unstable import Camera, Part
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
 from inspector.report.findings import brief, classes_of, finding_of, spoken
 from noiseclassifier import Event, Labels
-from noisemodel import Block, Run
+from noisemodel import Block, Robot, Run
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
 from noisemodel.types import Array, Mask, Real
 
@@ -49,11 +49,11 @@ MAX_JOINTS = 10  # joints that one plot can hold
 JOINTS_PER_PLOT = 8  # joints in each plot if there are more than that
 
 
-def limbs(names: Sequence[str], tree: UrdfTree | None) -> dict[str, tuple[str, ...]]:
+def limbs(names: Sequence[str], robot: Robot | None) -> dict[str, tuple[str, ...]]:
     """Divide joints into limbs."""
     if not names:
         return {}
-    groups = [tuple(names)] if tree is None else _chains(names, tree)
+    groups = [tuple(names)] if robot is None else _chains(names, robot)
     parts = []
     for group in groups:
         size = len(group) if len(group) <= MAX_JOINTS else JOINTS_PER_PLOT
@@ -66,23 +66,24 @@ def limbs(names: Sequence[str], tree: UrdfTree | None) -> dict[str, tuple[str, .
     }
 
 
-def _chains(names: Sequence[str], tree: UrdfTree) -> list[tuple[str, ...]]:
+def _chains(names: Sequence[str], robot: Robot) -> list[tuple[str, ...]]:
     """Follow the robot outwards: a limb begins where it branches, and has two joints or more."""
-    moved_by = {joint.child_link: joint for joint in tree.joints()}
+    known = ["", *(joint.name for joint in robot.joints)]
+    above = {joint.name: known[joint.parent] for joint in robot.joints}
     carrier: dict[str, str] = {}  # the next of the named joints towards the root, if there is one
-    for joint in moved_by.values():
-        link = joint.parent_link
-        while link in moved_by and moved_by[link].name not in names:
-            link = moved_by[link].parent_link
-        carrier[joint.name] = moved_by[link].name if link in moved_by else ""
+    for name in names:
+        link = above[name]
+        while link and link not in names:
+            link = above[link]
+        carrier[name] = link
     branches = Counter(carrier[name] for name in names)
     limb = {"": ""}
     waiting = list(names)
     while waiting:
         name = next(name for name in waiting if carrier[name] not in waiting)
-        above, alone = carrier[name], not branches[name]  # a finger, a wheel
-        goes_on = above and (alone or branches[above] == 1)
-        limb[name] = limb[above] if goes_on or (alone and not above) else name
+        before, alone = carrier[name], not branches[name]  # a finger, a wheel
+        goes_on = before and (alone or branches[before] == 1)
+        limb[name] = limb[before] if goes_on or (alone and not before) else name
         waiting.remove(name)
     return [
         tuple(name for name in names if limb[name] == first)
@@ -397,14 +398,14 @@ def signals(run: Run) -> list[Signal]:
 
 
 # Entity of a signal, the signal, the samples shown, what is added to names, whether it is dim.
-Drawn: TypeAlias = tuple[str, Signal, Mask, str, bool]
+Plotted: TypeAlias = tuple[str, Signal, Mask, str, bool]
 
 
 def log_joints(
     recording: rr.RecordingStream, run: Run, limbs: Mapping[str, tuple[str, ...]]
 ) -> list[Part]:
     """Log the joints' signals, at most 4000 points each; tabs of a limb each."""
-    plots: dict[str, list[Drawn]] = {}
+    plots: dict[str, list[Plotted]] = {}
     for signal in signals(run):
         path = f"/joints/{signal.kind.replace(' ', '_')}{'_desired' * signal.desired}"
         drawn = (path, signal, run.mask, " desired" * signal.desired, signal.desired)
@@ -416,7 +417,7 @@ def log_joints(
 def log_plots(
     recording: rr.RecordingStream,
     time: Array,
-    plots: Mapping[str, Sequence[Drawn]],
+    plots: Mapping[str, Sequence[Plotted]],
     limbs: Mapping[str, tuple[str, ...]],
     points: int,
 ) -> list[Part]:
@@ -495,14 +496,14 @@ def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
 
 
 def log_links(
-    recording: rr.RecordingStream, tree: UrdfTree, analysis: Analysis, noise: LinkNoise
+    recording: rr.RecordingStream, robot: Drawn, analysis: Analysis, noise: LinkNoise
 ) -> Timed:
     """Log the noise of a robot's links: levels of those that vibrate most, power, colours."""
     time, level = levels.link_levels(noise)
     power = np.maximum(decibel(noise.total / REFERENCE_POWER), POWER_FLOOR_DB)
     axes.log_line(recording, "/power/total", noise.time, power, colors.NOISE)
     scale = levels.LINKS.following(level)
-    log_robot_levels(recording, tree, noise, scale)
+    log_robot_levels(recording, robot, noise, scale)
     axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
     edges = np.append(time, noise.time[-1] + width / 2)
@@ -511,13 +512,13 @@ def log_links(
 
 
 def log_robot_levels(
-    recording: rr.RecordingStream, tree: UrdfTree, noise: LinkNoise, scale: Scale
+    recording: rr.RecordingStream, robot: Drawn, noise: LinkNoise, scale: Scale
 ) -> None:
     """Colour the links of a robot by their levels; what does not move is as quiet as can be."""
     time, level = levels.link_levels(noise)
     rgba = scale.colours(level, shades=ROBOT_SHADES)
     colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
-    robot.log_colours(recording, tree, time, colours, rest=scale.colours(np.array([-np.inf])))
+    log_colours(recording, robot, time, colours, rest=scale.colours(np.array([-np.inf])))
 
 
 def log_strip(

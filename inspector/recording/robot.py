@@ -1,170 +1,201 @@
-"""The robot in a recording: from its URDF or MJCF, its motion and colours, and its camera.
+"""The robot in a recording: its links as the noise model has them, their motion, and its camera.
 
-The camera is as near as it sees every point in the motion, and the floor below. What is framed is
-what is drawn: the viewer's tree of links, with mimicking joints and what is fixed to the world.
+The camera is as near as it sees every point in the motion, and the floor below.
 """
 
-import hashlib
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain, product
-from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from rerun.urdf import UrdfJoint, UrdfTree
 
-import noisemodel
+from inspector.colors import Color
 from inspector.errors import InspectorError
 from inspector.recording import axes, unstable
 from inspector.recording.unstable import Camera
-from noisemodel import meshes, robot, urdf
-from noisemodel.mjcf import is_mjcf
+from noisemodel import GeometryError, urdf
+from noisemodel.meshes import FACET, HEADER
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.surface import link_names, pieces
 from noisemodel.types import Array, UnknownJointError
-from noisemodel.urdf import find_mesh, shapes_in
+from noisemodel.urdf import Mimic
 
 FRAMES_PER_SECOND = 50.0
 MAX_FRAMES = 2000
-WORLD = "world"
-# The shapes that a URDF becomes, and what colours each.
-COLOURED = {
-    "Asset3D": "albedo_factor",
-    "Boxes3D": "colors",
-    "Capsules3D": "colors",
-    "Cylinders3D": "colors",
-    "Ellipsoids3D": "colors",
-}
+# Frames of transforms beside those of links that move.
+WORLD, FIXED, VIEW = "_world", "_fixed", "_view"
+UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 
-def load(name: str, folder: Path, joint_names: Sequence[str] = (), *, side: str = "") -> UrdfTree:
-    """Read the robot that a run names, for drawing; `side` tells one of several apart."""
-    path, copy = robot.locate(name), drawn_file(name, folder)
-    place = f"robot_{side}" if side else "robot"
-    if is_mjcf(path):
-        text = drawable_mjcf(Robot.load(path), folder)
-    else:
-        urdf.checked(path)
-        text = drawable(path, robot.package_roots(name), folder)
-    copy.write_text(text, encoding="utf-8")
-    tree = UrdfTree.from_file_path(
-        copy,
-        entity_path_prefix=place,
-        frame_prefix=f"{place}/" if side else None,
-        static_transform_entity_path=f"/{place}/fixed",
-    )
-    known = [joint.name for joint in tree.joints() if joint.joint_type != "fixed"]
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A robot whose links were logged; `poses` moves them."""
+
+    robot: Robot
+    origin: str  # entity path that all of it lies under
+    # Outermost points of what each joint moves, in its axes, in [m]; 0 is fixed to the world.
+    outermost: Mapping[int, Array]
+    moves: bool  # whether its base does, which the camera follows on the floor
+    mimics: Mapping[str, Mimic]
+
+    @property
+    def links(self) -> list[str]:
+        """What each joint moves, in the order of `outermost`."""
+        names = (FIXED, *link_names(self.robot))
+        return [names[joint] for joint in self.outermost]
+
+    def frame(self, link: str) -> str:
+        """Name of a frame of transforms."""
+        return f"{self.origin}/{link}"
+
+    def path(self, link: str) -> str:
+        """Entity of a link's mesh."""
+        return self.origin + rr.new_entity_path([link])
+
+    def poses(self, count: int, columns: Mapping[str, Array], base: Array | None) -> Array:
+        """Place and quaternion of each link, and of the camera's frame if the base moves.
+
+        Args:
+            count: Number of samples.
+            columns: Positions by joint, each of shape (samples,); others are at 0.
+            base: Pose of the base, shape (samples, 7); None where it is not known.
+
+        Returns:
+            Poses in the world, shape (samples, frames, 7).
+        """
+        from scipy.spatial.transform import Rotation
+
+        placed = {0: (Rotation.identity(), np.zeros(3))}
+        for index, joint in enumerate(self.robot.joints, start=1):
+            rest = self.robot.model.jointPlacements[index]
+            turned, place = placed[joint.parent]
+            place = place + turned.apply(rest.translation)
+            turned = turned * Rotation.from_matrix(rest.rotation)
+            axis = (np.eye(3) if joint.turn is None else joint.turn)[joint.axis]
+            moved = columns.get(joint.name)
+            if (mimic := self.mimics.get(joint.name)) and mimic.joint in columns:
+                moved = columns[mimic.joint] * mimic.multiplier + mimic.offset
+            if index == 1 and self.moves and base is not None:
+                turned, place = Rotation.from_quat(base[:, 3:]), base[:, :3]
+            elif moved is not None and joint.kind == "prismatic":
+                place = place + turned.apply(moved[:, None] * axis)
+            elif moved is not None:
+                turned = turned * Rotation.from_rotvec(moved[:, None] * axis)
+            placed[index] = turned, place
+        found = np.empty((count, len(self.outermost) + self.moves, 7))
+        for column, index in enumerate(self.outermost):
+            turned, place = placed[index]
+            found[:, column, :3], found[:, column, 3:] = place, turned.as_quat()
+        if self.moves:
+            found[:, -1, :3] = 0.0 if base is None else base[:, :3] * ON_FLOOR
+            found[:, -1, 3:] = UPRIGHT
+        return found
+
+    def columns(self, poses: Array) -> Any:
+        """Rerun's columns of poses, a row for each frame of transforms at each time."""
+        frames = [*map(self.frame, self.links), *([self.frame(VIEW)] * self.moves)]
+        rows = poses.reshape(-1, 7)
+        return rr.Transform3D.columns(
+            translation=rows[:, :3],
+            quaternion=rows[:, 3:],
+            parent_frame=[self.frame(WORLD)] * len(rows),
+            child_frame=frames * (len(rows) // len(frames)),
+        )
+
+
+def log_robot(
+    recording: rr.RecordingStream,
+    name: str,
+    joint_names: Sequence[str],
+    *,
+    side: str = "",
+    moves: bool = False,
+    color: Color | None = None,
+) -> Drawn:
+    """Log the links of a robot; `side` tells one of two apart, colours may follow."""
+    robot = Robot.load(name, floating_base=moves or None)
+    known = [joint.name for joint in robot.joints if joint.nv == 1]
     for joint in joint_names:
         if joint not in known:
-            raise UnknownJointError(joint, tree.name, known)
-    return tree
+            raise UnknownJointError(joint, robot.name, known)
+    mimics = robot.mjcf.mimics if robot.mjcf else urdf.mimics(robot.path, urdf.checked(robot.path))
+    parts: dict[int, list[Array]] = {index: [] for index in _carried(robot)}
+    try:
+        for index, _, triangles in pieces(robot):
+            if index in parts:
+                parts[index].append(triangles)
+    except GeometryError as error:
+        raise InspectorError(f"{error}; `--robot none` shows the run without the robot") from error
+    meshes = {index: np.concatenate(part) for index, part in parts.items() if part}
+    outermost = {index: _outermost(mesh.reshape(-1, 3)) for index, mesh in meshes.items()}
+    outermost = outermost or dict.fromkeys(parts, np.zeros((1, 3)))
+    drawn = Drawn(robot, f"robot_{side}" if side else "robot", outermost, moves, mimics)
+    unstable.log_up(recording)
+    for link, triangles in zip(drawn.links, meshes.values(), strict=False):
+        mesh = rr.Asset3D(
+            contents=_stl(triangles), media_type=rr.MediaType.STL, albedo_factor=color
+        )
+        recording.log(drawn.path(link), mesh, rr.CoordinateFrame(drawn.frame(link)), static=True)
+    return drawn
 
 
-def drawn_file(name: str, folder: Path) -> Path:
-    """The URDF that `load` writes into a folder for rerun to read."""
-    return folder / robot.locate(name).with_suffix(".urdf").name
-
-
-def origin(tree: UrdfTree) -> str:
-    """Entity path that all of a robot lies under."""
-    return f"/{tree.frame_prefix or 'robot'}".rstrip("/")
-
-
-def frame(tree: UrdfTree, link: str) -> str:
-    """Name of a link's frame of transforms, or of the world's."""
-    return f"{tree.frame_prefix or ''}{link}"
-
-
-def outwards(tree: UrdfTree) -> Iterator[UrdfJoint]:
-    """The joints of a robot, each after those that carry it."""
-    reached, waiting = {tree.root_link().name}, list(tree.joints())
-    while waiting:
-        ready = [joint for joint in waiting if joint.parent_link in reached]
-        yield from ready
-        reached |= {joint.child_link for joint in ready}
-        waiting = [joint for joint in waiting if joint not in ready]
-
-
-def shapes_by_link(tree: UrdfTree) -> dict[str, list[tuple[str, str]]]:
-    """What is drawn of each link that moves, and of the root, with what is fixed to it.
-
-    These are entities and their shapes, keys of ``COLOURED``.
-    """
-    kinds = {}
-    for chunk in tree.stream().to_chunks():
-        for name in chunk.to_record_batch().schema.names:
-            shape, _, component = name.partition(":")
-            if shape in COLOURED and component != COLOURED[shape]:
-                kinds[chunk.entity_path] = shape
-    carrier = {tree.root_link().name: tree.root_link().name}
-    for joint in outwards(tree):
-        fixed = joint.joint_type == "fixed"
-        carrier[joint.child_link] = carrier[joint.parent_link] if fixed else joint.child_link
-    found: dict[str, list[tuple[str, str]]] = {}
-    for link, moved in carrier.items():
-        paths = tree.get_visual_geometry_paths(link)
-        found.setdefault(moved, []).extend((path, kinds[path]) for path in paths)
+def _carried(robot: Robot) -> list[int]:
+    """The joints that belong to a robot: where its base floats, the rest of the world does not."""
+    found = [1 if robot.floating_base else 0]
+    for index, joint in enumerate(robot.joints, start=1):
+        if joint.parent in found and joint.kind != "floating":
+            found.append(index)
     return found
 
 
+def _outermost(corners: Array) -> Array:
+    return np.asarray(corners[np.unique((corners @ DIRECTIONS.T).argmax(axis=0))])
+
+
+def _stl(triangles: Array) -> bytes:
+    """Triangles, shape (triangles, 3 corners, 3), as a binary STL file."""
+    facets = np.zeros(len(triangles), FACET)
+    facets["corners"] = triangles
+    edges = np.diff(triangles, axis=1)
+    across = np.cross(edges[:, 0], edges[:, 1])
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    facets["normal"] = across / np.where(length > 0.0, length, 1.0)
+    return bytes(HEADER - 4) + len(facets).to_bytes(4, "little") + facets.tobytes()
+
+
 def log_robots(
-    recording: rr.RecordingStream, runs: Mapping[str, Run], folder: Path, *, aspect: float
-) -> list[tuple[UrdfTree, Camera]]:
+    recording: rr.RecordingStream, runs: Mapping[str, Run], *, aspect: float
+) -> list[tuple[Drawn, Camera]]:
     """Log the robot of each side's run, its motion and the floor; colours have to follow.
 
     All are of one robot, and seen from where the camera sees both.
     """
-    trees, parts, poses = list[UrdfTree](), list[Iterator[Array]](), list[Array | None]()
-    drawn: dict[str, Array] = {}
+    found, seen = list[tuple[Drawn, Array | None]](), list[Iterator[Array]]()
     for side, run in runs.items():
         assert run.robot is not None
-        names = (*run.joint_names, *run.desired_joint_names)
-        tree, frames = load(run.robot, folder, names, side=side), shown(run)
-        log_shapes(recording, tree)
         assert run.position is not None
+        names, frames = (*run.joint_names, *run.desired_joint_names), shown(run)
+        moves = run.base_pose is not None
+        drawn = log_robot(recording, run.robot, names, side=side, moves=moves)
         columns = dict(zip(run.joint_names, run.position[frames].T, strict=True))
-        moved, index = angles(tree, columns), [axes.at(run.time[frames])]
-        for joint in tree.joints():
-            if joint.name in moved:
-                angle = moved[joint.name].tolist()
-                path = f"{origin(tree)}/motion/{joint.name}"
-                turns = joint.compute_transform_columns(angle, clamp=False)
-                recording.send_columns(path, indexes=index, columns=turns)
-        pose = None if run.base_pose is None else run.base_pose[frames].astype(np.float64)
-        if pose is not None:
-            _log_motion(recording, tree, "base", run, pose[:, :3], quaternion=pose[:, 3:])
-        trees.append(tree)
-        poses.append(pose if len(frames) else None)
-        drawn = drawn or outermost(drawn_file(run.robot, folder))
-        parts.append(reached(tree, drawn, moved, poses[-1]))
-    seen, cameras = fitted(chain(*parts), aspect=aspect), list[Camera]()
-    for tree, run, pose in zip(trees, runs.values(), poses, strict=True):
-        cameras.append(standing(seen, tree, moves=pose is not None))
-        if pose is not None:  # the camera follows on the floor below the base, without its turns
-            _log_motion(recording, tree, "view", run, pose[:, :3] * ON_FLOOR)
-            log_floor(recording, tree, cameras[-1], pose)
-    return list(zip(trees, cameras, strict=True))
-
-
-def _log_motion(
-    recording: rr.RecordingStream, tree: UrdfTree, name: str, run: Run, place: Array, **turn: Any
-) -> None:
-    """Log the motion of the root or of the camera's frame in the world."""
-    moves = tree.root_link().name if name == "base" else VIEW
-    columns = rr.Transform3D.columns(
-        translation=place,
-        parent_frame=[frame(tree, WORLD)] * len(place),
-        child_frame=[frame(tree, moves)] * len(place),
-        **turn,
-    )
-    index = [axes.at(run.time[shown(run)])]
-    recording.send_columns(f"{origin(tree)}/motion/{name}", indexes=index, columns=columns)
+        base = None if run.base_pose is None else run.base_pose[frames].astype(np.float64)
+        poses = drawn.poses(len(frames), columns, base)
+        index = [axes.at(run.time[frames].repeat(poses.shape[1]))]
+        recording.send_columns(f"/{drawn.origin}/motion", index, drawn.columns(poses))
+        if not len(frames):  # all of it is a gap: the robot at rest
+            base, poses = None, drawn.poses(1, {}, None)
+        found.append((drawn, base))
+        seen.append(reached(drawn, poses))
+    camera, cameras = fitted(chain(*seen), aspect=aspect), list[tuple[Drawn, Camera]]()
+    for drawn, base in found:
+        cameras.append((drawn, standing(camera, drawn)))
+        if base is not None:
+            log_floor(recording, drawn, camera, base)
+    return cameras
 
 
 def shown(run: Run) -> NDArray[np.intp]:
@@ -174,184 +205,24 @@ def shown(run: Run) -> NDArray[np.intp]:
     return frames[run.mask[frames]]
 
 
-def angles(tree: UrdfTree, columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Positions of all joints that move, by joint, mimics included, by those that are known."""
-    found = {}
-    for joint in tree.joints():
-        follows = joint.mimic
-        if joint.joint_type == "fixed":
-            continue
-        if follows is not None and follows.joint in columns:
-            found[joint.name] = columns[follows.joint] * follows.multiplier + follows.offset
-        elif joint.name in columns:
-            found[joint.name] = columns[joint.name]
-    return found
-
-
-def log_shapes(recording: rr.RecordingStream, tree: UrdfTree, *, coloured: bool = False) -> None:
-    """Log a robot at rest, with its own colours or without."""
-    unstable.log_up(recording)
-    colours = [":".join(pair) for pair in COLOURED.items()]
-    shapes = tree.stream()
-    recording.send_chunks(shapes if coloured else shapes.drop(components=colours))
-
-
 def log_colours(
     recording: rr.RecordingStream,
-    tree: UrdfTree,
+    drawn: Drawn,
     time: Array,
     colours: Mapping[str, NDArray[np.uint8]],
     *,
     rest: NDArray[np.uint8],
 ) -> None:
     """Log the colours of links over time, shape (steps, 4), and of what does not move."""
-    for link, shapes in shapes_by_link(tree).items():
+    for link in drawn.links:
         if link not in colours:
-            for path, kind in shapes:
-                colour = getattr(rr, kind).from_fields(**{COLOURED[kind]: rest})
-                recording.log(path, colour, static=True)
+            still = rr.Asset3D.from_fields(albedo_factor=rest)
+            recording.log(drawn.path(link), still, static=True)
             continue
         own = colours[link]
         changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
-        index = [axes.at(time[changed])]
-        for path, kind in shapes:
-            columns = getattr(rr, kind).columns(**{COLOURED[kind]: own[changed]})
-            recording.send_columns(path, indexes=index, columns=columns)
-
-
-DRAWN = {".stl", ".dae", ".obj", ".glb", ".gltf"}
-FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-
-
-def _not_drawn(mesh: str, problem: str) -> InspectorError:
-    """A mesh that is missing, lies outside of the robot's folders, or cannot be read."""
-    return InspectorError(f"mesh {mesh}: {problem}; `--robot none` shows the run without the robot")
-
-
-def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
-    """Rewrite a URDF for drawing.
-
-    Textures and simulator extensions are left out, addresses of meshes become absolute: rerun
-    refuses empty textures and needs an environment variable for ``package://``. For a link without
-    visual shapes the collision shapes are drawn.
-    """
-    tree = ET.parse(urdf).getroot()  # noqa: S314
-    for link in tree.iter("link"):
-        if link.find("visual") is None:
-            for shape in link.findall("collision"):
-                shape.tag = "visual"
-    for parent in list(tree.iter()):
-        for child in list(parent):
-            empty = child.tag == "texture" and not child.get("filename")
-            if empty or child.tag in ("collision", "gazebo", "transmission", "sensor"):
-                parent.remove(child)
-    for mesh in tree.iter("mesh"):
-        mesh.set("filename", f"file://{_checked(mesh.get('filename', ''), urdf, roots, folder)}")
-    return ET.tostring(tree, encoding="unicode")
-
-
-def drawable_mjcf(moved: Robot, folder: Path) -> str:
-    """Write the URDF of a robot that was read from an MJCF, for drawing.
-
-    Links are what moves with one joint, in that joint's axes. What is fixed to the world is the
-    root; where the base floats, the base is, and the rest of the world is left out.
-
-    Args:
-        folder: Takes the links' shapes as STL files, one for each colour.
-    """
-    assert moved.mjcf is not None
-    names = ["base", *link_names(moved)]
-    while names[0] in names[1:]:
-        names[0] += "_"
-    shapes: dict[tuple[int, tuple[float, ...]], list[Array]] = {}
-    try:
-        for joint, shape, triangles in pieces(moved):
-            if joint == 0 and all(known for known, _ in shapes):
-                names[0] = shape.link  # the foot of an arm
-            shapes.setdefault((joint, shape.colour), []).append(triangles)
-    except noisemodel.MeshError as error:
-        raise _not_drawn(error.mesh, error.problem) from error
-    tree = ET.Element("robot", name=moved.name)
-    base = 1 if moved.floating_base else 0
-    links = {base: ET.SubElement(tree, "link", name=names[base])}
-    for index, moving in enumerate(moved.joints, start=1):
-        if moving.kind != "floating" and moving.parent in links:
-            links[index] = ET.SubElement(tree, "link", name=names[index])
-            tree.append(_joint(moved, index, names[moving.parent], names[index]))
-    for number, ((joint, colour), parts) in enumerate(shapes.items()):
-        if joint not in links:
-            continue
-        visual = ET.SubElement(links[joint], "visual")
-        file = _write_stl(np.concatenate(parts), folder / f"{number}.stl")
-        ET.SubElement(ET.SubElement(visual, "geometry"), "mesh", filename=f"file://{file}")
-        material = ET.SubElement(visual, "material", name=f"colour{number}")
-        ET.SubElement(material, "color", rgba=_numbers(colour))
-    return ET.tostring(tree, encoding="unicode")
-
-
-def _joint(moved: Robot, index: int, parent: str, child: str) -> ET.Element:
-    """Write a joint of a robot that was read from an MJCF as a URDF has it."""
-    from pinocchio.rpy import matrixToRpy
-
-    assert moved.mjcf is not None
-    joint, place = moved.joints[index - 1], moved.model.jointPlacements[index]
-    kind = "prismatic" if joint.kind == "prismatic" else "continuous"
-    element = ET.Element("joint", name=joint.name, type=kind)
-    ET.SubElement(element, "parent", link=parent)
-    ET.SubElement(element, "child", link=child)
-    turn = _numbers(matrixToRpy(place.rotation))
-    ET.SubElement(element, "origin", xyz=_numbers(place.translation), rpy=turn)
-    axis = (np.eye(3) if joint.turn is None else joint.turn)[joint.axis]
-    ET.SubElement(element, "axis", xyz=_numbers(axis))
-    ET.SubElement(element, "limit", lower="-1e3", upper="1e3", effort="0", velocity="0")
-    if joint.name in moved.mjcf.mimics:
-        mimic = moved.mjcf.mimics[joint.name]
-        ratio = {"multiplier": repr(mimic.multiplier), "offset": repr(mimic.offset)}
-        ET.SubElement(element, "mimic", {"joint": mimic.joint, **ratio})
-    return element
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
-def _checked(address: str, urdf: Path, roots: Sequence[Path], folder: Path) -> Path:
-    """The file of a mesh; its triangles as the noise model reads them where rerun draws nothing."""
-    try:
-        path = find_mesh(address, urdf, roots)
-        if path.suffix.lower() not in DRAWN:
-            known = ", ".join(sorted(DRAWN))
-            raise _not_drawn(address, f"of kind {path.suffix!r}, expected {known}")
-        meshes.check_whole(path)  # the viewer draws nothing of others, without a warning
-        if path.suffix.lower() != ".dae" or _read_by_rerun(path):
-            return path
-        copy = folder / f"{hashlib.sha256(bytes(path)).hexdigest()[:16]}.stl"
-        return copy if copy.exists() else _write_stl(meshes.read(path), copy)
-    except noisemodel.MeshError as error:
-        raise _not_drawn(address or "''", error.problem) from error
-
-
-def _read_by_rerun(path: Path) -> bool:
-    """Whether rerun's reader of COLLADA draws a file; of others it draws nothing, silently.
-
-    As of 0.41 on the robots of example-robot-data: it takes triangles of version 1.4.1 only,
-    and turns what is not Z_UP, which URDFs do not mean.
-    """
-    text = path.read_text(encoding="utf-8", errors="replace")
-    others = re.search(r"<(polylist|polygons|tristrips|trifans)\b", text)
-    return not others and 'version="1.4.1"' in text and "<up_axis>Z_UP<" in text
-
-
-def _write_stl(triangles: Array, file: Path) -> Path:
-    """Write triangles, shape (triangles, 3 corners, 3), as a binary STL file."""
-    facets = np.zeros(len(triangles), FACET)
-    facets["corners"] = triangles
-    edges = np.diff(triangles, axis=1)
-    across = np.cross(edges[:, 0], edges[:, 1])
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    facets["normal"] = across / np.where(length > 0.0, length, 1.0)
-    file.write_bytes(bytes(80) + len(facets).to_bytes(4, "little") + facets.tobytes())
-    return file
+        columns = rr.Asset3D.columns(albedo_factor=own[changed])
+        recording.send_columns(drawn.path(link), [axes.at(time[changed])], columns)
 
 
 # Of the viewer's camera, from the lower to the upper edge, in [rad].
@@ -362,7 +233,6 @@ MARGIN = 0.08  # share of the picture that stays free at each edge
 # A robot that is smaller, such as one without any shape, is framed as if it were so large, [m].
 SMALLEST = 0.05
 ON_FLOOR = np.array([1.0, 1.0, 0.0])  # the camera follows a base along the floor, not up and down
-VIEW = "_view"  # frame of transforms that the camera moves with
 # Colour of the lines of a floor, and half of their width by their distance.
 FLOOR, THICKNESS = (58, 62, 70), 0.006
 MOST_LINES = 200  # lines of a floor in one direction
@@ -412,13 +282,13 @@ def sight() -> Array:
     return np.stack((right, np.cross(right, ahead), ahead))
 
 
-def standing(camera: Camera, tree: UrdfTree, *, moves: bool) -> Camera:
+def standing(camera: Camera, drawn: Drawn) -> Camera:
     """A camera in the frame of transforms that it stands in."""
-    own = frame(tree, VIEW if moves else tree.root_link().name)
-    return replace(camera, frame=own, moves=moves)
+    own = drawn.frame(VIEW if drawn.moves else WORLD)
+    return replace(camera, frame=own, moves=drawn.moves)
 
 
-def log_floor(recording: rr.RecordingStream, tree: UrdfTree, camera: Camera, pose: Array) -> None:
+def log_floor(recording: rr.RecordingStream, drawn: Drawn, camera: Camera, pose: Array) -> None:
     """Log a floor below all poses of a base, which stays where it is while the camera moves."""
     reach = 4.0 * float(np.linalg.norm(camera.eye - camera.target))
     low, high = pose[:, :2].min(axis=0) - reach, pose[:, :2].max(axis=0) + reach
@@ -431,66 +301,20 @@ def log_floor(recording: rr.RecordingStream, tree: UrdfTree, camera: Camera, pos
     )
     lines = [[(x, low[1], camera.floor), (x, high[1], camera.floor)] for x in across.tolist()]
     lines += [[(low[0], y, camera.floor), (high[0], y, camera.floor)] for y in along.tolist()]
-    path = f"{origin(tree)}/floor"
-    recording.log(path, rr.CoordinateFrame(frame(tree, WORLD)), static=True)
-    drawn = rr.LineStrips3D(lines, colors=[FLOOR] * len(lines), radii=spacing * THICKNESS)
-    recording.log(path, drawn, static=True)
+    path = f"/{drawn.origin}/floor"
+    recording.log(path, rr.CoordinateFrame(drawn.frame(WORLD)), static=True)
+    strips = rr.LineStrips3D(lines, colors=[FLOOR] * len(lines), radii=spacing * THICKNESS)
+    recording.log(path, strips, static=True)
 
 
-def outermost(urdf: Path) -> dict[str, Array]:
-    """Outermost points of the links that are drawn, by link, in its axes, in [m]."""
-    found: dict[str, list[Array]] = {}
-    for shape in shapes_in(urdf, "visual"):
-        body = shape.body
-        if isinstance(body, str):
-            try:
-                body = meshes.read(Path(body.removeprefix("file://")))
-            except noisemodel.MeshError:
-                body = np.zeros((1, 3))
-        corners = body.reshape(-1, 3)
-        chosen = corners[np.unique((corners @ DIRECTIONS.T).argmax(axis=0))]
-        found.setdefault(shape.link, []).append(chosen @ shape.matrix.T + shape.translation)
-    return {link: np.concatenate(parts) for link, parts in found.items()}
-
-
-def reached(
-    tree: UrdfTree, drawn: Mapping[str, Array], angles: Mapping[str, Array], base: Array | None
-) -> Iterator[Array]:
-    """Points of each link in all frames, from the place on the floor below the base, in [m].
-
-    Args:
-        angles: Of joints that move, each of shape (frames,), in [rad] or [m].
-        base: x, y, z and quaternion x, y, z, w of a base that moves, shape (frames, 7).
-    """
+def reached(drawn: Drawn, poses: Array) -> Iterator[Array]:
+    """Points of each link in all frames, from the place on the floor below the base, in [m]."""
     from scipy.spatial.transform import Rotation
 
-    at_root = np.eye(3), np.zeros(3)
-    if base is not None:
-        turned = Rotation.from_quat(base[:, 3:]).as_matrix()
-        at_root = turned, base[:, :3] * (1.0 - ON_FLOOR)
-    poses = {tree.root_link().name: at_root}
-    for joint in outwards(tree):
-        turned, shifted = poses[joint.parent_link]
-        own_turn, own_shift = pose(joint, angles.get(joint.name, np.zeros(())))
-        place = (turned @ own_shift[..., None])[..., 0] + shifted
-        poses[joint.child_link] = turned @ own_turn, place
-    drawn = drawn or dict.fromkeys(poses, np.zeros((1, 3)))
-    for link, own in drawn.items():
-        turned, shifted = poses[link]
+    below = poses[:, -1, :3] if drawn.moves else np.zeros(3)
+    for place, own in enumerate(drawn.outermost.values()):
+        turned = Rotation.from_quat(poses[:, place, 3:]).as_matrix()
         # One product for all frames: many of three by three would take much longer.
-        placed = (turned.reshape(-1, 3) @ own.T).reshape(-1, 3, len(own))
-        yield (placed + shifted.reshape(-1, 3, 1)).swapaxes(1, 2).reshape(-1, 3)
-
-
-def pose(joint: UrdfJoint, angle: Array) -> tuple[Array, Array]:
-    """Pose of a joint's child in the axes of its parent, for each angle in [rad] or [m]."""
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_euler("xyz", joint.origin_rpy)
-    place, axis = np.array(joint.origin_xyz), np.array(joint.axis)
-    if joint.joint_type == "fixed":
-        return turn.as_matrix(), place
-    along = angle[..., None] * axis / np.linalg.norm(axis)
-    if joint.joint_type == "prismatic":
-        return turn.as_matrix(), place + along @ turn.as_matrix().T
-    return (turn * Rotation.from_rotvec(along)).as_matrix(), place
+        points = (turned.reshape(-1, 3) @ own.T).reshape(-1, 3, len(own))
+        shifted = (poses[:, place, :3] - below)[..., None]
+        yield (points + shifted).swapaxes(1, 2).reshape(-1, 3)

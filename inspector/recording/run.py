@@ -5,16 +5,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from math import ceil
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import rerun as rr
-from rerun.urdf import UrdfTree
 
 from inspector import levels
 from inspector.analysis import LOUDEST, Analysis, worst, worst_joint, worst_signal
 from inspector.levels import spectrogram
 from inspector.recording import axes, panels, robot, unstable
+from inspector.recording.robot import Drawn
 from inspector.recording.unstable import Part
 from inspector.reference.judging import Comparison
 from inspector.report.findings import report, spoken
@@ -96,13 +95,11 @@ def write(
     """
     run, moments = analysis.run, worst(analysis)
     beside = None if beside is None or beside.empty else beside
-    identity = analysis.sha256
-    with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
+    with writing(path, analysis.sha256, overwrite=overwrite) as recording:
         axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
-        tree, left = None, _log_findings(recording, analysis)
+        drawn, left = None, _log_findings(recording, analysis)
         if analysis.links is not None:
-            robots = robot.log_robots(recording, {"": run}, Path(folder), aspect=ASPECT)
-            ((tree, seen),) = robots
+            ((drawn, seen),) = robot.log_robots(recording, {"": run}, aspect=ASPECT)
             rest = WHOLE - DETAILS - sum(size for _, size in left)
             left.append((panels.robot_view(seen), rest))
         details = unstable.tabs(*panels.log_details(recording, analysis, moments))
@@ -110,7 +107,7 @@ def write(
             *panels.log_classes(recording, analysis),
             *panels.log_curves(recording, analysis, beside),
             (_log_spectra(recording, analysis), panels.HEIGHT + TITLES),
-            _log_strips(recording, analysis, tree, beside),
+            _log_strips(recording, analysis, drawn, beside),
         ]
         _log_text(recording, analysis)
         whole = unstable.beside(
@@ -157,19 +154,21 @@ def _log_spectra(recording: rr.RecordingStream, analysis: Analysis) -> Part:
 def _log_strips(
     recording: rr.RecordingStream,
     analysis: Analysis,
-    tree: UrdfTree | None,
+    drawn: Drawn | None,
     beside: Comparison | None,
 ) -> axes.Timed:
     """Log levels of joints and links; they, scores, and each limb's signals."""
     run, links = analysis.run, analysis.links
     strips = [] if beside is None else [panels.log_over(recording, beside)]
     strips += panels.log_joint_levels(recording, analysis)
-    if tree is not None and links is not None:
-        strips.append(panels.log_links(recording, tree, analysis, links))
+    if drawn is not None and links is not None:
+        strips.append(panels.log_links(recording, drawn, analysis, links))
     parts = [part for part, _ in strips]
     if analysis.labels is not None:
         parts.append(unstable.plot("Scores", "/score", axes.ALL, legend=True))
-    parts += panels.log_joints(recording, run, panels.limbs(run.joint_names, tree))
+    parts += panels.log_joints(
+        recording, run, panels.limbs(run.joint_names, drawn.robot if drawn else None)
+    )
     lowest = max((size for _, size in strips), default=160.0)
     return unstable.tabs(*parts), lowest + TITLES
 
