@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -156,35 +155,32 @@ def _powers(run: Run) -> tuple[Array, Array, Array]:
     return mask.astype(np.float64), level, level**2
 
 
+SIDES = ("before", "after")
 SAME_RATE = 1e-3  # rates that differ by less are one
 REMARKED = 0.005  # time from which on a stretch that is left out is remarked on, in [s]
 
 
 def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
     """Two runs with the signals and the rate that both have."""
-    remarks = []
+    sides, remarks = [before, after], []
     for field, name in (
         ("velocity_desired", "desired velocities"),
         ("base_velocity", "a base velocity"),
     ):
-        having = [run for run in (before, after) if getattr(run, field) is not None]
-        if len(having) == 1:
-            which = "before" if having[0] is before else "after"
+        having = [getattr(run, field) is not None for run in sides]
+        if sum(having) == 1:
+            which, nothing = SIDES[having.index(True)], {field: None}
             remarks.append(f"Only the run {which} has {name}: they are left out of both.")
-            nothing: dict[str, Any] = {field: None}
-            before, after = replace(before, **nothing), replace(after, **nothing)
+            sides = [replace(run, **nothing) for run in sides]  # type: ignore[arg-type]
     rate = min(before.rate, after.rate)
-    for which, run in (("before", before), ("after", after)):
+    for place, run in enumerate(sides):
         if run.rate > rate * (1 + SAME_RATE):
             remarks.append(
-                f"The run {which} is decimated from {run.rate:g} Hz to the {rate:g} Hz of the"
-                " other, without its positions and efforts."
+                f"The run {SIDES[place]} is decimated from {run.rate:g} Hz to the {rate:g} Hz of"
+                " the other, without its positions and efforts."
             )
-    before, after = (
-        run if run.rate <= rate * (1 + SAME_RATE) else decimated(run, rate)
-        for run in (before, after)
-    )
-    return before, after, tuple(remarks)
+            sides[place] = decimated(run, rate)
+    return sides[0], sides[1], tuple(remarks)
 
 
 def together(before: Run, after: Run, alignment: Alignment) -> tuple[Run, Run, tuple[str, ...]]:
@@ -197,30 +193,25 @@ def together(before: Run, after: Run, alignment: Alignment) -> tuple[Run, Run, t
             f" {alignment.seconds:+.2f} s from it: they share no time; `--align start` lays their"
             " starts beside each other"
         )
-    time = before.time[first:stop]
-    cut_before = _cut(before, first, stop, time)
-    cut_after = _cut(after, first - alignment.lag, stop - alignment.lag, time)
-    remarks = [
-        f"The run {which} has {run.duration - cut.duration:.2f} s that the other one has not:"
-        " they are not compared."
-        for which, run, cut in (("before", before, cut_before), ("after", after, cut_after))
-        if run.duration - cut.duration >= REMARKED
-    ]
-    return cut_before, cut_after, tuple(remarks)
+    time, lag = before.time[first:stop], alignment.lag
+    cut = _cut(before, first, stop, time), _cut(after, first - lag, stop - lag, time)
+    left = [run.duration - own.duration for run, own in zip((before, after), cut, strict=True)]
+    remarks = (
+        f"The run {which} has {more:.2f} s that the other one has not: they are not compared."
+        for which, more in zip(SIDES, left, strict=True)
+        if more >= REMARKED
+    )
+    return *cut, tuple(remarks)
 
 
 def _cut(run: Run, first: int, stop: int, time: Array) -> Run:
     """A part of a run, with other times; blocks are moved and cut with it."""
     shift, begin, end = float(time[0] - run.time[first]), float(time[0]), float(time[-1])
-    moved = [
-        Block(max(block.start + shift, begin), min(block.stop + shift, end), block.label)
-        for block in run.blocks
-    ]
-    blocks = tuple(block for block in moved if block.start < block.stop)
+    moved = [(max(b.start + shift, begin), min(b.stop + shift, end), b.label) for b in run.blocks]
+    blocks = tuple(Block(*each) for each in moved if each[0] < each[1])
     return part(run, first, stop, time=time, blocks=blocks)
 
 
-SIDES = ("before", "after")
 TIMED = "Findings at the same time are matched; for runs of other motions, use `inspector diff`."
 
 
@@ -254,19 +245,16 @@ class Pair:
         return self.before.run.mask & self.after.run.mask
 
     @cached_property
-    def vibration(self) -> tuple[Array, Array]:
+    def vibration(self) -> list[Array]:
         """The noise above 10 Hz of both, each of shape (samples,), in [rad/s]; 0 in gaps."""
-        fast = (
-            vibrating(side.noise[:, None], self.valid, self.rate)[:, 0] for _, side in self.sides
-        )
-        return next(fast), next(fast)
+        noises = [side.noise[:, None] for _, side in self.sides]
+        return [vibrating(each, self.valid, self.rate)[:, 0] for each in noises]
 
     @property
     def links(self) -> tuple[LinkNoise, LinkNoise] | None:
         """Noise of the links of both; None unless both are of one robot."""
-        if self.before.links is None or self.after.links is None:
-            return None
-        return self.before.links, self.after.links
+        before, after = self.before.links, self.after.links
+        return None if before is None or after is None else (before, after)
 
 
 def compare(
@@ -331,16 +319,17 @@ class Level:
         return 0.0 if self.before == self.after else self.after - self.before
 
 
-def spectra(pair: Pair, joint: str = "") -> tuple[Spectrogram, Spectrogram]:
+def spectra(pair: Pair, joint: str = "") -> list[Spectrogram]:
     """Spectrograms of both runs, of a joint above 10 Hz or of the noise; windows without a gap."""
     found = []
     for _, side in pair.sides:
         own = worst_signal(side, side.run.joint_names.index(joint)) if joint else side.noise
         each = spectrogram(own, pair.rate, start=float(pair.time[0]), valid=pair.valid)
         kept = each.valid
-        time, amplitude = each.time[kept], each.amplitude[:, kept]
-        found.append(replace(each, time=time, amplitude=amplitude, valid=kept[kept]))
-    return found[0], found[1]
+        found.append(
+            Spectrogram(each.time[kept], each.frequency, each.amplitude[:, kept], kept[kept])
+        )
+    return found
 
 
 def steps(pair: Pair) -> tuple[Array, Array]:
@@ -471,40 +460,27 @@ def _counts(found: Sequence[Change]) -> str:
 def report(pair: Pair) -> str:
     """The report of two runs, in Markdown."""
     parts = [f"### {pair.before.name} → {pair.after.name}", f"**{summary(pair)}**"]
-    found = sorted(changes(pair), key=lambda change: (KINDS.index(change.kind), change.start))
-    if found:
-        events = [
-            (f"**{c.kind}**", spoken(c.label), f"{c.start:.2f} to {c.stop:.2f}", *_numbers(c.level))
-            for c in found
-        ]
-        title = "finding" if labelled(pair) else "annotated"
-        parts += [_table(("", title, "time [s]", "before [dB]", "after [dB]", "change"), events)]
-    parts += [_largest(pair), f"Aligned {pair.alignment}. Levels above 10 Hz in dB re 1 rad/s."]
-    if pair.remarks:
-        parts += ["#### Remarks", "\n".join(f"- {remark}" for remark in pair.remarks)]
-    return "\n\n".join(parts) + "\n"
-
-
-def _largest(pair: Pair) -> str:
-    """Where the level changed most, in a sentence."""
+    title = "finding" if labelled(pair) else "annotated"
+    rows: list[tuple[str, ...]] = [
+        ("", title, "time [s]", "before [dB]", "after [dB]", "change"),
+        ("---",) * 6,
+    ]
+    for each in sorted(changes(pair), key=lambda change: (KINDS.index(change.kind), change.start)):
+        when, both = f"{each.start:.2f} to {each.stop:.2f}", (each.level.before, each.level.after)
+        levels = [f"{value:.1f}" if np.isfinite(value) else "silent" for value in both]
+        numbers = (*levels, f"{each.level.change:+.1f}")
+        rows.append((f"**{each.kind}**", spoken(each.label), when, *numbers))
+    if len(rows) > 2:
+        parts.append("\n".join(f"| {' | '.join(cells)} |" for cells in rows))
     time, level = steps(pair)
     change = level[:, 1] - level[:, 0]
     place = int(np.abs(change).argmax())
-    if change[place] == 0.0:
-        return "The level is the same at all times."
-    return f"Largest change of level: **{change[place]:+.0f} dB at {time[place]:.2f} s**."
-
-
-def _numbers(level: Level) -> tuple[str, str, str]:
-    before, after = (
-        f"{value:.1f}" if np.isfinite(value) else "silent" for value in (level.before, level.after)
-    )
-    return before, after, f"{level.change:+.1f}"
-
-
-def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+    most = f"Largest change of level: **{change[place]:+.0f} dB at {time[place]:.2f} s**."
+    parts.append(most if change[place] else "The level is the same at all times.")
+    parts.append(f"Aligned {pair.alignment}. Levels above 10 Hz in dB re 1 rad/s.")
+    if pair.remarks:
+        parts += ["#### Remarks", "\n".join(f"- {remark}" for remark in pair.remarks)]
+    return "\n\n".join(parts) + "\n"
 
 
 # --- the recording
@@ -574,13 +550,6 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[P
     return parts
 
 
-def log_noise(recording: rr.RecordingStream, pair: Pair) -> Part:
-    """Log both noises."""
-    sides, shades = dict(pair.sides), list(SIDE_COLORS.values())
-    ends = panels.log_noise(recording, NOISE_PANEL, sides, shades, _sides(), NOISE_POINTS)
-    return axes.timed(NOISE_PANEL, title="Noise", name="Noise", between=ends)[0]
-
-
 def _sides(*places: float) -> list[Label]:
     return [
         Label(place, name, color=color)
@@ -595,13 +564,10 @@ BETWEEN = {"before": ((0.06, 0.34), (0.37, 0.45)), "after": ((0.52, 0.80), (0.83
 
 def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Timed:
     """Log found and annotated classes, and the changes."""
-    occur = {
-        name: None
-        for _, one in pair.sides
-        for name in classes_of(one)
-        if name != "ok" and any(_occurs(side, name) for _, side in pair.sides)
-    }
-    names = list(occur)
+    both = [side for _, side in pair.sides]
+    every = dict.fromkeys(name for side in both for name in classes_of(side) if name != "ok")
+    there = {block.label for side in both for block in side.run.blocks}
+    names = [n for n in every if n in there or any(found_stretches(side, n) for side in both)]
     panel = Panel("class", max(ROW * len(names), LEAST) + axes.AXIS)
     for row, name in enumerate(names):
         for side, analysis in pair.sides:
@@ -621,12 +587,6 @@ def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Chang
             warnings=[change.kind == NEW for change in found],
         )
     return axes.timed(panel)
-
-
-def _occurs(side: Analysis, name: str) -> bool:
-    return bool(found_stretches(side, name)) or any(
-        block.label == name for block in side.run.blocks
-    )
 
 
 JOINT_POINTS = 2000  # points of a line: there are two for each signal of a joint
@@ -693,19 +653,16 @@ def _log_robots(recording: rr.RecordingStream, pair: Pair) -> tuple[dict[str, Dr
 
 def _log_details(recording: rr.RecordingStream, pair: Pair, drawn: Mapping[str, Drawn]) -> Part:
     """Log what lies behind each other: spectra, noise, signals of joints."""
-    parts = [*log_spectra(recording, pair, _joint(pair)), log_noise(recording, pair)]
+    worst = worst_joint(pair.after)
+    joint = "" if worst is None else pair.after.run.joint_names[worst]
+    parts = log_spectra(recording, pair, joint if joint in pair.before.run.joint_names else "")
+    sides, shades = dict(pair.sides), list(SIDE_COLORS.values())
+    ends = panels.log_noise(recording, NOISE_PANEL, sides, shades, _sides(), NOISE_POINTS)
+    parts.append(axes.timed(NOISE_PANEL, title="Noise", name="Noise", between=ends)[0])
     names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
     after = drawn.get("after")
     limbs = panels.limbs(tuple(names), after.robot if after else None)
-    parts += log_joints(recording, pair, limbs)
-    return unstable.tabs(*parts)
-
-
-def _joint(pair: Pair) -> str:
-    """The joint whose spectra are shown: the worst one after, if both runs have it."""
-    joint = worst_joint(pair.after)
-    name = "" if joint is None else pair.after.run.joint_names[joint]
-    return name if name in pair.before.run.joint_names else ""
+    return unstable.tabs(*parts, *log_joints(recording, pair, limbs))
 
 
 def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Part:
