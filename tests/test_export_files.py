@@ -10,7 +10,7 @@ from commandline import call
 from mcap.reader import make_reader
 
 from inspector.analysis import estimate
-from inspector.export.tables import collect, export
+from inspector.export import collect, export
 from inspector.library import demo_run, load_library, model_files
 from noisemodel import Block, Run, simplified
 

@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from inspector.errors import InspectorError
-from inspector.export.labels import read_labels, write_labels
+from inspector.export import read_labels, write_labels
 from inspector.library import demo_run
 from noiseclassifier import Event
 from noisemodel import Block, OutputError, Run, RunError

@@ -9,7 +9,7 @@ import pytest
 import noiseclassifier as nc
 from inspector import training, verdict
 from inspector.errors import InspectorError
-from inspector.export.labels import read_labels
+from inspector.export import read_labels
 from inspector.live import LiveError, LiveSession
 from inspector.live.pipe import reader_of
 from inspector.logs.mapping import ReadOptions

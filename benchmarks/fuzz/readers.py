@@ -25,7 +25,7 @@ import noisemodel as nm
 from inspector import training, verdict
 from inspector.analysis import analyse
 from inspector.errors import InspectorError
-from inspector.export.labels import read_labels
+from inspector.export import read_labels
 from inspector.library import load_library, model_files
 from inspector.live import pipe
 from inspector.live.samples import Clock, Warnings

@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 
 import typer
 
+from inspector import export as exports
 from inspector.analysis import analyse
 from inspector.commands import shared
 from inspector.commands.shared import argument, opened, option
 from inspector.errors import EXIT, OUTPUT_LOST, Status, worst
-from inspector.export import tables
-from inspector.export.labels import read_labels, write_labels
+from inspector.export import read_labels, write_labels
 from inspector.library import load_library
 from inspector.logs.read import import_logs, listing
 from inspector.text import counted, printable, progress
@@ -108,7 +108,7 @@ def export(
             typer.echo(f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s")
         told = counted(len(spans), "label")
     else:
-        written = tables.export(recorded, output, library, kind=kind, overwrite=overwrite)
+        written = exports.export(recorded, output, library, kind=kind, overwrite=overwrite)
         typer.echo(f"{run}: {written.analysis.headline}")
         for remark in written.remarks:
             typer.echo(f"  {remark}")

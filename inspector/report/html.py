@@ -15,13 +15,13 @@ from xml.etree import ElementTree as ET
 
 from inspector.analysis import Analysis
 from inspector.errors import Status
-from inspector.export.sound import clip, worst_time
 from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
 from inspector.report import findings
 from inspector.report.findings import COUNTED, excused, failing, spoken
 from inspector.report.formats import summary
 from inspector.report.picture import picture, require
+from inspector.sound import clip, worst_time
 from inspector.verdict import Verdict
 from noisemodel.files import write_whole
 
