@@ -21,11 +21,10 @@ import csv
 import heapq
 import io
 import json
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
-from math import inf, isfinite
+from math import inf, isfinite, isnan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -231,9 +230,15 @@ def _topics(content: Content) -> dict[str, tuple[dict[str, Any], Iterator[Row]]]
     noise = {"time": content.time, "simplified": content.simplified}
     if content.extended is not None:
         noise["extended"] = content.extended
+    samples = zip(*(each.tolist() for each in noise.values()), strict=True)
+    (start, level), number = analysis.noise_level, {"level": NUMBER}
+    levels = zip(start.tolist(), level[:, 0].tolist(), strict=True)
     topics: dict[str, tuple[dict[str, Any], Iterator[Row]]] = {
-        "/noise": (dict.fromkeys(noise, NUMBER), _noise(noise)),
-        "/level": ({"level": NUMBER}, _levels(analysis)),
+        "/noise": (
+            dict.fromkeys(noise, NUMBER),
+            ((row[0], dict(zip(noise, row, strict=True))) for row in samples),
+        ),
+        "/level": (number, ((at, {"level": each}) for at, each in levels if not isnan(each))),
     }
     if analysis.labels is not None:
         scores = dict.fromkeys(analysis.labels.classes, NUMBER)
@@ -255,19 +260,6 @@ def _stamp(zero: int, time: float) -> int:
 def _serialised(topic: str, rows: Iterator[Row], zero: int) -> Iterator[Message]:
     for time, message in rows:
         yield _stamp(zero, time), topic, json.dumps(message, allow_nan=False).encode()
-
-
-def _noise(columns: dict[str, Array]) -> Iterator[Row]:
-    for row in zip(*(each.tolist() for each in columns.values()), strict=True):
-        yield row[0], dict(zip(columns, row, strict=True))
-
-
-def _levels(analysis: Analysis) -> Iterator[Row]:
-    """The level of the noise above 10 Hz, where it is known."""
-    start, level = analysis.noise_level
-    for time, each in zip(start.tolist(), level[:, 0].tolist(), strict=True):
-        if not math.isnan(each):
-            yield time, {"level": each}
 
 
 def _frames(labels: nc.Labels, alarm: float | None) -> Iterator[Row]:

@@ -65,6 +65,11 @@ class Sound:
         return np.asarray(fft.irfft(spectrum, size) * (size / len(self.signal)))
 
     @property
+    def stop(self) -> float:
+        """End in the run, in [s]."""
+        return self.start + len(self.signal) / self.rate
+
+    @property
     def peak(self) -> float:
         """Largest value, in [rad/s]."""
         return float(np.abs(self.played).max(initial=0.0))
@@ -96,16 +101,6 @@ class Sound:
         rms = float(np.sqrt(np.mean(np.square(self.signal))))
         level = f"peak {self.peak:.3g} rad/s, rms {rms:.3g} rad/s"
         return f"{self.what}: {'silent' if self.silent else level}"
-
-
-@dataclass(frozen=True)
-class Clip:
-    """A sound of 16 kHz to be embedded in a recording or a page."""
-
-    data: bytes  # a WAV file
-    start: float  # start in the run, in [s]
-    stop: float  # end in the run, in [s]
-    description: str  # what it is, at which gain
 
 
 def sonify(run: nm.Run, *, joint: str = "", speed: float = 1.0, playing: int = RATE) -> Sound:
@@ -149,8 +144,8 @@ def worst_time(analysis: Analysis) -> float:
     return moments[0].peak if moments else 0.0
 
 
-def clip(run: nm.Run, *, around: float = 0.0) -> Clip | None:
-    """Sound of a run's simplified noise; None if nothing in the run is audible.
+def clip(run: nm.Run, *, around: float = 0.0) -> Sound | None:
+    """Sound of 16 kHz of a run's simplified noise; None if nothing in the run is audible.
 
     Args:
         around: Middle of the part that is used if the run is too long, in [s].
@@ -161,16 +156,9 @@ def clip(run: nm.Run, *, around: float = 0.0) -> Clip | None:
     middle = int(np.searchsorted(run.time, around))
     first = min(max(middle - count // 2, 0), len(run.time) - count)
     try:
-        sound = sonify(part(run, first, first + count), playing=SMALL_RATE)
+        return sonify(part(run, first, first + count), playing=SMALL_RATE)
     except InspectorError:
         return None
-    gain = common_gain([sound])
-    return Clip(
-        data=sound.file(gain),
-        start=sound.start,
-        stop=sound.start + len(sound.signal) / sound.rate,
-        description=f"{sound.what}, {sound.description(gain)}",
-    )
 
 
 def mix(

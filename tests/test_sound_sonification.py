@@ -172,5 +172,5 @@ def test_a_clip_has_the_whole_run_or_the_part_around_its_worst_moment(monkeypatc
     monkeypatch.setattr("inspector.sound.MOST_VELOCITIES", 10_000)
     part = clip(run, around=1.5)
     assert (part.start, part.stop) == (1.25, 1.75)
-    samples, rate = read(part.data)
+    samples, rate = read(part.file(common_gain([part])))
     assert (len(samples), rate) == (8000, 16_000)

@@ -21,7 +21,7 @@ from inspector.report import findings
 from inspector.report.findings import COUNTED, excused, failing, spoken
 from inspector.report.formats import summary
 from inspector.report.picture import picture, require
-from inspector.sound import clip, worst_time
+from inspector.sound import clip, common_gain, worst_time
 from inspector.verdict import Verdict
 from noisemodel.files import write_whole
 
@@ -87,10 +87,11 @@ def page(
     if (sound := clip(analysis.run, around=worst_time(analysis))) is None:
         add_text(body, "p", "The log's rate is too low for audible frequencies.", "note")
     else:
-        source = f"data:audio/wav;base64,{_encoded(sound.data)}"
+        gain = common_gain([sound])
+        source = f"data:audio/wav;base64,{_encoded(sound.file(gain))}"
         ET.SubElement(body, "audio", controls="controls", src=source)
-        span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.description}."
-        add_text(body, "p", f"{span} {AUDIBLE}", "note")
+        span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.what}"
+        add_text(body, "p", f"{span}, {sound.description(gain)}. {AUDIBLE}", "note")
     _add_list(body, "What the log can show", audit.splitlines())
     _add_list(body, "Remarks", [spoken(remark) for remark in analysis.remarks])
     made = (
