@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
 from inspector.logs.clocks import resampled
-from inspector.logs.log import Stamps, Track
-from inspector.logs.mapping import pose_of, velocity_of
+from inspector.logs.mapping import Stamps, Track, pose_of, velocity_of
 
 TURNS = Rotation.random(50, rng=0)
 POSES = np.hstack((np.zeros((50, 3)), TURNS.as_quat()))

@@ -30,8 +30,7 @@ from inspector.library import load_library, model_files
 from inspector.live import pipe
 from inspector.live.samples import Clock, Warnings
 from inspector.logs.clocks import ordered, stamps_of
-from inspector.logs.log import Track
-from inspector.logs.mapping import ReadOptions, parse_mapping
+from inspector.logs.mapping import ReadOptions, Track, parse_mapping
 from inspector.logs.names import (
     Naming,
     array_signal,

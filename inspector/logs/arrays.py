@@ -24,8 +24,16 @@ from numpy.typing import NDArray
 
 from inspector.errors import LogError
 from inspector.logs.clocks import stamps_of
-from inspector.logs.log import Entry, Field, Log, LogReader, Stamps
-from inspector.logs.mapping import COMMAND, ReadOptions, no_motion
+from inspector.logs.mapping import (
+    COMMAND,
+    Entry,
+    Field,
+    Log,
+    LogReader,
+    ReadOptions,
+    Stamps,
+    no_motion,
+)
 from inspector.logs.names import (
     SIGNALS,
     TIMES,

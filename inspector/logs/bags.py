@@ -33,8 +33,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zstandard import ZstdDecompressor
 
 from inspector.errors import LogError
-from inspector.logs.log import Field, Log, LogReader, Stamps
-from inspector.logs.mapping import ReadOptions
+from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps
 from inspector.logs.names import listed
 from inspector.text import counted, natural
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line

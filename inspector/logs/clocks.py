@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.log import SAMPLES, UNIFORM, Stamps, Track
-from inspector.logs.mapping import ReadOptions
+from inspector.logs.mapping import SAMPLES, UNIFORM, ReadOptions, Stamps, Track
 from inspector.logs.names import TIME_UNITS, time_column, without_unit
 from inspector.text import counted
 from noisemodel import Run

@@ -19,8 +19,7 @@ import numpy as np
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, log_of
 from inspector.logs.clocks import stamps_since
-from inspector.logs.log import Log, LogReader, Stamps
-from inspector.logs.mapping import ReadOptions, no_motion
+from inspector.logs.mapping import Log, LogReader, ReadOptions, Stamps, no_motion
 from inspector.logs.names import (
     JOINT_SIGNALS,
     TIME_UNITS,

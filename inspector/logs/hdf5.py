@@ -28,8 +28,7 @@ from inspector.logs.arrays import (
     part_of,
     stated_rate,
 )
-from inspector.logs.log import Log, LogReader
-from inspector.logs.mapping import ReadOptions
+from inspector.logs.mapping import Log, LogReader, ReadOptions
 from inspector.logs.names import TIMES, listed
 from inspector.text import counted
 from noisemodel.runfile import ArchiveError, check_unpacked, one_line

@@ -24,8 +24,7 @@ from inspector.logs.clocks import (
     synchronise,
     updates,
 )
-from inspector.logs.log import SAMPLES, UNIFORM, Log, Stamps, Track
-from inspector.logs.mapping import ReadOptions, tracks_of
+from inspector.logs.mapping import SAMPLES, UNIFORM, Log, ReadOptions, Stamps, Track, tracks_of
 from inspector.logs.names import listed
 from inspector.text import counted, plain
 from noisemodel import Robot, Run

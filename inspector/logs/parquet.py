@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, floats, log_of
 from inspector.logs.clocks import stamps_of
-from inspector.logs.log import Field, Log, LogReader, Stamps
-from inspector.logs.mapping import ReadOptions, no_motion
+from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, no_motion
 from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of

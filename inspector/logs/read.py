@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from inspector.errors import InspectorError, LogError
-from inspector.logs.log import LogReader
-from inspector.logs.mapping import ReadOptions, read_options
+from inspector.logs.mapping import LogReader, ReadOptions, read_options
 from inspector.logs.motion import Imported, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
 from inspector.logs.plausibility import check_joints, contradictions, limit_warnings, named
