@@ -33,6 +33,7 @@ from inspector.logs.mapping import (
     ReadOptions,
     Stamps,
     no_motion,
+    reading,
 )
 from inspector.logs.names import (
     SIGNALS,
@@ -46,7 +47,7 @@ from inspector.logs.names import (
 )
 from noisemodel import Run, RunError, runfile
 from noisemodel.run import check_time
-from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
+from noisemodel.runfile import PIECE, ArchiveError, check_unpacked
 from noisemodel.types import Real
 
 COPY = "copy"
@@ -429,21 +430,19 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    try:
-        with path.open("rb") as stream:
-            if stream.read(len(MAGIC_PREFIX)) == MAGIC_PREFIX:
-                stream.seek(0)
-                array = np.asarray(runfile.read_array(stream, "it", path.stat().st_size))
-                names = array.dtype.names or ()
-                return {name: array[name] for name in names} if names else {ALONE: array}
-        return runfile.read_npz(path)
-    except OSError as error:
-        raise LogError(path, f"cannot be read ({error.strerror or error})") from error
-    except runfile.ObjectArrayError as error:
-        problem = f"not an archive of plain arrays: {error.name!r} holds {OBJECTS}"
-        raise LogError(path, problem) from error
-    except ArchiveError as error:
-        raise LogError(path, f"not an archive of plain arrays: {error}") from error
+    with reading(path), path.open("rb") as stream:
+        try:
+            if stream.read(len(MAGIC_PREFIX)) != MAGIC_PREFIX:
+                return runfile.read_npz(path)
+            stream.seek(0)
+            array = np.asarray(runfile.read_array(stream, "it", path.stat().st_size))
+        except ArchiveError as error:
+            what = str(error)
+            if isinstance(error, runfile.ObjectArrayError):
+                what = f"{error.name!r} holds {OBJECTS}"
+            raise LogError(path, f"not an archive of plain arrays: {what}") from error
+    names = array.dtype.names or ()
+    return {name: array[name] for name in names} if names else {ALONE: array}
 
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
@@ -509,16 +508,12 @@ def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log
 def _variables(path: Path) -> dict[str, NDArray[Any]]:
     """Arrays of numbers in a file, and in the fields of a struct."""
     found: dict[str, NDArray[Any]] = {}
-    try:
+    with reading(path, (struct_error, ValueError)):  # such as of a shape that no array has
         for data in _unpacked_variables(path.read_bytes()):
             texts = (part[1:] for part in _elements(data, 8, len(data)) if part[0] in (1, 2))
             name = data[slice(*next(texts, (0, 0)))].decode("latin1")
             if name and not name.startswith("__"):
                 found |= _numbers_in(data, 8, len(data), name)
-    except (ArchiveError, OSError) as error:
-        raise LogError(path, one_line(error)) from error
-    except (struct_error, ValueError) as error:  # a shape that no array has
-        raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
     return found
 
 

@@ -17,6 +17,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -33,7 +34,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zstandard import ZstdDecompressor
 
 from inspector.errors import LogError
-from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps
+from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, reading
 from inspector.logs.names import listed
 from inspector.text import counted, natural
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
@@ -101,28 +102,6 @@ STATES = (
 )
 
 
-def decoder(path: Path, topic: Topic) -> Callable[[bytes], Any]:
-    """What deserialises the messages of a topic, by the version of their type that fits."""
-    versions = list(STATES if topic.type == STATE else [""])
-
-    def decode(data: bytes) -> Any:
-        problem: Exception | None = None
-        for version in versions:
-            store = _store(topic.type, version, topic.ros1)
-            parse = store.deserialize_ros1 if topic.ros1 else store.deserialize_cdr
-            try:
-                message = parse(data, topic.type)
-            except DAMAGE as error:
-                problem = error
-                continue
-            versions[:] = [version]
-            return message
-        what = " ".join(str(problem).split()) or type(problem).__name__
-        raise LogError(path, f"{topic.name}: a message is not a {topic.type} ({what})")
-
-    return decode
-
-
 @cache  # a store takes 20 ms to make
 def _store(kind: str, definition: str, ros1: bool) -> Any:
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
@@ -131,24 +110,16 @@ def _store(kind: str, definition: str, ros1: bool) -> Any:
     return store
 
 
-def _nanoseconds(time: Any) -> int:
-    """Time of ROS, in [ns]."""
-    return int(time.sec) * 10**9 + int(time.nanosec)
+# What a message tells: joints, and numbers by the array's name.
+Row: TypeAlias = tuple[tuple[str, ...], Mapping[str, Any]]
 
 
-# Rows of messages
-
-# What a message tells at one time: joints, stamp in [ns], and numbers by the array's name.
-Row: TypeAlias = tuple[tuple[str, ...], int, Mapping[str, Any]]
-
-
-def _of_state(message: Any) -> Iterator[Row]:
+def _of_state(message: Any) -> Row:
     """Row of a ``sensor_msgs/JointState``."""
-    parts = {name: getattr(message, name) for name in ARRAYS}
-    yield tuple(message.name), _nanoseconds(message.header.stamp), parts
+    return tuple(message.name), {name: getattr(message, name) for name in ARRAYS}
 
 
-def _of_controller(message: Any) -> Iterator[Row]:
+def _of_controller(message: Any) -> Row:
     """Row of a controller's state; of the two names of a stage the one that is not empty."""
     parts: dict[str, Any] = {}
     for stages in (("reference", "desired"), ("feedback", "actual")):
@@ -157,21 +128,20 @@ def _of_controller(message: Any) -> Iterator[Row]:
             if point is not None and (len(point.positions) or len(point.velocities)):
                 parts |= {f"{stage}/{name}": getattr(point, name, ()) for name in POINT}
                 break
-    yield tuple(message.joint_names), _nanoseconds(message.header.stamp), parts
+    return tuple(message.joint_names), parts
 
 
-def _of_odometry(message: Any) -> Iterator[Row]:
+def _of_odometry(message: Any) -> Row:
     """Row of a ``nav_msgs/Odometry``: pose of the base in the world, velocity in body axes."""
     pose, twist = message.pose.pose, message.twist.twist
-    velocity = [getattr(part, axis) for part in (twist.linear, twist.angular) for axis in "xyz"]
     place, turn = pose.position, pose.orientation
     numbers = [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
-    parts = {"pose": numbers, "twist": velocity}
-    yield (), _nanoseconds(message.header.stamp), parts
+    velocity = [getattr(part, axis) for part in (twist.linear, twist.angular) for axis in "xyz"]
+    return (), {"pose": numbers, "twist": velocity}
 
 
-# By the type of messages, the rows of a message, and signal and rank of each of its arrays.
-MOTION: Mapping[str, tuple[Callable[[Any], Iterator[Row]], Mapping[str, tuple[str, int]]]] = {
+# By the type of messages, the row of a message, and signal and rank of each of its arrays.
+MOTION: Mapping[str, tuple[Callable[[Any], Row], Mapping[str, tuple[str, int]]]] = {
     JOINT_STATE: (_of_state, {name: (name, 0) for name in ARRAYS}),
     STATE: (_of_controller, CONTROLLED),
     "nav_msgs/msg/Odometry": (
@@ -201,32 +171,48 @@ class MotionReader:
     """
 
     def __init__(self, path: Path, topic: Topic) -> None:
-        self._decode = decoder(path, topic)
-        self._topic = topic
-        self._rows, self._signals = MOTION[topic.type]
+        self._path, self._topic = path, topic
+        self._versions = STATES if topic.type == STATE else ("",)
+        self._row, self._signals = MOTION[topic.type]
         if topic.type == JOINT_STATE and any(word in topic.name.lower() for word in COMMANDED):
             self._signals = {name: (f"{name}_desired", 1) for name in ("position", "velocity")}
         self._groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
 
     def add(self, received: int, data: bytes) -> None:
         """Add a message that was received at a time in [ns]."""
-        for joints, logged, found in self._rows(self._decode(data)):
-            # Arrays with another length than the joints are ignored.
-            rows = {
-                name: np.asarray(numbers, dtype=np.float64)
-                for name, numbers in found.items()
-                if len(numbers) == BASE_WIDTHS.get(name, len(joints)) > 0
-            }
-            key = frozenset(joints), tuple(rows)
-            if key not in self._groups:
-                self._groups[key] = Group(joints, {name: array("d") for name in rows})
-            group = self._groups[key]
-            group.logged.append(logged)
-            group.received.append(received)
-            for name, row in rows.items():
-                if joints != group.joints:
-                    row = row[[joints.index(joint) for joint in group.joints]]
-                group.arrays[name].frombytes(row.tobytes())
+        message = self._decoded(data)
+        joints, found = self._row(message)
+        # Arrays with another length than the joints are ignored.
+        rows = {
+            name: np.asarray(numbers, dtype=np.float64)
+            for name, numbers in found.items()
+            if len(numbers) == BASE_WIDTHS.get(name, len(joints)) > 0
+        }
+        key = frozenset(joints), tuple(rows)
+        if key not in self._groups:
+            self._groups[key] = Group(joints, {name: array("d") for name in rows})
+        group, stamp = self._groups[key], message.header.stamp
+        group.logged.append(int(stamp.sec) * 10**9 + int(stamp.nanosec))
+        group.received.append(received)
+        for name, row in rows.items():
+            if joints != group.joints:
+                row = row[[joints.index(joint) for joint in group.joints]]
+            group.arrays[name].frombytes(row.tobytes())
+
+    def _decoded(self, data: bytes) -> Any:
+        """A message, by the version of its type that fits, which all others then have."""
+        kind, ros1 = self._topic.type, self._topic.ros1
+        problem = ""
+        for version in self._versions:
+            store = _store(kind, version, ros1)
+            try:
+                message = (store.deserialize_ros1 if ros1 else store.deserialize_cdr)(data, kind)
+            except DAMAGE as error:
+                problem = one_line(error)
+                continue
+            self._versions = (version,)
+            return message
+        raise LogError(self._path, f"{self._topic.name}: a message is not a {kind} ({problem})")
 
     def fields(self) -> Iterator[Field]:
         """Fields of the messages."""
@@ -236,9 +222,13 @@ class MotionReader:
             if (np.diff(received) < 0).any():
                 order = np.argsort(received, kind="stable")
             logged = np.frombuffer(group.logged, dtype=np.int64)
-            remark = "" if logged.any() else RECORDER
-            chosen = logged if logged.any() else received
-            stamps = Stamps.of_nanoseconds(chosen[order], remark=remark)
+            chosen = (logged if logged.any() else received)[order]
+            first = int(chosen[0])
+            stamps = Stamps(
+                Decimal(first).scaleb(-9),
+                np.multiply(chosen - first, 1e-9),
+                remark="" if logged.any() else RECORDER,
+            )
             for name, numbers in group.arrays.items():
                 signal, rank = self._signals.get(name, ("", 0))
                 yield Field(
@@ -321,7 +311,7 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
     """Contents of a bag, read through; readers have the messages of topics with wanted names."""
     bag, unpack = Bag(), Unpacker(path)
     taken = odd = 0
-    try:
+    with reading(path):
         for each in _records(path, bag.lost, unpack):
             if isinstance(each, Topic):
                 if each.name not in bag.topics:
@@ -342,8 +332,6 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
                     taken += 1
                 else:
                     odd += 1
-    except ArchiveError as error:
-        raise LogError(path, str(error)) from error
     if not bag.topics:
         why = f": {bag.lost[0]}" if bag.lost else ""
         raise LogError(path, f"no topic of the bag can be read{why}")
@@ -356,15 +344,11 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
 # Chunks, unpacked piece by piece
 
 
-def _zstd(stream: BinaryIO) -> Any:
-    return ZstdDecompressor().stream_reader(stream, read_across_frames=True)
-
-
 # What opens a compressed stream, by the name that bags have for it.
 METHODS: dict[str, Callable[[BinaryIO], Any]] = {
     "bz2": bz2.open,
     "lz4": lz4.frame.open,
-    "zstd": _zstd,
+    "zstd": lambda packed: ZstdDecompressor().stream_reader(packed, read_across_frames=True),
 }
 ZSTD = b"\x28\xb5\x2f\xfd"  # the first bytes of a file or a message that was compressed whole
 

@@ -28,10 +28,10 @@ from inspector.logs.arrays import (
     part_of,
     stated_rate,
 )
-from inspector.logs.mapping import Log, LogReader, ReadOptions
+from inspector.logs.mapping import Log, LogReader, ReadOptions, reading
 from inspector.logs.names import TIMES, listed
 from inspector.text import counted
-from noisemodel.runfile import ArchiveError, check_unpacked, one_line
+from noisemodel.runfile import check_unpacked
 
 EPISODES = "data"  # the group that holds the episodes of robomimic and Isaac Lab
 # Names of episodes in a file without that group: Minari's, ManiSkill's and others.
@@ -49,13 +49,8 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of an HDF5 file."""
     with path.open("rb") as stream:
         is_matlab = stream.read(len(MATLAB)) == MATLAB
-    try:
-        with h5py.File(path) as file:
-            home, episodes = _episodes(path, file, is_matlab=is_matlab)
-    except LogError:
-        raise
-    except DAMAGE as error:
-        raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
+    with reading(path, DAMAGE), h5py.File(path) as file:
+        home, episodes = _episodes(path, file, is_matlab=is_matlab)
     return LogReader(
         "MATLAB 7.3" if is_matlab else "HDF5",
         episodes,
@@ -83,16 +78,11 @@ def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str
 
 
 def _read(path: Path, options: ReadOptions, home: str, episode: str, *, is_matlab: bool) -> Log:
-    try:
-        with h5py.File(path) as file:
-            group = _own(path, file[f"{home}/{episode}"], file) if home else file
-            datasets, left_out = _wanted(group, options)
-            arrays: Arrays = _values(path, file, datasets)
-            attributes = {**_single(file.attrs), **_single(group.attrs)}
-    except LogError:
-        raise
-    except DAMAGE as error:
-        raise LogError(path, f"{episode or 'it'} is damaged ({one_line(error)})") from error
+    with reading(path, DAMAGE, f"{episode or 'it'} is damaged"), h5py.File(path) as file:
+        group = _own(path, file[f"{home}/{episode}"], file) if home else file
+        datasets, left_out = _wanted(group, options)
+        arrays: Arrays = _values(path, file, datasets)
+        attributes = {**_single(file.attrs), **_single(group.attrs)}
     if is_matlab:
         return log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
     arrays = arrays if home else part_of(arrays, episode)
@@ -128,10 +118,7 @@ def _own(path: Path, each: Any, file: Any) -> Any:
 def _values(path: Path, file: Any, datasets: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     """Read datasets that are in the file, or nearly so: a few bytes may state any shape."""
     own = {name: _own(path, each, file) for name, each in datasets.items()}
-    try:
-        check_unpacked(sum(int(each.nbytes) for each in own.values()), path.stat().st_size)
-    except ArchiveError as error:
-        raise LogError(path, str(error)) from error
+    check_unpacked(sum(int(each.nbytes) for each in own.values()), path.stat().st_size)
     return {name: np.atleast_1d(each[()]) for name, each in own.items()}
 
 
@@ -179,10 +166,7 @@ def _datasets(group: Any, mapped: Collection[str]) -> dict[str, Any]:
 
 def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...]:
     rows = [f"{counted(len(episodes), 'episode')}: {listed(episodes)}"] if episodes[0] else []
-    try:
-        with h5py.File(path) as file:
-            found = _datasets(file[f"{home}/{episodes[0]}"] if home else file, ())
-            rows += (f"{name}  {each.dtype} {each.shape}" for name, each in found.items())
-    except DAMAGE as error:
-        raise LogError(path, f"{episodes[0] or 'it'} is damaged ({one_line(error)})") from error
+    with reading(path, DAMAGE, f"{episodes[0] or 'it'} is damaged"), h5py.File(path) as file:
+        found = _datasets(file[f"{home}/{episodes[0]}"] if home else file, ())
+        rows += (f"{name}  {each.dtype} {each.shape}" for name, each in found.items())
     return tuple(rows)

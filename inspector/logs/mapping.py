@@ -7,6 +7,7 @@ the names of columns. One column is chosen for each signal of each joint.
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from decimal import Decimal
 from functools import cached_property
@@ -15,7 +16,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inspector.errors import InspectorError, LogError, OptionError
 from inspector.logs.names import (
@@ -36,9 +36,28 @@ from noiseclassifier.jsontext import from_toml, text_of
 from noisemodel import Robot, Run
 from noisemodel.files import replacing
 from noisemodel.run import LONGEST, SHORTEST
+from noisemodel.runfile import ArchiveError, one_line
 from noisemodel.types import Array, Mask, Real
 
 # Logs
+
+
+@contextmanager
+def reading(
+    path: Path, damage: tuple[type[Exception], ...] = (), what: str = "damaged or cut off"
+) -> Iterator[None]:
+    """Errors of reading a file as errors of a log; those that libraries raise for damage, too."""
+    try:
+        yield
+    except InspectorError:
+        raise
+    except ArchiveError as error:
+        raise LogError(path, str(error)) from error
+    except damage as error:
+        raise LogError(path, f"{what} ({one_line(error)})") from error
+    except OSError as error:
+        raise LogError(path, f"cannot be read ({error.strerror or error})") from error
+
 
 SAMPLES = "samples"  # the unit of stamps that count samples, of a log whose rate is not known yet
 
@@ -77,12 +96,6 @@ class Stamps:
     rate: float | None = None  # that the log is said to have, in [Hz]
     name: str = ""  # of their column
     stated: tuple[str, float | None] = ("", None)  # what else tells the rate, and that, in [Hz]
-
-    @classmethod
-    def of_nanoseconds(cls, stamps: NDArray[np.int64], *, remark: str = "") -> "Stamps":
-        """Stamps from whole nanoseconds, shape (samples,)."""
-        first = int(stamps[0])
-        return cls(Decimal(first).scaleb(-9), np.multiply(stamps - first, 1e-9), remark=remark)
 
     @classmethod
     def counted(cls, samples: int) -> "Stamps":

@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, floats, log_of
 from inspector.logs.clocks import stamps_of
-from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, no_motion
+from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, no_motion, reading
 from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
 from noisemodel.files import beyond, limit
-from noisemodel.runfile import ArchiveError, check_regular, check_unpacked, one_line
+from noisemodel.runfile import ArchiveError, check_regular, check_unpacked
 
 # Errors that pyarrow raises for damaged files.
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
@@ -76,13 +76,9 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 def _schema(path: Path) -> Any:
     """Names and types of the columns."""
-    try:
+    with reading(path, DAMAGE):
         check_regular(path)
         return pyarrow.parquet.read_schema(path)
-    except ArchiveError as error:
-        raise LogError(path, str(error)) from error
-    except DAMAGE as error:
-        raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
 
 
 def _episodes(path: Path) -> tuple[str, ...]:
@@ -100,16 +96,12 @@ def _table(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any:
     filters = [(EPISODE, "==", int(episode))] if episode else None
     tables = []
     for path in paths:
-        try:
+        with reading(path, DAMAGE):
             unpacked, width = unpacked_size(path, {*columns, *([EPISODE] if episode else [])})
             if width > limit("columns"):
                 raise ArchiveError(f"lists of {width} numbers in a row, {beyond('columns')}")
             check_unpacked(unpacked, path.stat().st_size)
             tables.append(pyarrow.parquet.read_table(path, columns=list(columns), filters=filters))
-        except ArchiveError as error:
-            raise LogError(path, str(error)) from error
-        except DAMAGE as error:
-            raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
     return pyarrow.concat_tables(tables)
 
 
@@ -299,10 +291,8 @@ def _data_set(path: Path, folder: Path, options: ReadOptions) -> LogReader:
 
 
 def _info(path: Path) -> dict[str, Any]:
-    try:
+    with reading(path, (OSError, ValueError), "cannot be read"):
         info: dict[str, Any] = from_json(text_of(path))
-    except (OSError, ValueError) as error:
-        raise LogError(path, f"cannot be read ({error})") from error
     features = info.get("features") if isinstance(info, dict) else None
     if not isinstance(features, dict) or not all(isinstance(f, dict) for f in features.values()):
         raise LogError(path, "has no table of features")

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from inspector.errors import InspectorError, LogError
-from inspector.logs.mapping import LogReader, ReadOptions, read_options
+from inspector.logs.mapping import LogReader, ReadOptions, read_options, reading
 from inspector.logs.motion import Imported, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
 from inspector.logs.plausibility import check_joints, contradictions, limit_warnings, named
@@ -66,21 +66,17 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 def _module_of_folder(folder: Path) -> str:
     """What reads a folder that is one log, a LeRobot data set or a bag; empty for one of logs."""
-    try:
+    with reading(folder):
         if (folder / INFO).is_file():
             return "parquet"
         files = [each for each in folder.iterdir() if not each.name.startswith(".")]
         alone = len(files) == 1 and files[0].suffix in (".mcap", ".db3")
         return "bags" if alone or (folder / BAG).is_file() else ""
-    except OSError as error:
-        raise LogError(folder, f"cannot be read ({error.strerror})") from error
 
 
 def _is_folder(path: Path) -> bool:
-    try:
+    with reading(path):  # such as one whose name has more than 255 characters
         return path.is_dir()
-    except OSError as error:  # such as a name of more than 255 characters
-        raise LogError(path, f"cannot be read ({error.strerror})") from error
 
 
 def _module_of(path: Path) -> str:
@@ -93,14 +89,10 @@ def _module_of(path: Path) -> str:
             "a folder that is neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
             " (meta/info.json); name its files one by one",
         )
-    try:
+    with reading(path):
         runfile.check_regular(path)
         with path.open("rb") as stream:
             head = stream.read(16)
-    except OSError as error:
-        raise LogError(path, f"cannot be read ({error.strerror})") from error
-    except runfile.ArchiveError as error:
-        raise LogError(path, str(error)) from error
     return next((module for magic, module in MAGIC.items() if head.startswith(magic)), "csv")
 
 
