@@ -124,7 +124,12 @@ def log_of(
         joints: Names of the columns of arrays, by the arrays' names.
         stamps: Of all arrays; those of one of the arrays unless given.
     """
-    every, arrays = arrays, _tables(arrays)
+    every = arrays
+    arrays = {  # that may be of samples; times as columns of one dimension
+        n: each[:, 0] if each.shape[1:] == (1,) and n.rpartition("/")[2].lower() in TIMES else each
+        for n, each in arrays.items()
+        if each.ndim in (1, 2) and len(each) > 1
+    }
     options = options.for_columns(path, [*arrays])
     mapped = options.mapped
     naming = Naming.of((n for n, e in arrays.items() if e.ndim == 1), options.known_joints)
@@ -138,7 +143,12 @@ def log_of(
     if not motion:
         raise _nothing(path, every, not_read)
     if not stamps:
-        stamps, arrays = _stamped(path, arrays, options, motion, roles)
+        time, arrays = _time(arrays, options)
+        commands = [name for name, what in roles.items() if what == COMMAND]
+        arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], commands)
+        stamps = Stamps.counted(len(arrays[motion[0]]))
+        if time:
+            stamps = stamps_of(path, time, arrays[time], options.rate)
         stamps = replace(stamps, stated=stated)
     time, samples = stamps.name, len(stamps.time)
     named = {**(joints or {}), **_arms(arrays, roles)}
@@ -166,15 +176,6 @@ def log_of(
         time=time,
     )
     return gathered(log, options)
-
-
-def _tables(arrays: Arrays) -> Arrays:
-    """Arrays that may be of samples; times as columns of one dimension."""
-    return {
-        n: each[:, 0] if each.shape[1:] == (1,) and n.rpartition("/")[2].lower() in TIMES else each
-        for n, each in arrays.items()
-        if each.ndim in (1, 2) and len(each) > 1
-    }
 
 
 def _arms(arrays: Arrays, roles: Collection[str]) -> dict[str, tuple[str, ...]]:
@@ -271,21 +272,6 @@ def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
     }
 
 
-def _stamped(
-    path: Path,
-    arrays: Arrays,
-    options: ReadOptions,
-    motion: Sequence[str],
-    roles: Mapping[str, str],
-) -> tuple[Stamps, Arrays]:
-    """Stamps, counted where no array has them, and arrays of as many samples."""
-    time, arrays = _time(arrays, options)
-    arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
-    if time:
-        return stamps_of(path, time, arrays[time], options.rate), arrays
-    return Stamps.counted(len(arrays[motion[0]])), arrays
-
-
 def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
     """Name of the array with the stamps, empty without; a part of one is an array then."""
     source = options.time
@@ -298,13 +284,12 @@ def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
 
 
 def _of_one_length(
-    path: Path, arrays: Arrays, names: Sequence[str], roles: Mapping[str, str]
+    path: Path, arrays: Arrays, names: Sequence[str], commands: Sequence[str]
 ) -> Arrays:
     """Arrays of as many samples as there are stamps.
 
     Of an episode with one state more than actions the last state is left out.
     """
-    commands = [name for name, what in roles.items() if what == COMMAND]
     lengths = {len(arrays[name]) for name in (*names, *commands)}
     if max(lengths) - min(lengths) == 1:
         longest = max(lengths)
@@ -329,10 +314,15 @@ def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
         if QVEL in flat:
             yield Entry("velocity", "", names[QVEL])
         return
-    qpos, qvel = flat[QPOS], flat.get(QVEL)
-    width = qpos.shape[1]
-    floating = _floating(qpos, 1 if qvel is None else width - qvel.shape[1])
-    if qvel is None and floating != [0]:
+    qpos, width = flat[QPOS], flat[QPOS].shape[1]
+    count = width - flat[QVEL].shape[1] if QVEL in flat else 1
+    floating, place = list[int](), 0  # first columns of free joints: x, y, z and a quaternion
+    while len(floating) < count and place + 7 <= width:
+        length = np.linalg.norm(qpos[:, place + 3 : place + 7], axis=1)
+        is_free = bool((np.abs(length - 1) < 0.01).all())
+        floating += [place] * is_free
+        place += 7 if is_free else 1
+    if QVEL not in flat and floating != [0]:
         floating = []  # four numbers of norm 1 among joints may be chance
     base = floating[:1] == [0]
     stop = next((place for place in floating if place > 0), width)
@@ -342,26 +332,12 @@ def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
     if stop > first:
         yield Entry("position", "", f"{names[QPOS]}[{first}:{stop}]")
     for what, signal in ((QVEL, "velocity"), (FORCE, "effort")):
-        each = flat.get(what)
-        if each is None or each.shape[1] < stop - base:
+        if what not in flat or flat[what].shape[1] < stop - base:
             continue
         if base and what == QVEL:
             yield Entry("base_velocity", "mujoco", f"{names[what]}[0:6]")
         if stop > first:
             yield Entry(signal, "", f"{names[what]}[{6 * base}:{stop - base}]")
-
-
-def _floating(qpos: Real, count: int) -> list[int]:
-    """First columns of up to ``count`` free joints: x, y, z and a quaternion."""
-    places, first = list[int](), 0
-    while len(places) < count and first + 7 <= qpos.shape[1]:
-        length = np.linalg.norm(qpos[:, first + 3 : first + 7], axis=1)
-        if (np.abs(length - 1) < 0.01).all():
-            places.append(first)
-            first += 7
-        else:
-            first += 1
-    return places
 
 
 NO_ARRAYS = "no numbers; of a timeseries of MATLAB or Simulink, save ts.Time and ts.Data"

@@ -469,10 +469,10 @@ def tracks_of(
 ) -> tuple[tuple[Track, ...], tuple[str, ...], tuple[str, ...]]:
     """Tracks of a log, what is not read, and remarks; the mapping goes before names of columns."""
     log, converted = _without_units(log, options)
-    names = [field.name for field in log.fields]
+    names = [each.name for each in log.fields]
     options = options.for_columns(log.path, [name for name in names if name != log.time])
     joints = robot.joint_names if robot else ()
-    naming = Naming.of((field.name for field in log.fields if _is_column(field)), joints)
+    naming = Naming.of((each.name for each in log.fields if _is_column(each)), joints)
     found, unknown = _of_robot([*_choices(log, options, naming, options.joints or joints)], robot)
     kept = _unique(log, found)
     if not any(choice.signal.startswith(("position", "velocity")) for choice in kept):
@@ -481,7 +481,7 @@ def tracks_of(
     kept += targets
     remarks = [*_taken(log, kept), *problem]
     read = {id(choice.field) for choice in kept}
-    not_read = tuple(field.name for field in log.fields if id(field) not in read)
+    not_read = tuple(each.name for each in log.fields if id(each) not in read)
     for unit, of_unit in converted.items():
         if taken := [name for name in of_unit if name not in not_read]:
             remarks.append(f"{listed(taken)}: converted from {unit}, as their names say")
@@ -494,83 +494,22 @@ def tracks_of(
     return (*_base_tracks(log, kept), *_joint_tracks(kept)), (*log.not_read, *not_read), (*remarks,)
 
 
-def _targets(log: Log, choices: Sequence[_Choice]) -> tuple[list[_Choice], list[str]]:
-    """Columns of the first command that the positions follow, and a remark if there is none."""
-    signals = {each.signal for each in choices}
-    commands = [each for each in log.fields if each.signal == COMMAND]
-    if not commands or "position" not in signals or "position_desired" in signals:
-        return [], []
-    position = next(t for t in _joint_tracks(choices) if t.signal == "position")
-    for each in sorted(commands, key=lambda field: "processed" not in field.name):
-        count = 0
-        if each.stamps is position.stamps:
-            count = followed(each.values, position.values)
-        if count:
-            part = "" if count == each.values.shape[1] else f"[0:{count}]"
-            return [
-                _Choice(
-                    each,
-                    slice(column, column + 1),
-                    "position_desired",
-                    position.joints[column],
-                    f"{each.name}{part}",
-                    "format",
-                )
-                for column in range(count)
-            ], []
-    place = next(each.source for each in choices if each.signal == "position")
-    return [], [
-        f"{listed([each.name for each in commands])} not taken as desired positions: {place} does"
-        f" not follow; --map position_desired={commands[0].name} takes it"
-    ]
-
-
-def followed(command: Real, position: Real) -> int:
-    """Number of leading columns of a command that are targets of the positions beside them."""
-    count = moving = 0
-    for wanted, actual in zip(command.T, position.T, strict=False):
-        extent, asked = float(np.ptp(actual)), float(np.ptp(wanted))
-        moves = min(extent, asked) > STILL
-        if not moves and max(extent, asked) > NEARBY:
-            break
-        if abs(float(np.mean(wanted) - np.mean(actual))) > max(extent, NEARBY):
-            break
-        if moves:
-            deviation = float(np.std(wanted)), float(np.std(actual))
-            common = float(np.mean((wanted - wanted.mean()) * (actual - actual.mean())))
-            correlation, slope = common / (deviation[0] * deviation[1]), common / deviation[0] ** 2
-            if correlation < FOLLOWS or not SLOPES[0] <= slope <= SLOPES[1]:
-                break
-        count, moving = count + 1, moving + moves
-    return count if moving and 2 * count >= position.shape[1] else 0
-
-
-def _taken(log: Log, choices: Sequence[_Choice]) -> Iterator[str]:
-    """Say which arrays of a file are taken for what, if the options do not say it."""
-    found = set[tuple[int, str]]()
-    for each in choices:
-        field, why = each.field, each.joint if each.signal in BASE_SIGNALS else ""
-        named = field.source == log.path.name and not (_is_column(field) or field.stamps.rows)
-        if each.by == "format" or (each.by == "name" and named):
-            why = "position follows it" if field.signal == COMMAND else why
-            text = f"{each.signal} = {each.source}{f' ({why})' if why else ''}"
-            found.add((SIGNALS.index(each.signal), text))
-    if found:
-        yield f"taken: {', '.join(text for _, text in sorted(found))}"
-
-
 def _without_units(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[str]]]:
     """Log with columns in the units of a run, and the names of the others by their unit."""
     found: dict[str, list[str]] = {}
-    fields = []
+    converted = []
     for each in log.fields:
         factor = factor_of(each.name) if each.values.shape[1] == 1 else 1.0
         if factor != 1.0 and not options.units:
             found.setdefault(without_unit(each.name)[1], []).append(each.name)
-            fields.append(replace(each, values=each.values * factor))
-        else:
-            fields.append(each)
-    return replace(log, fields=tuple(fields)), found
+            each = replace(each, values=each.values * factor)
+        converted.append(each)
+    return replace(log, fields=tuple(converted)), found
+
+
+def _is_column(each: Field) -> bool:
+    """Whether it is a column, which may name its joint."""
+    return each.values.shape[1] == 1 and not each.signal
 
 
 def no_motion(path: Path, names: Sequence[str]) -> LogError:
@@ -579,9 +518,92 @@ def no_motion(path: Path, names: Sequence[str]) -> LogError:
     return LogError(path, f"{NO_MOTION}; columns are {columns}")
 
 
-def _is_column(field: Field) -> bool:
-    """Whether it is a column, which may name its joint."""
-    return field.values.shape[1] == 1 and not field.signal
+def _choices(
+    log: Log, options: ReadOptions, naming: Naming, joints: Sequence[str]
+) -> Iterator[_Choice]:
+    """Columns and their signals: by the options, then by the format, then by their names."""
+    by_name = {each.name: each for each in log.fields}
+    signals = {entry.signal for entry in options.entries if not entry.joint}
+    sources = {entry.part()[0] for entry in options.entries}
+    suggested = [
+        entry
+        for entry in log.suggested
+        if entry.signal not in signals and entry.part()[0] not in sources
+    ]
+    mapped = set()
+    for entry in (*options.entries, *suggested):
+        name, part = (entry.source, slice(None)) if entry.source in by_name else entry.part()
+        if name not in by_name:
+            continue
+        width = by_name[name].values.shape[1]
+        start, stop, _ = part.indices(width)
+        if name != entry.source and (start >= stop or (part.stop or 0) > width):
+            raise LogError(log.path, f"{entry.source!r}: {name!r} has {width} columns")
+        mapped.add(id(by_name[name]))
+        if entry.joint and entry.signal in JOINT_SIGNALS and stop - start != 1:
+            problem = f"{entry.source!r} has {stop - start} columns, {entry.target} is one"
+            raise LogError(log.path, f"{problem}; name it as {name}[0]")
+        if entry.signal != "time":
+            by = "options" if entry in options.entries else "format"
+            whole = by_name[name], slice(start, stop), entry.signal, entry.joint, entry.source, by
+            yield from _columns(log, _Choice(*whole), options, joints)
+    known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
+    named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
+    numbered = {number_of(joint): joint for joint in reversed(named)}
+    for each in log.fields:
+        if id(each) not in mapped and each.name != options.time:
+            signal, joint = _meaning(each, naming, numbered, joints)
+            if signal and signal != COMMAND:
+                choice = _Choice(each, slice(0, each.values.shape[1]), signal, joint, each.name)
+                yield from _columns(log, choice, options, joints)
+
+
+def _meaning(
+    each: Field, naming: Naming, numbered: Mapping[int | None, str], joints: Sequence[str]
+) -> tuple[str, str]:
+    """Signal of a field by the format or by its name, and the joint if it is a column of one."""
+    known = column_signal(each.name, naming) if _is_column(each) else None
+    if known is None:
+        signal = each.signal or array_signal(each.name) or ""
+        unnamed = _is_column(each) and signal in JOINT_SIGNALS and not naming.alone
+        return "" if unnamed else signal, ""
+    signal, joint = known
+    number, first = number_of(joint), naming.first
+    if number is not None and joint not in joints and first <= number < first + len(joints):
+        return signal, joints[number - first]
+    if isinstance(joint, int):
+        return signal, numbered.get(joint, f"joint_{joint}")
+    return signal, joint
+
+
+def _columns(
+    log: Log, whole: _Choice, options: ReadOptions, joints: Sequence[str]
+) -> Iterator[_Choice]:
+    """Columns of a field: of one joint, of the base with its convention, or one for each joint."""
+    field, part, signal = whole.field, whole.columns, whole.signal
+    width = part.stop - part.start
+    what = f"{field.name!r} has {width} columns"
+    if signal in BASE_SIGNALS and width != WIDTHS[signal]:
+        raise LogError(log.path, f"{what}, a {signal} has {WIDTHS[signal]}")
+    if signal in BASE_SIGNALS or whole.joint:
+        yield whole
+        return
+    names: Sequence[str] = ()
+    if len(field.joints) in (width, field.values.shape[1]):
+        names = field.joints if len(field.joints) == width else field.joints[part]
+    if not names or len(options.joints) == width:
+        names = joints
+        other = options.joints and len(names) != width and not signal.endswith("_desired")
+        if names and (len(names) < width or other):
+            whose = "--joints names" if options.joints else f"robot {options.robot!r} has"
+            raise LogError(
+                log.path,
+                f"{what}, {whose} {len(names)}; take a part of it"
+                f" (--map {signal}={field.name}[0:{len(names)}]) or name all (--joints)",
+            )
+    names = names or [f"joint_{number}" for number in range(width)]
+    for column, name in zip(range(part.start, part.stop), names[:width], strict=True):
+        yield whole._replace(columns=slice(column, column + 1), joint=name)
 
 
 def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice], list[str]]:
@@ -629,6 +651,63 @@ def _both(log: Log, joint: str, before: _Choice, after: _Choice) -> LogError:
     return LogError(log.path, f"{names} both hold {what}; choose with {how}")
 
 
+def _targets(log: Log, choices: Sequence[_Choice]) -> tuple[list[_Choice], list[str]]:
+    """Columns of the first command that the positions follow, and a remark if there is none."""
+    signals = {each.signal for each in choices}
+    commands = [each for each in log.fields if each.signal == COMMAND]
+    if not commands or "position" not in signals or "position_desired" in signals:
+        return [], []
+    position = next(t for t in _joint_tracks(choices) if t.signal == "position")
+    for each in sorted(commands, key=lambda command: "processed" not in command.name):
+        same = each.stamps is position.stamps
+        if count := followed(each.values, position.values) if same else 0:
+            part = "" if count == each.values.shape[1] else f"[0:{count}]"
+            whole = _Choice(each, slice(0), "position_desired", "", f"{each.name}{part}", "format")
+            return [
+                whole._replace(columns=slice(at, at + 1), joint=position.joints[at])
+                for at in range(count)
+            ], []
+    place = next(each.source for each in choices if each.signal == "position")
+    return [], [
+        f"{listed([each.name for each in commands])} not taken as desired positions: {place} does"
+        f" not follow; --map position_desired={commands[0].name} takes it"
+    ]
+
+
+def followed(command: Real, position: Real) -> int:
+    """Number of leading columns of a command that are targets of the positions beside them."""
+    count = moving = 0
+    for wanted, actual in zip(command.T, position.T, strict=False):
+        extent, asked = float(np.ptp(actual)), float(np.ptp(wanted))
+        moves = min(extent, asked) > STILL
+        if not moves and max(extent, asked) > NEARBY:
+            break
+        if abs(float(np.mean(wanted) - np.mean(actual))) > max(extent, NEARBY):
+            break
+        if moves:
+            deviation = float(np.std(wanted)), float(np.std(actual))
+            common = float(np.mean((wanted - wanted.mean()) * (actual - actual.mean())))
+            correlation, slope = common / (deviation[0] * deviation[1]), common / deviation[0] ** 2
+            if correlation < FOLLOWS or not SLOPES[0] <= slope <= SLOPES[1]:
+                break
+        count, moving = count + 1, moving + moves
+    return count if moving and 2 * count >= position.shape[1] else 0
+
+
+def _taken(log: Log, choices: Sequence[_Choice]) -> Iterator[str]:
+    """Say which arrays of a file are taken for what, if the options do not say it."""
+    found = set[tuple[int, str]]()
+    for each in choices:
+        field, why = each.field, each.joint if each.signal in BASE_SIGNALS else ""
+        named = field.source == log.path.name and not (_is_column(field) or field.stamps.rows)
+        if each.by == "format" or (each.by == "name" and named):
+            why = "position follows it" if field.signal == COMMAND else why
+            text = f"{each.signal} = {each.source}{f' ({why})' if why else ''}"
+            found.add((SIGNALS.index(each.signal), text))
+    if found:
+        yield f"taken: {', '.join(text for _, text in sorted(found))}"
+
+
 def _joint_tracks(choices: Sequence[_Choice]) -> Iterator[Track]:
     """Tracks, each of the columns of one signal that share their stamps."""
     together: dict[tuple[str, int], list[_Choice]] = {}
@@ -642,13 +721,10 @@ def _joint_tracks(choices: Sequence[_Choice]) -> Iterator[Track]:
             values = np.hstack([each.values for each in members])
         elif columns != list(range(values.shape[1])):  # else no copy: a long log is large
             values = values[:, columns]
-        yield Track(
-            signal,
-            tuple(each.joint for each in members),
-            tuple(each.label for each in members),
-            members[0].field.stamps,
-            values,
+        joints, labels = (
+            tuple(each) for each in zip(*((m.joint, m.label) for m in members), strict=True)
         )
+        yield Track(signal, joints, labels, members[0].field.stamps, values)
 
 
 def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
@@ -659,12 +735,8 @@ def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
         track = Track("base_pose", (), (choice.field.name,) * 7, choice.field.stamps, pose)
         wrong = np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1) > 0.01
         if wrong.any():
-            raise track.fault(
-                log.path,
-                f"{choice.label}: a quaternion whose norm is not 1; expected x, y, z and the"
-                " quaternion",
-                int(np.argmax(wrong)),
-            )
+            problem = "a quaternion whose norm is not 1; expected x, y, z and the quaternion"
+            raise track.fault(log.path, f"{choice.label}: {problem}", int(np.argmax(wrong)))
         yield track
     if choice := by_signal.get("base_velocity"):
         stamps, values = choice.field.stamps, choice.values
@@ -690,115 +762,9 @@ def velocity_of(values: Real, convention: str, pose: Array) -> Array:
 
     ``pose`` is that of the same samples, as the run has it, shape (samples, 7).
     """
-    linear, angular = np.hsplit(np.asarray(values, dtype=np.float64), 2)
-    if convention in ("world", "mujoco"):
-        linear = _into_body(linear, pose)
-    if convention == "world":
-        angular = _into_body(angular, pose)
-    return np.hstack((linear, angular))
-
-
-def _into_body(vectors: Array, pose: Array) -> Array:
-    """Vectors rotated from world to body axes: v' = R(q)^T v."""
+    parts = np.hsplit(np.asarray(values, dtype=np.float64), 2)
     axis, scalar = -pose[:, 3:6], pose[:, 6:]
-    cross = 2 * np.cross(axis, vectors)
-    rotated: Array = vectors + scalar * cross + np.cross(axis, cross)
-    return rotated
-
-
-def _choices(
-    log: Log, options: ReadOptions, naming: Naming, joints: Sequence[str]
-) -> Iterator[_Choice]:
-    """Columns and their signals: by the options, then by the format, then by their names."""
-    by_name = {field.name: field for field in log.fields}
-    signals = {entry.signal for entry in options.entries if not entry.joint}
-    sources = {entry.part()[0] for entry in options.entries}
-    suggested = [
-        entry
-        for entry in log.suggested
-        if entry.signal not in signals and entry.part()[0] not in sources
-    ]
-    mapped = set()
-    for entry in (*options.entries, *suggested):
-        name, part = (entry.source, slice(None)) if entry.source in by_name else entry.part()
-        if name not in by_name:
-            continue
-        field = by_name[name]
-        width = field.values.shape[1]
-        start, stop, _ = part.indices(width)
-        if name != entry.source and (start >= stop or (part.stop or 0) > width):
-            raise LogError(log.path, f"{entry.source!r}: {name!r} has {width} columns")
-        mapped.add(id(field))
-        if entry.joint and entry.signal in JOINT_SIGNALS and stop - start != 1:
-            raise LogError(
-                log.path,
-                f"{entry.source!r} has {stop - start} columns, {entry.target} is one; name it as"
-                f" {name}[0]",
-            )
-        if entry.signal != "time":
-            by = "options" if entry in options.entries else "format"
-            choice = _Choice(field, slice(start, stop), entry.signal, entry.joint, entry.source, by)
-            yield from _columns(log, choice, options, joints)
-    known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
-    named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
-    numbered = {number_of(joint): joint for joint in reversed(named)}
-    for each in log.fields:
-        if id(each) not in mapped and each.name != options.time:
-            signal, joint = _meaning(log, each, naming, numbered, joints)
-            if signal and signal != COMMAND:
-                whole = slice(0, each.values.shape[1])
-                choice = _Choice(each, whole, signal, joint, each.name)
-                yield from _columns(log, choice, options, joints)
-
-
-def _meaning(
-    log: Log,
-    field: Field,
-    naming: Naming,
-    numbered: Mapping[int | None, str],
-    joints: Sequence[str],
-) -> tuple[str, str]:
-    """Signal of a field by the format or by its name, and the joint if it is a column of one."""
-    known = column_signal(field.name, naming) if _is_column(field) else None
-    signal = field.signal or array_signal(field.name) or ""
-    if known is None:
-        unnamed = _is_column(field) and signal in JOINT_SIGNALS and not naming.alone
-        return "" if unnamed else signal, ""
-    signal, joint = known
-    number, first = number_of(joint), naming.first
-    if number is not None and joint not in joints and first <= number < first + len(joints):
-        return signal, joints[number - first]
-    if isinstance(joint, int):
-        return signal, numbered.get(joint, f"joint_{joint}")
-    return signal, joint
-
-
-def _columns(
-    log: Log, whole: _Choice, options: ReadOptions, joints: Sequence[str]
-) -> Iterator[_Choice]:
-    """Columns of a field: of one joint, of the base with its convention, or one for each joint."""
-    field, part, signal = whole.field, whole.columns, whole.signal
-    width = part.stop - part.start
-    if signal in BASE_SIGNALS and width != WIDTHS[signal]:
-        raise LogError(
-            log.path, f"{field.name!r} has {width} columns, a {signal} has {WIDTHS[signal]}"
-        )
-    if signal in BASE_SIGNALS or whole.joint:
-        yield whole
-        return
-    names: Sequence[str] = ()
-    if len(field.joints) in (width, field.values.shape[1]):
-        names = field.joints if len(field.joints) == width else field.joints[part]
-    if not names or len(options.joints) == width:
-        names = joints
-        other = options.joints and len(names) != width and not signal.endswith("_desired")
-        if names and (len(names) < width or other):
-            whose = "--joints names" if options.joints else f"robot {options.robot!r} has"
-            raise LogError(
-                log.path,
-                f"{field.name!r} has {width} columns, {whose} {len(names)}; take a part of it"
-                f" (--map {signal}={field.name}[0:{len(names)}]) or name all (--joints)",
-            )
-    names = names or [f"joint_{number}" for number in range(width)]
-    for column, name in zip(range(part.start, part.stop), names[:width], strict=True):
-        yield whole._replace(columns=slice(column, column + 1), joint=name)
+    for place in {"world": (0, 1), "mujoco": (0,)}.get(convention, ()):  # v' = R(q)^T v
+        cross = 2 * np.cross(axis, parts[place])
+        parts[place] = parts[place] + scalar * cross + np.cross(axis, cross)
+    return np.hstack(parts)
