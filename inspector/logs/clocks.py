@@ -55,7 +55,9 @@ def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | No
     known = TIME_UNITS.get(without_unit(name)[1], "")
     start = {unit: first * float(UNITS[unit]) for unit in UNITS}
     absolute = any(EPOCH[0] < each < EPOCH[1] for each in start.values())
-    if not known and not absolute and _is_counter(steps, first):
+    by_one = len(steps) and float(first).is_integer() and np.median(steps) == 1
+    counts = by_one and (steps >= 1).all() and (steps == np.rint(steps)).all()  # but for holes
+    if not known and not absolute and counts:
         return SAMPLES
     rising = steps[steps > 0]
     step = float(np.median(rising)) if len(rising) else 0.0
@@ -83,32 +85,18 @@ def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | No
     )
 
 
-def _is_counter(steps: NDArray[Any], first: float) -> bool:
-    """Whether stamps are whole numbers that grow by one, but for some holes."""
-    return bool(
-        len(steps)
-        and float(first).is_integer()
-        and (steps >= 1).all()
-        and np.median(steps) == 1
-        and (steps == np.rint(steps)).all()
-    )
-
-
 def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -> Stamps:
     """Stamps from an array of numbers."""
     if values.dtype.kind == "M":
         values = values.astype("datetime64[ns]").astype(np.int64)
     if values.dtype.kind not in "iuf" or values.ndim != 1 or len(values) < 2:
-        raise LogError(
-            path,
-            f"{name!r} holds {values.dtype} of shape {values.shape}; expected two stamps or more",
-        )
+        held = f"{values.dtype} of shape {values.shape}"
+        raise LogError(path, f"{name!r} holds {held}; expected two stamps or more")
     if not np.isfinite(values).all():
         sample = int(np.argmin(np.isfinite(values)))
         raise LogError(path, f"column {name!r} holds {values[sample]} (sample {sample + 1})")
-    return stamps_since(
-        path, name, Decimal(str(values[0])), (values - values[0]).astype(np.float64), rate
-    )
+    since = (values - values[0]).astype(np.float64)
+    return stamps_since(path, name, Decimal(str(values[0])), since, rate)
 
 
 def stamps_since(
@@ -127,28 +115,35 @@ def stamps_since(
     return Stamps(first * Decimal(UNITS[unit]), time, rows, unit, name=name)
 
 
-def counted_stamps(
-    path: Path,
-    stamps: Stamps,
-    options: ReadOptions,
-    position: Real | None,
-    velocity: Real | None,
-) -> Stamps:
-    """Stamps in seconds of samples that are only counted: at a rate that is known or found."""
+def in_seconds(path: Path, tracks: Sequence[Track], options: ReadOptions) -> list[Track]:
+    """Tracks whose stamps are in seconds, where they counted samples."""
+    by_signal = {track.signal: track for track in reversed(tracks)}
+    position, velocity = by_signal.get("position"), by_signal.get("velocity")
     found = None
-    if position is not None and velocity is not None and position.shape == velocity.shape:
-        holes = np.concatenate(([False], np.diff(stamps.time) != 1))
-        found = rate_of(np.where(holes[:, None], np.nan, position), velocity)
+    if position and velocity and position.stamps is velocity.stamps:
+        shared = [joint for joint in position.joints if joint in velocity.joints]
+        if shared and position.stamps.unit == SAMPLES:
+            holes = np.concatenate(([False], np.diff(position.stamps.time) != 1))
+            known = np.where(holes[:, None], np.nan, position.of(shared))
+            found = rate_of(known, velocity.of(shared))
+    timed = {
+        id(stamps): _timed(path, stamps, options, found)
+        for stamps in clocks_of(tracks)
+        if stamps.unit == SAMPLES
+    }
+    return on_clocks(tracks, timed)
+
+
+def _timed(path: Path, stamps: Stamps, options: ReadOptions, found: float | None) -> Stamps:
+    """Stamps in seconds of samples that are only counted: at a rate that is known or found."""
     what = f"{stamps.name!r} counts samples" if stamps.name else "there are no stamps"
     name, number = stamps.stated
     if options.rate:
         rate, by = options.rate, "as --rate says"
         if found and abs(found / rate - 1) > DISAGREE and not options.force:
-            raise LogError(
-                path,
-                f"positions and velocities fit a rate of {found:g} Hz, not {rate:g} Hz: type"
-                f" --rate {found:g}, or --force to take {rate:g} Hz all the same",
-            )
+            problem = f"positions and velocities fit a rate of {found:g} Hz, not {rate:g} Hz"
+            how = f"type --rate {found:g}, or --force to take {rate:g} Hz all the same"
+            raise LogError(path, f"{problem}: {how}")
     elif number and (found is None or abs(found / number - 1) <= DISAGREE):
         rate, by = number, f"by {name}"
     elif found:
@@ -191,6 +186,16 @@ def slope(steps: Real, speed: Real) -> tuple[float, float]:
     steps, speed = steps[usable], speed[usable]
     both, own, other = (float(each) for each in (steps @ speed, steps @ steps, speed @ speed))
     return (both / np.sqrt(own * other), both / own) if own * other > 0 else (0.0, 0.0)
+
+
+def clocks_of(tracks: Sequence[Track]) -> list[Stamps]:
+    """The stamps of tracks, each once: some share them."""
+    return [*{id(track.stamps): track.stamps for track in tracks}.values()]
+
+
+def on_clocks(tracks: Sequence[Track], changed: Mapping[int, Stamps]) -> list[Track]:
+    """Tracks with other stamps in place of some, which their identities tell."""
+    return [replace(track, stamps=changed.get(id(track.stamps), track.stamps)) for track in tracks]
 
 
 def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], str]:
@@ -242,7 +247,7 @@ def common_time(tracks: Sequence[Track], main: Track) -> tuple[Array, Mask]:
     stops = min(track.stamps.time[-1] for track in tracks) + slack
     time = time[(time >= starts) & (time <= stops)]
     valid = np.ones(len(time), dtype=bool)
-    for stamps in {id(track.stamps): track.stamps for track in tracks}.values():
+    for stamps in clocks_of(tracks):
         if _places(time, stamps, slack) is None:
             reached = np.zeros(len(time), dtype=bool)
             for stretch in stamps.clock.stretches:
@@ -252,8 +257,11 @@ def common_time(tracks: Sequence[Track], main: Track) -> tuple[Array, Mask]:
                     reached[edges[0] : edges[1]] = True
             valid &= reached
     for track in tracks:
-        if track.missing is not None:
-            valid &= ~_beside(time, track.stamps, track.missing, slack)
+        if (missing := track.missing) is not None:  # at an instant, or next to one between samples
+            stamps = track.stamps
+            after = np.searchsorted(stamps.time, time - slack).clip(max=len(stamps.time) - 1)
+            between = np.abs(stamps.time[after] - time) > slack
+            valid &= ~(missing[after] | (between & missing[np.maximum(after - 1, 0)]))
     return time, valid
 
 
@@ -299,13 +307,6 @@ def _places(instants: Array, stamps: Stamps, slack: float) -> Indices | None:
     return places if (np.abs(stamps.time[places] - instants) <= slack).all() else None
 
 
-def _beside(instants: Array, stamps: Stamps, missing: Mask, slack: float) -> Mask:
-    """Whether a missing sample is at an instant, or next to one between samples."""
-    after = np.searchsorted(stamps.time, instants - slack).clip(max=len(stamps.time) - 1)
-    between = np.abs(stamps.time[after] - instants) > slack
-    return np.asarray(missing[after] | (between & missing[np.maximum(after - 1, 0)]))
-
-
 # Two clocks
 
 CORRELATION = 0.6  # least normalised correlation of an accepted offset
@@ -329,25 +330,25 @@ def synchronise(
     *,
     rate: float | None = None,
     offset: float | None = None,
-) -> tuple[tuple[Track, ...], str, dict[str, float]]:
+) -> tuple[list[Track], str, dict[str, float]]:
     """Tracks on the clock of the measured motion, whose time starts at 0.
 
     The result has a remark, and by how many seconds the desired clock was shifted, if it was.
     """
     start = main.stamps.start
     clocks = {
-        id(track.stamps): replace(
-            track.stamps,
+        id(stamps): replace(
+            stamps,
             start=start,
-            time=track.stamps.time + float(track.stamps.start - start),
-            rate=rate if track.stamps is main.stamps else None,
+            time=stamps.time + float(stamps.start - start),
+            rate=rate if stamps is main.stamps else None,
         )
-        for track in tracks
+        for stamps in clocks_of(tracks)
     }
-    clocked = tuple(replace(track, stamps=clocks[id(track.stamps)]) for track in tracks)
+    clocked = on_clocks(tracks, clocks)
     measured = {id(track.stamps) for track in tracks if not track.is_desired}
-    others = [track.stamps for track in tracks if id(track.stamps) not in measured]
-    own = [clocks[key] for key in dict.fromkeys(map(id, others))]
+    others = [stamps for stamps in clocks_of(tracks) if id(stamps) not in measured]
+    own = [clocks[id(stamps)] for stamps in others]
     main_time = clocks[id(main.stamps)].time
     if all(np.array_equal(stamps.time, main_time) for stamps in own):
         return clocked, "", {}
@@ -360,8 +361,7 @@ def synchronise(
         if seconds == 0.0:
             return clocked, said, {}
     moved = {id(each): replace(each, time=each.time + seconds) for each in own}
-    shifted = (replace(t, stamps=moved.get(id(t.stamps), t.stamps)) for t in clocked)
-    return tuple(shifted), said, {"seconds": seconds}
+    return on_clocks(clocked, moved), said, {"seconds": seconds}
 
 
 def _estimated(
@@ -409,7 +409,13 @@ def _estimate(measured: Track, desired: Track) -> tuple[float, float, float, flo
     """Offset of the desired clock and its change from half to half, in [s]; two correlations."""
     rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in (measured, desired)))
     joints = [joint for joint in measured.joints if joint in desired.joints]
-    one, other = (_velocities(track, joints) for track in (measured, desired))
+    speeds = []
+    for track in (measured, desired):
+        values = np.asarray(track.of(joints), dtype=np.float64)
+        if track.signal.startswith("position"):
+            values = np.gradient(np.unwrap(values, axis=0), track.stamps.time, axis=0)
+        speeds.append(replace(track, values=values))
+    one, other = speeds
     seconds, correlation, next_best = _search(one, other, min(rate, COARSE_RATE))
     change = 0.0
     for _ in range(3):
@@ -427,21 +433,12 @@ def _common_tracks(
     """A measured and a desired track with a joint that moves in both, preferably velocities."""
     for one in ("velocity", "position"):
         for other in (one, "velocity", "position"):
-            first, second = measured.get(one), desired.get(other)
-            if first is None or second is None:
-                continue
-            for joint in set(first.joints) & set(second.joints):
-                if all(np.ptp(track.of([joint])) > 0 for track in (first, second)):
-                    return first, second
+            if one in measured and other in desired:
+                first, second = measured[one], desired[other]
+                for joint in set(first.joints) & set(second.joints):
+                    if all(np.ptp(track.of([joint])) > 0 for track in (first, second)):
+                        return first, second
     return None
-
-
-def _velocities(track: Track, joints: Sequence[str]) -> Track:
-    """Velocities of some joints, differentiated if the track holds positions."""
-    values = np.asarray(track.of(joints), dtype=np.float64)
-    if track.signal.startswith("position"):
-        values = np.gradient(np.unwrap(values, axis=0), track.stamps.time, axis=0)
-    return replace(track, values=values)
 
 
 def _at(motion: Track, instants: Array) -> Array:

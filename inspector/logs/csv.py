@@ -382,26 +382,19 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
 
 def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -> list[float]:
     """Numbers of cells of which some are empty, have a decimal comma, or are no numbers."""
-    found = []
     for name, cell in zip(names, cells, strict=True):
         if not (_is_missing(cell) or _is_number(cell)):
             raise LogError(path, f"column {name!r} holds {cell[:40]!r}, which is not a number", row)
-        found.append(np.nan if _is_missing(cell) else float(cell.replace(",", ".")))
-    return found
+    return [np.nan if _is_missing(cell) else float(cell.replace(",", ".")) for cell in cells]
 
 
 def _check_sparse(path: Path, names: Sequence[str], table: Array, rows: Sequence[int]) -> None:
     """Refuse columns that have numbers in some rows only, since they have another clock."""
-    lacking = np.isnan(table)
-    share = lacking.mean(axis=0)
-    sparse = np.flatnonzero((share >= SPARSE) & (share < 1))
-    if len(sparse):
-        raise LogError(
-            path,
-            f"column {names[sparse[0]]!r} is empty in {share[sparse[0]]:.0%} of the rows; columns"
-            " with another clock must be in a separate log (--desired)",
-            rows[int(np.argmax(lacking[:, sparse[0]]))],
-        )
+    for name, lacking in zip(names, np.isnan(table).T, strict=True):
+        if SPARSE <= (share := lacking.mean()) < 1:
+            how = "columns with another clock must be in a separate log (--desired)"
+            problem = f"column {name!r} is empty in {share:.0%} of the rows; {how}"
+            raise LogError(path, problem, rows[int(np.argmax(lacking))])
 
 
 def _is_missing(cell: str) -> bool:
@@ -424,21 +417,18 @@ def _decimals(
     """Stamps, of dates in [s] since 1970."""
     dated = _date(cells[0]) is not None
     found = []
-    for row, cell in zip(rows, cells, strict=True):
-        stamp = _date(cell) if dated else _decimal(cell)
+    for row, cell in zip(rows, map(str.strip, cells), strict=True):
+        stamp = _date(cell) if dated else None
+        if not dated:
+            with suppress(InvalidOperation):
+                stamp = Decimal(cell.replace(",", "."))
         if stamp is None or not stamp.is_finite():
-            what = f"holds {cell.strip()[:40]!r}, which is no time"
-            raise LogError(path, f"column {name!r} {what if cell.strip() else 'is empty'}", row)
+            what = f"holds {cell[:40]!r}, which is no time" if cell else "is empty"
+            raise LogError(path, f"column {name!r} {what}", row)
         if stamp and not -DIGITS < stamp.adjusted() < DIGITS:
-            raise LogError(path, f"the stamp {cell.strip()[:40]!r} is no time", row)
+            raise LogError(path, f"the stamp {cell[:40]!r} is no time", row)
         found.append(stamp)
     return found
-
-
-def _decimal(cell: str) -> Decimal | None:
-    with suppress(InvalidOperation):
-        return Decimal(cell.strip().replace(",", "."))
-    return None
 
 
 def _date(cell: str) -> Decimal | None:
@@ -448,7 +438,6 @@ def _date(cell: str) -> Decimal | None:
     with suppress(ValueError):
         date = datetime.fromisoformat(cell.strip())
         since = (date if date.tzinfo else date.replace(tzinfo=UTC)) - DAY
-        return (
-            Decimal(since // timedelta(microseconds=1)).scaleb(-6) if date.year in YEARS else None
-        )
+        if date.year in YEARS:
+            return Decimal(since // timedelta(microseconds=1)).scaleb(-6)
     return None

@@ -15,21 +15,22 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs.clocks import (
+    clocks_of,
     common_time,
-    counted_stamps,
     hold_length,
+    in_seconds,
     no_overlap,
     ordered,
     resampled,
     synchronise,
     updates,
 )
-from inspector.logs.mapping import SAMPLES, UNIFORM, Log, ReadOptions, Stamps, Track, tracks_of
+from inspector.logs.mapping import UNIFORM, Log, ReadOptions, Stamps, Track, tracks_of
 from inspector.logs.names import listed
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
 from noisemodel.run import METHOD, base_velocity, joint_velocity
-from noisemodel.types import Array, Indices, Mask, Real
+from noisemodel.types import Array, Indices, Mask
 
 LARGEST_RATE_RATIO = 1.5  # of the specified rate to the stamps' rate, or the inverse
 SAME_RATE = 1.01  # ratio of two rates up to which no band is lost from one to the other
@@ -53,7 +54,12 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
     found, not_read, told = tracks_of(log, options, robot)
     remarks = [*log.remarks, *told]
     _refuse_quaternion(path, found, options)
-    tracks = _with_two_samples(path, _in_seconds(path, found, options), remarks)
+    timed = in_seconds(path, found, options)
+    tracks = [track for track in timed if len(track.values) > 1]
+    if not any(track.joints for track in tracks):
+        raise LogError(path, "1 sample; a run needs at least 2")
+    if once := [label for track in timed if len(track.values) < 2 for label in track.labels]:
+        remarks.append(f"logged once only, left out: {listed(once)}")
     tracks = [t for each in tracks if (t := _finite(path, each, remarks)) is not None]
     tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks)
     increasing, order = ordered(path, tracks)
@@ -83,31 +89,6 @@ def _refuse_quaternion(path: Path, tracks: Sequence[Track], options: ReadOptions
                     f"{listed(track.labels)} hold a quaternion (their norm is 1), not joints; if"
                     " they are joints, name them: --map position.JOINT=COLUMN",
                 )
-
-
-def _in_seconds(path: Path, tracks: Sequence[Track], options: ReadOptions) -> list[Track]:
-    """Tracks whose stamps are in seconds, where they counted samples."""
-    by_signal = {track.signal: track for track in reversed(tracks)}
-    position, velocity = by_signal.get("position"), by_signal.get("velocity")
-    values: tuple[Real | None, Real | None] = (None, None)
-    if position and velocity and position.stamps is velocity.stamps:
-        shared = [joint for joint in position.joints if joint in velocity.joints]
-        values = (position.of(shared), velocity.of(shared)) if shared else values
-    timed = {
-        id(stamps): counted_stamps(path, stamps, options, *values)
-        for stamps in {id(track.stamps): track.stamps for track in tracks}.values()
-        if stamps.unit == SAMPLES
-    }
-    return [replace(t, stamps=timed.get(id(t.stamps), t.stamps)) for t in tracks]
-
-
-def _with_two_samples(path: Path, tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
-    long_enough = [track for track in tracks if len(track.values) > 1]
-    if not any(track.joints for track in long_enough):
-        raise LogError(path, "1 sample; a run needs at least 2")
-    if once := [label for track in tracks if len(track.values) < 2 for label in track.labels]:
-        remarks.append(f"logged once only, left out: {listed(once)}")
-    return long_enough
 
 
 # Values that are none
@@ -194,7 +175,7 @@ FROZEN_WAY = 0.05  # least way that joints should have gone in that time, in [ra
 def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
     """Tracks whose samples are missing where all rows are one, and joints should move."""
     found = list(tracks)
-    for stamps in {id(track.stamps): track.stamps for track in tracks}.values():
+    for stamps in clocks_of(tracks):
         ours = [track for track in tracks if track.stamps is stamps and track.joints]
         measured = [track for track in ours if not track.is_desired]
         if "position" not in {track.signal for track in measured}:
