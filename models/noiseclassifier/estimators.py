@@ -236,11 +236,6 @@ class Probable(ABC):
         np.fmax.reduce(features - highest, 1, out=decisions[:, -1])
         return decisions
 
-    @cached_property
-    def _expected(self) -> Array:
-        """Logarithms of the failures' frequencies, shape (classes - 1,)."""
-        return np.asarray(np.log(self.frequency[1:]))
-
     def choose(self, decisions: Array) -> Index:
         """Choose a failure if failures are probable enough, or else `ok`.
 
@@ -248,7 +243,7 @@ class Probable(ABC):
         not masked by a frequent one (balanced accuracy weighs them alike).
         """
         logarithms = decisions[:, :-1]
-        chosen: Index = 1 + (logarithms[:, 1:] - self._expected).argmax(axis=1)
+        chosen: Index = 1 + (logarithms[:, 1:] - np.log(self.frequency[1:])).argmax(axis=1)
         chosen[logarithms[:, 0] > log1p(-LIKELY)] = 0
         chosen[self.novel(decisions) & ~self.above_threshold(decisions)] = logarithms.shape[1]
         return chosen
@@ -407,41 +402,32 @@ class Trees(Probable):
 
     def logits(self, features: Array) -> Array:
         """Sums of the leaves that frames lead to, and the prior, shape (frames, classes)."""
+        number, threshold, missing, left, leaf, leaves, begins = self._side_by_side
         found = np.empty((len(features), len(self.prior)))
         for first in range(0, len(features), BATCH):
             few = slice(first, first + BATCH)
-            found[few] = self._sums(features[few])
+            values = features[few].take(number, axis=1)
+            right = values > threshold
+            if np.isnan(features[few]).any():
+                right |= np.isnan(values) & missing
+            ruled_out = np.bitwise_or.reduce(right * left, 1)
+            place = leaves + _FIRST.take(np.invert(ruled_out, out=ruled_out))
+            found[few] = np.add.reduceat(leaf.take(place), begins, 1)
+            found[few] += self.prior
         return found
 
-    def _sums(self, features: Array) -> Array:
-        number, threshold, missing, left, leaf, first = self._side_by_side
-        values = features.take(number, axis=1)
-        right = values > threshold
-        if np.isnan(features).any():
-            right |= np.isnan(values) & missing
-        ruled_out = np.bitwise_or.reduce(right * left, 1)
-        place = first + _FIRST.take(np.invert(ruled_out, out=ruled_out))
-        sums: Array = np.add.reduceat(leaf.take(place), self._by_class[1], 1)
-        sums += self.prior
-        return sums
-
     @cached_property
-    def _by_class(self) -> tuple[Index, Index]:
-        """Trees that have leaves, and one of each class, class by class; where each class begins.
+    def _side_by_side(self) -> tuple[Index, Array, Mask, NDArray[np.uint16], Array, Index, Index]:
+        """All first splits of the trees that count side by side, and then all second ones.
 
-        The shapes are (trees,) and (classes,).
+        These are the trees that have leaves, and one of each class, class by class; the last array
+        has where each class begins, shape (classes,).
         """
         classes = len(self.prior)
         kept: Mask = np.any(self.leaf != 0.0, axis=1)
         kept[:classes] = True
         number = np.flatnonzero(kept)
-        order: Index = number[np.argsort(number % classes, kind="stable")]
-        return order, np.searchsorted(order % classes, np.arange(classes))
-
-    @cached_property
-    def _side_by_side(self) -> tuple[Index, Array, Mask, NDArray[np.uint16], Array, Index]:
-        """All first splits of the trees that count side by side, and then all second ones."""
-        own, _ = self._by_class
+        own = number[np.argsort(number % classes, kind="stable")]
         start, stop = self.left[:, own].astype(np.int64)
         bits = ((1 << stop) - (1 << start)).astype(np.uint16)
         trees, leaves = self.leaf[own].shape
@@ -452,6 +438,7 @@ class Trees(Probable):
             np.ascontiguousarray(bits.T),
             self.leaf[own].ravel(),
             leaves * np.arange(trees),
+            np.searchsorted(own % classes, np.arange(classes)),
         )
 
 
