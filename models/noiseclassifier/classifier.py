@@ -6,6 +6,7 @@ where frames without a feature belong. Bound to a rate and to signals (`General.
 `Classifier` like any other, without missing features.
 """
 
+import hashlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
@@ -446,7 +447,8 @@ def load(path: str | Path) -> Model:
     """
     manifest, arrays, profile, recipe = modelfile.read(path)
     classes, mean, scale = tuple(manifest["classes"]), arrays["mean"], arrays["scale"]
-    known = *(manifest[name] for name in ("runs", "metrics", "versions")), modelfile.digest(path)
+    sha256 = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    known = *(manifest[name] for name in ("runs", "metrics", "versions")), sha256
     if recipe is not None:
         return General(recipe, classes, Detector.of(arrays, profile), mean, scale, *known)
     estimator = ESTIMATORS[profile.estimator].of(arrays, profile)

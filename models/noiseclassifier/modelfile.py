@@ -7,7 +7,6 @@ profile is for its highest rate. Versions 4 to 6 are read too; 4 and 5 know no m
 and no reference.
 """
 
-import hashlib
 import io
 import json
 import os
@@ -135,11 +134,6 @@ def read(
         if not np.isfinite(array).all():
             raise FileError(path, f"array {name!r} holds values that are not finite")
     return manifest, members, *check(path, manifest, members)
-
-
-def digest(path: str | Path) -> str:
-    """SHA-256 of a model file."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def _check_members(path: str | Path, archive: zipfile.ZipFile) -> dict[str, int]:
