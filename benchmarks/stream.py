@@ -8,7 +8,7 @@ import numpy as np
 
 import noiseclassifier as nc
 from benchmarks.table import ROOT, Row, used
-from noiseclassifier.signals import JOINTS, MOTION, NOISE, by_joint
+from noiseclassifier.signals import BY_JOINT, JOINTS, MOTION, NOISE
 
 RATES = (125.0, 1000.0, 10_000.0)  # rates of the signals, in [Hz]
 INPUTS = {"joints": (*MOTION, *JOINTS), "norms": MOTION, "noise": (NOISE,)}
@@ -35,8 +35,8 @@ def rows(_: object) -> Iterator[Row]:
         for name, classifier in cases.items():
             rate, count = classifier.rate, round(SECONDS * classifier.rate)
             signals = {
-                signal: 1.0 + 0.1 * random.standard_normal((MANY,) * by_joint(signal) + (count,))
-                for signal in classifier.profile.signals
+                each: 1.0 + 0.1 * random.standard_normal((MANY,) * (each in BY_JOINT) + (count,))
+                for each in classifier.profile.signals
             }
             found[name].append(pushed(classifier, signals, max(1, round(CHUNK * rate))))
             if name == "labels by joints, 1000 Hz":

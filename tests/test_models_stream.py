@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import noiseclassifier as nc
 from noiseclassifier.features import FrameFeatures, frame_features
 from noiseclassifier.profile import INPUTS
-from noiseclassifier.signals import JOINTS, MOTION, by_joint, stacked
+from noiseclassifier.signals import BY_JOINT, JOINTS, MOTION, stacked
 
 module = sys.modules["noiseclassifier.features"]
 RATE = 1000.0
@@ -138,7 +138,7 @@ def random_signals(profile, joints, count):
     """White noise about 1, shape (samples,) or (joints, samples), by name."""
     random = np.random.default_rng(count)
     return {
-        name: 1.0 + 0.1 * random.standard_normal((joints,) * by_joint(name) + (count,))
+        name: 1.0 + 0.1 * random.standard_normal((joints,) * (name in BY_JOINT) + (count,))
         for name in profile.signals
     }
 

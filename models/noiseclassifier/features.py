@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from noiseclassifier.errors import SignalError
 from noiseclassifier.profile import STATISTICS, Profile, Resolution, columns, spectra
-from noiseclassifier.signals import Array, Index, Mask, Real, Signals, by_joint, stacked
+from noiseclassifier.signals import BY_JOINT, Array, Index, Mask, Real, Signals, stacked
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -227,7 +227,7 @@ def _level(profile: Profile) -> tuple[Index, Array]:
         for name in spectra(profile):
             for statistic in profile.statistics:
                 counts = " less " not in name and statistic != "deviation"
-                means += [counts and statistic == "mean" and not by_joint(name)] * each.bands
+                means += [counts and statistic == "mean" and name not in BY_JOINT] * each.bands
                 above += [float(counts)] * each.bands
     return np.flatnonzero(means), np.array([*above, -1.0])
 

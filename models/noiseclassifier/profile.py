@@ -15,7 +15,7 @@ from typing import Any, Literal, Self, TypeAlias, get_args
 import numpy as np
 
 from noiseclassifier.errors import ProfileError
-from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE, Index, by_joint
+from noiseclassifier.signals import BY_JOINT, EFFORT, JOINTS, MOTION, NOISE, Index
 
 # NoisyTest's classes, in its order; `ok` is the first of every model.
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
@@ -165,7 +165,7 @@ class Profile:
     @cached_property
     def norms(self) -> int:
         """Number of signals that are norms."""
-        return sum(not by_joint(name) for name in self.signals)
+        return sum(name not in BY_JOINT for name in self.signals)
 
     @property
     def name(self) -> str:
@@ -273,7 +273,7 @@ def _rules_of_signals(profile: Profile) -> Iterator[tuple[bool, str]]:
     names, norms, log = profile.signals, profile.norms, profile.bands == "log"
     signals = f"signals are {', '.join(names) or 'none'}"
     yield (
-        norms > 0 and len(names) == len(set(names)) and not any(map(by_joint, names[:norms])),
+        norms > 0 and len(names) == len(set(names)) and not set(names[:norms]) & set(BY_JOINT),
         f"{signals}, expected norms, and after them those that go joint by joint, each once",
     )
     yield (
@@ -372,8 +372,12 @@ class LogBands:
         """
         nyquist = rate / 2
         highest, edges, quick = min(self.highest, nyquist), [self.lowest], []
-        while (upper := self._upper(edges[-1])) <= highest:
-            edges.append(upper)
+        # A band is as wide as the window resolves, or wider.
+        ratio: float = 2.0 ** (1.0 / self.per_octave)
+        while len(edges) <= FEWEST or edges[-1] <= highest:
+            edges.append(max(edges[-1] + 1.0 / self.window, edges[-1] * ratio))
+        least = edges[FEWEST]
+        edges = edges[:1] + [edge for edge in edges[1:] if edge <= highest]
         if self.quick and nyquist * self.quick >= SPEED:  # else its first band does not fit
             quick = [0.0, SPEED / self.quick] if self.speed else [SPEED / self.quick]
             while (upper := quick[-1] * WIDE) <= highest:
@@ -381,7 +385,6 @@ class LogBands:
         if len(quick) < 2:  # no band fits
             quick = []
         if len(edges) <= FEWEST:
-            least = self._upper(self._upper(self.lowest))  # of the second band
             raise ProfileError(
                 f"a rate of {rate:g} Hz leaves {len(edges) - 1} bands up to {nyquist:g} Hz,"
                 f" expected {FEWEST} or more: take a rate of {ceil(2 * least)} Hz at least"
@@ -463,11 +466,6 @@ class LogBands:
             [not name.startswith(fixed) and not name.endswith(" 0") for name in plain],
             dtype=np.intp,
         )
-
-    def _upper(self, edge: float) -> float:
-        """Upper edge of the band from an edge on: as wide as the window resolves, or wider."""
-        ratio: float = 2.0 ** (1.0 / self.per_octave)
-        return max(edge + 1.0 / self.window, edge * ratio)
 
 
 # For any rate and whatever signals there are; features relative to a reference beside.

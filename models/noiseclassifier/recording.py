@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from noiseclassifier.errors import DatasetError, RecordingError
-from noiseclassifier.signals import NOISE, Array, Index, Mask, Signals, by_joint, named
+from noiseclassifier.signals import BY_JOINT, NOISE, Array, Index, Mask, Signals, named
 
 
 class Block(NamedTuple):
@@ -86,7 +86,7 @@ def _problems(recording: Recording) -> Iterator[str]:
     """What is wrong with the samples and the blocks of a recording."""
     count, valid, start, rate = recording.samples, recording.valid, recording.start, recording.rate
     for kind, signal in named(recording.signal).items():
-        many = by_joint(kind)
+        many = kind in BY_JOINT
         if signal.ndim != 1 + many or signal.shape[-1:] != (count,) or not signal.size:
             expected = "(joints, samples)" if many else "(samples,)"
             yield f"a signal of shape {signal.shape}, expected {expected}, one or more"

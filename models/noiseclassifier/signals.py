@@ -24,6 +24,7 @@ NOISE = "noise"
 MOTION = ("desired", "measured", "error")  # norms of the velocities of a run with a desired motion
 JOINTS = tuple(f"{name}_joints" for name in MOTION)  # the same, joint by joint
 EFFORT = "effort_joints"  # joint torques, forces or motor currents, in any unit
+BY_JOINT = (*JOINTS, EFFORT)  # signals that have a row for each joint
 # The noise, shape (samples,), or signals by name: norms of that shape, and what goes joint by
 # joint, shape (joints, samples).
 Signals: TypeAlias = Real | Mapping[str, Real]
@@ -32,11 +33,6 @@ Signals: TypeAlias = Real | Mapping[str, Real]
 def named(signals: Signals) -> Mapping[str, Real]:
     """Signals by name; one alone is the noise."""
     return signals if isinstance(signals, Mapping) else {NOISE: signals}
-
-
-def by_joint(name: str) -> bool:
-    """Whether a signal has a row for each joint, by its name."""
-    return name in JOINTS or name == EFFORT
 
 
 def without_zero_error(signals: Mapping[str, Real]) -> dict[str, Real]:
@@ -65,10 +61,10 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
     chosen = [np.asarray(there[name]) for name in names]
     # All norms have one shape, and all that goes joint by joint has another one.
     count, joints = chosen[0].shape[-1:], chosen[-1].shape[:-1]
-    wanted = [joints + count if by_joint(name) else count for name in names]
+    wanted = [joints + count if name in BY_JOINT else count for name in names]
     alike = [each.shape for each in chosen] == wanted and len(count) == 1
-    if not alike or len(joints) != by_joint(names[-1]) or 0 in joints:
+    if not alike or len(joints) != (names[-1] in BY_JOINT) or 0 in joints:
         found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
-        more = ", and (joints, samples) joint by joint" * any(map(by_joint, names))
+        more = ", and (joints, samples) joint by joint" * any(name in BY_JOINT for name in names)
         raise SignalError(f"a signal has another shape, {found}, expected (samples,){more}")
     return chosen[0] if len(chosen) == 1 else np.vstack(chosen)
