@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -127,19 +127,15 @@ UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.E
 # --- commands
 
 
-def _plain(checked: Callable[[], Any]) -> Any:
+def _coerce(checked: Callable[[], Any], value: Any, *, param: Any, ctx: Any) -> Any:
     """Take defaults and paths as they are: to check them, typer imports pydantic for 0.1 s."""
-
-    def coerce(value: Any, *, param: Any, ctx: Any) -> Any:
-        many = param.multiple or param.nargs == -1
-        if value is None or value is param.default:
-            return () if value is None and many else value
-        paths = many and param.type_descriptor.annotation == list[Path]
-        if paths and all(isinstance(each, str) and os.access(each, os.R_OK) for each in value):
-            return list(map(Path, value))
-        return checked().coerce(value, param=param, ctx=ctx)
-
-    return lambda: SimpleNamespace(coerce=coerce)
+    many = param.multiple or param.nargs == -1
+    if value is None or value is param.default:
+        return () if value is None and many else value
+    paths = many and param.type_descriptor.annotation == list[Path]
+    if paths and all(isinstance(each, str) and os.access(each, os.R_OK) for each in value):
+        return list(map(Path, value))
+    return checked().coerce(value, param=param, ctx=ctx)
 
 
 class _Taking:
@@ -149,7 +145,8 @@ class _Taking:
         found: list[Any] = super().get_params(ctx)  # type: ignore[misc]
         for each in found:
             if hasattr(each, "get_runtime_param"):  # of typer's latest versions
-                each.get_runtime_param = _plain(each.get_runtime_param)
+                coerce = partial(_coerce, each.get_runtime_param)
+                each.get_runtime_param = partial(SimpleNamespace, coerce=coerce)
         return found
 
 
@@ -171,9 +168,15 @@ class _Command(_Taking, TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; no output in `OUTPUTS` may be one of its other files."""
+        import ctypes
+
         from noisemodel.files import reading, refuse_read
 
-        _keep_memory()
+        # Freed memory waits for the next arrays: to return it and get it anew takes a tenth.
+        for number, name, size in ((-3, "MMAP", 2**25), (-1, "TRIM", 2**27)):  # see mallopt(3)
+            os.environ.setdefault(f"MALLOC_{name}_THRESHOLD_", str(size))  # of processes to come
+            with suppress(OSError, AttributeError):  # where the C library is another one
+                ctypes.CDLL(None).mallopt(number, size)
         files: dict[bool, list[Path]] = {True: [], False: []}
         for name, value in ctx.params.items():
             paths = value if isinstance(value, list) else [value]
@@ -186,16 +189,6 @@ class _Command(_Taking, TyperCommand):
             for path in files[True]:
                 refuse_read(path)
             return super().invoke(ctx)
-
-
-def _keep_memory() -> None:
-    """Have freed memory wait for the next arrays: to return it and get it anew takes a tenth."""
-    import ctypes
-
-    for number, name, size in ((-3, "MMAP", 2**25), (-1, "TRIM", 2**27)):  # see mallopt(3)
-        os.environ.setdefault(f"MALLOC_{name}_THRESHOLD_", str(size))  # of processes to come
-        with suppress(OSError, AttributeError):  # where the C library is another one
-            ctypes.CDLL(None).mallopt(number, size)
 
 
 def _converted(function: Callable[..., Any], name: str, **settings: Any) -> Any:
