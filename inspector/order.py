@@ -3,25 +3,20 @@
 Teeth, balls or poles that pass n times per turn of a joint shake it at n |w| / 2 pi: a frequency
 that goes with the joint's speed w, but one line at order n in the spectrum over the joint's angle.
 That is order tracking with angular resampling (Fyfe & Munck 1997, Analysis of computed order
-tracking, Mechanical Systems and Signal Processing 11(2); R. B. Randall, Vibration-based Condition
-Monitoring, Wiley 2011). A vibration of fixed frequency is a line over time, and smears over angle.
+tracking, Mechanical Systems and Signal Processing 11(2)). A vibration of fixed frequency is a line
+over time, and smears over angle.
 
-Both are measured in the same way: by the share of the energy that one line explains. The vibration
-e is cut into pieces of at most `LONGEST`, and where the joint stops or turns back. In each piece,
-with Hann weights h, a line at order n is
-
-    a sqrt|w| cos(n theta + phi)
-
-with amplitude a and phase phi by least squares, for each piece its own; n is common to all. A line
-at frequency f is the same of a joint that turns at 1 rad/s throughout: a cos(2 pi f t + phi). The
-factor sqrt|w| lies between a ripple of constant amplitude and one that grows with the speed, and
-conserves energy from time to angle: sum h e sqrt|w| exp(-i n theta) over time is the integral of
-h e / sqrt|w| exp(-i n theta) over angle, thus a Fourier transform of samples at equal steps of it.
+Both are measured by the share of the energy that one line explains. The vibration e is cut into
+pieces of at most `LONGEST`, and where the joint stops or turns back. In each piece, with Hann
+weights h, a line at order n is a sqrt|w| cos(n theta + phi), with amplitude a and phase phi by
+least squares, for each piece its own; n is common to all. A line at frequency f is the same of a
+joint that turns at 1 rad/s throughout. The factor sqrt|w| lies between a ripple of constant
+amplitude and one that grows with the speed, and conserves energy from time to angle: sum h e
+sqrt|w| exp(-i n theta) over time is the integral of h e / sqrt|w| exp(-i n theta) over angle, thus
+a Fourier transform of samples at equal steps of it.
 
 An order is stated if its line explains `LEAST` of the energy, and `MARGIN` of it more than the best
-line of fixed frequency. While the speed hardly varies both explain the same, and none is stated.
-The resolution of an order is the inverse of the number of periods, of which `PERIODS` are needed.
-Neither share depends on the scale of the vibration or the direction of time. The limits were chosen
+line of fixed frequency: while the speed hardly varies both explain the same. The limits were chosen
 on simulated findings.
 """
 
@@ -73,6 +68,7 @@ class Piece(NamedTuple):
     wave: Array  # vibration, in [rad/s]
     angle: Array  # since the start of the piece, increasing, in [rad]
     speed: Array  # its derivative, in [rad/s]; 0 at rest
+    weight: Array  # Hann weights, of which none is 0
 
 
 def order(run: Run, failure: Event | Block) -> Order | None:
@@ -129,7 +125,7 @@ def best_lines(
     # Time is the angle of a joint that turns at 1 rad/s throughout. Few periods count too: a tone
     # that is called ripple is worse than the reverse.
     uniform = [
-        Piece(piece.wave, np.arange(len(piece.wave)) / run.rate, np.ones(len(piece.wave)))
+        piece._replace(angle=np.arange(len(piece.wave)) / run.rate, speed=np.ones(len(piece.wave)))
         for piece in pieces
     ]
     _, over_time = _explained(uniform, 1.0, run.rate)
@@ -201,7 +197,8 @@ def _pieces(wave: Array, angle: Array, speed: Array, slowest: float) -> Iterator
         if last - first >= 4:
             sign = direction[first]
             turned = sign * (angle[first:last] - angle[first])
-            yield Piece(wave[first:last], turned, sign * speed[first:last])
+            weight = _hann(last - first)
+            yield Piece(wave[first:last], turned, sign * speed[first:last], weight)
 
 
 def _explained(
@@ -216,10 +213,10 @@ def _explained(
     size = 1 << math.ceil(math.log2(PADDED * longest / step + 1.0))
     orders = 2.0 * np.pi / (size * step) * np.arange(size // 2 + 1)
     energy, counted = np.zeros(len(orders)), np.zeros(len(orders))
-    for wave, angle, speed in pieces:
+    for wave, angle, speed, weight in pieces:
         if not speed.any():
             continue
-        weight, sample = _hann(len(wave)), np.arange(len(wave))
+        sample = np.arange(len(wave))
         at = np.interp(np.arange(0.0, angle[-1], step), angle, sample)
         # Values between samples: the weighted wave begins and ends near 0, as if it were periodic.
         many = FINER * len(wave)
@@ -238,24 +235,20 @@ def _explained(
         before, highest, after = lines[top - 1 : top + 2].tolist()
         offset = (before - after) / (before - 2.0 * highest + after) / 2.0
         best = float(best + offset * (orders[1] - orders[0]))
-    rest = _energy([_without(piece, best, fewest=fewest) for piece in pieces])
+    rest = 0.0  # energy less the least-squares fit, where it has periods enough
+    for wave, angle, speed, weight in pieces:
+        left = wave
+        if speed.any() and best * angle[-1] >= 2.0 * np.pi * fewest:
+            line = np.sqrt(speed) * np.exp(1j * best * angle)
+            size = 2.0 * (weight * wave) @ line.conj() / (weight @ speed)
+            left = wave - (size * line).real
+        rest += float(weight @ np.square(left))
     return best, 1.0 - rest / _energy(pieces)
 
 
-def _without(piece: Piece, order: float, *, fewest: float) -> Piece:
-    """A piece less the least-squares fit of an order, unless it has too few periods of it."""
-    if not piece.speed.any() or order * piece.angle[-1] < 2.0 * np.pi * fewest:
-        return piece
-    weight = _hann(len(piece.wave))
-    line = np.sqrt(piece.speed) * np.exp(1j * order * piece.angle)
-    size = 2.0 * (weight * piece.wave) @ line.conj() / (weight @ piece.speed)
-    return piece._replace(wave=piece.wave - (size * line).real)
-
-
 def _energy(pieces: list[Piece]) -> float:
-    return sum(float(_hann(len(piece.wave)) @ np.square(piece.wave)) for piece in pieces)
+    return sum(float(piece.weight @ np.square(piece.wave)) for piece in pieces)
 
 
 def _hann(samples: int) -> Array:
-    """Hann weights, of which none is 0."""
     return np.hanning(samples + 2)[1:-1]

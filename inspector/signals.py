@@ -191,29 +191,6 @@ def step_of(values: Real) -> float:
     return float(distances.min()) if fits else 0.0
 
 
-def steps_of(run: Run, differentiator: Differentiator | None) -> Array:
-    """Quantisation steps of the signal from which a run's velocities come, 0 where there are none.
-
-    They are of the positions, in [rad], if these were differentiated, else of the velocities, in
-    [rad/s]; shape (joints,).
-    """
-    signal = run.position if differentiator and run.position is not None else run.velocity
-    return np.array([step_of(values) for values in np.ascontiguousarray(valid(run, signal).T)])
-
-
-def quantisation_noise(
-    steps: Array, spectrum: Spectrum, differentiator: Differentiator | None
-) -> Array:
-    """Spectrum of the velocities' quantisation noise, all joints together, in [(rad/s)²/Hz]."""
-    # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12.
-    white = float(np.square(steps).sum()) / 12.0 / (spectrum.rate / 2)
-    frequency = spectrum.frequency
-    gain = np.ones(len(frequency))
-    if differentiator:
-        gain = differentiator.response(frequency, spectrum.rate)
-    return np.asarray(white * np.square(gain))
-
-
 def floor_frequency(spectrum: Spectrum, floor: Array) -> float:
     """Frequency above which a spectrum is less than twice its noise floor, in amplitude.
 
@@ -288,8 +265,14 @@ def bandwidth(run: Run) -> Bandwidth:
     found = spectrum(run.velocity, run.rate, run.mask)
     if found is None or not found.total.any():
         return plain
-    steps = steps_of(run, differentiator)
-    noise = quantisation_noise(steps, found, differentiator)
+    # Of the positions, in [rad], if these were differentiated, else of the velocities, in [rad/s].
+    signal = run.position if differentiator and run.position is not None else run.velocity
+    steps = np.array([step_of(values) for values in np.ascontiguousarray(valid(run, signal).T)])
+    # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12, here of all
+    # joints together.
+    noise = np.full(len(found.total), float(np.square(steps).sum()) / 12.0 / (run.rate / 2))
+    if differentiator:
+        noise = noise * np.square(differentiator.response(found.frequency, run.rate))
     # A sine of amplitude a in a band of width b has the mean density a² / 2b.
     encoders = np.full(len(noise), ENCODER_NOISE**2 / (2 * RESOLUTION))
     floor, quiet = floor_frequency(found, noise), floor_frequency(found, encoders)
