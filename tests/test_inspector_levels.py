@@ -111,6 +111,13 @@ def test_a_tone_is_loudest_at_its_frequency_and_a_constant_is_not_shown(hertz, r
     assert np.abs(loudest - hertz).max() <= shown.frequency[1] - shown.frequency[0]
 
 
+@pytest.mark.parametrize(("amplitude", "level"), [(1.0, 0.0), (0.1, -20.0), (0.02, -33.98)])
+def test_a_tenth_of_the_amplitude_is_20_decibels_less_in_a_spectrogram(amplitude, level):
+    signal = amplitude * wave(312.5, 10_000.0, 1.0)  # 32 periods in a window of 1024 samples
+    shown = spectrogram(signal, 10_000.0, start=0.0, valid=everywhere(signal))
+    np.testing.assert_allclose(shown.decibel.max(axis=0), level, atol=0.01)
+
+
 def test_windows_that_touch_a_gap_are_silent():
     signal = wave(100.0, 1000.0, 4.0)
     valid = everywhere(signal)
