@@ -13,7 +13,7 @@ from inspector.library import label_run, load_library
 from inspector.live import LiveError
 from inspector.live.drawing import Sink
 from inspector.live.session import BATCH
-from inspector.recording import unstable
+from inspector.recording import views
 from inspector.report.findings import spoken
 from noisemodel import UnknownJointError
 
@@ -66,7 +66,7 @@ def classes(path):
     """Start, stop and class of each stretch that is drawn, frames that touch as one."""
     time, values = read(path, "/class/found", "Measurements:values")
     found = []
-    for now, row in zip(time, np.array(values)[:, :: unstable.COPIES], strict=True):
+    for now, row in zip(time, np.array(values)[:, :: views.COPIES], strict=True):
         for state in np.array(ROWS)[np.isfinite(row)]:
             if not found or found[-1][2] != state or now > found[-1][1] + 0.11:
                 found.append([now, now, state])

@@ -14,7 +14,7 @@ from inspector.live import SinkError
 from inspector.live import drawing as module
 from inspector.live.drawing import Sink
 from inspector.recording import viewer
-from inspector.recording.unstable import has_end
+from inspector.recording.views import has_end
 
 
 def free_port():

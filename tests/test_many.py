@@ -7,7 +7,7 @@ from recordings import entities, read
 
 from inspector.compare.many import Several, lay, report, shortened, write
 from inspector.logs.read import open_run
-from inspector.recording.axes import TOP
+from inspector.recording.views import TOP
 from noiseclassifier import Event
 from noisemodel import Block, Run
 

@@ -29,7 +29,7 @@ from inspector import colors
 from inspector.analysis import Analysis, Status, analyse_file
 from inspector.errors import InspectorError
 from inspector.levels import velocity_levels
-from inspector.recording import axes, panels
+from inspector.recording import panels, views
 from inspector.recording import run as recordings
 from inspector.recording.panels import HEIGHT, NOISE_POINTS, scaled
 from inspector.recording.run import height, write
@@ -247,11 +247,11 @@ def test_a_tone_is_brightest_at_its_tick(tmp_path):
     )
     light = [brightest(path, f"/spectrogram/bands/{row:02d}") for row in range(48)]
     _, values = read(path, f"/spectrogram/bands/{np.argmax(light):02d}", "Scalars:scalars")
-    place = values[0][0] / axes.TOP
+    place = values[0][0] / views.TOP
     _, (labels,) = read(path, "/axis/spectrogram/left", "Points2D:labels")
     _, (points,) = read(path, "/axis/spectrogram/left", "Points2D:positions")
     y = points[labels.index("300 Hz")][1]
-    panel = axes.Panel("spectrogram", HEIGHT)
+    panel = views.Panel("spectrogram", HEIGHT)
     assert y == pytest.approx(panel.y(place), abs=0.02)
     assert labels[1:] == ["10 Hz", "30 Hz", "100 Hz", "300 Hz", "1 kHz", "3 kHz"]
 

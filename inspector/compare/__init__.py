@@ -29,12 +29,11 @@ from inspector.errors import InspectorError
 from inspector.levels import FLOOR_DB, LINKS, SPECTRUM, STEP, Spectrogram, link_levels, spectrogram
 from inspector.library import Library
 from inspector.logs.read import Opened, open_run
-from inspector.recording import axes, panels, robot, unstable
-from inspector.recording.axes import Label, Panel, Timed
+from inspector.recording import panels, robot, views
 from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Plotted, found_stretches
 from inspector.recording.robot import Drawn
 from inspector.recording.run import log_report, writing
-from inspector.recording.unstable import Part
+from inspector.recording.views import Label, Panel, Part, Timed
 from inspector.report.findings import classes_of, spoken
 from noiseclassifier import Event
 from noiseclassifier.matching import spans_of, union
@@ -492,7 +491,7 @@ SHADES = {
     LOUDER: panels.AFTER,
     RESOLVED: panels.BEFORE,
     QUIETER: panels.BEFORE,
-    UNCHANGED: axes.INK,
+    UNCHANGED: views.INK,
 }
 NOISE_POINTS = 60_000  # of each run's noise
 DETAILS = 184.0  # height of the panels that lie behind each other
@@ -508,25 +507,25 @@ def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change
     styles = {kind: (kind, shade) for kind, shade in SHADES.items()}
     panels.log_shades(recording, "/level/change", changed, styles, (LOW_DB, HIGH_DB))
     for place, (name, _) in enumerate(pair.sides):
-        axes.log_line(recording, f"/level/{name}", time, level[:, place], SIDE_COLORS[name])
-    axes.log_beside(recording, LEVEL, panels.level_axis(), _sides())
+        views.log_line(recording, f"/level/{name}", time, level[:, place], SIDE_COLORS[name])
+    views.log_beside(recording, LEVEL, panels.level_axis(), _sides())
     change = level[:, 1] - level[:, 0]
     peak = float(change[np.abs(change).argmax()])
     reach = SPAN_DB * max(float(np.ceil(abs(peak) / SPAN_DB)), 1.0)
-    axes.log_line(recording, "/change/noise", time, change, axes.INK)
+    views.log_line(recording, "/change/noise", time, change, views.INK)
     nothing = colors.CLASSES["unknown"]
-    axes.log_line(recording, "/change/none", time[[0, -1]], np.zeros(2), nothing)
+    views.log_line(recording, "/change/none", time[[0, -1]], np.zeros(2), nothing)
     panels.log_shades(recording, "/change/finding", changed, styles, (-reach, reach))
     marks = [
-        Label(0.5 + mark / reach / 2, axes.written(mark), 44.0)
+        Label(0.5 + mark / reach / 2, views.written(mark), 44.0)
         for mark in (-reach / 2, 0.0, reach / 2)
     ]
     signed = f"{peak:+.0f}".replace("-", "\u2212").replace("+0", "0")
     left, right = [Label(0.6, "change\n[dB]", -22.0), *marks], [Label(0.5, f"largest\n{signed}")]
-    axes.log_beside(recording, CHANGED, left, right)
+    views.log_beside(recording, CHANGED, left, right)
     return [
-        axes.timed(LEVEL, title="Level", between=(LOW_DB, HIGH_DB)),
-        axes.timed(CHANGED, title="Change", between=(-reach, reach)),
+        views.timed(LEVEL, title="Level", between=(LOW_DB, HIGH_DB)),
+        views.timed(CHANGED, title="Change", between=(-reach, reach)),
     ]
 
 
@@ -568,25 +567,25 @@ def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Chang
     every = dict.fromkeys(name for side in both for name in classes_of(side) if name != "ok")
     there = {block.label for side in both for block in side.run.blocks}
     names = [n for n in every if n in there or any(found_stretches(side, n) for side in both)]
-    panel = Panel("class", max(ROW * len(names), LEAST) + axes.AXIS)
+    panel = Panel("class", max(ROW * len(names), LEAST) + views.AXIS)
     for row, name in enumerate(names):
         for side, analysis in pair.sides:
             shades, place = (SIDE_COLORS[side], SIDE_COLORS[side]), (row, len(names))
             panels.log_class(recording, analysis, name, place, shades, BETWEEN[side], side)
-    titles = axes.row_labels(list(map(spoken, names)))
+    titles = views.row_labels(list(map(spoken, names)))
     told = _sides(0.8, 0.45)
     if any(side.run.blocks for _, side in pair.sides):
         told.append(Label(0.1, "thin: annotated"))
-    axes.log_beside(recording, panel, titles or [Label(0.5, "no failure\nin either run")], told)
+    views.log_beside(recording, panel, titles or [Label(0.5, "no failure\nin either run")], told)
     if found:
-        axes.log_events(
+        views.log_events(
             recording,
             [change.start for change in found],
             [str(change) for change in found],
             [SHADES[change.kind] for change in found],
             warnings=[change.kind == NEW for change in found],
         )
-    return axes.timed(panel)
+    return views.timed(panel)
 
 
 JOINT_POINTS = 2000  # points of a line: there are two for each signal of a joint
@@ -624,13 +623,13 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
     found, time = changes(pair), pair.time
     loop = largest_change(pair, found)
     with writing(path, identity, overwrite=overwrite) as recording:
-        axes.log_span(recording, float(time[0]), float(time[-1]))
+        views.log_span(recording, float(time[0]), float(time[-1]))
         drawn, robots = _log_robots(recording, pair)
         over_time = [log_changes(recording, pair, found), *log_levels(recording, pair, found)]
         details = _log_details(recording, pair, drawn)
-        head = unstable.beside((_log_text(recording, pair, found), 34.0), *robots)
-        whole = unstable.above((head, ABOVE), *over_time, (details, DETAILS + TITLES))
-        recording.send_blueprint(unstable.blueprint(whole, loop))  # instead of an older layout
+        head = views.beside((_log_text(recording, pair, found), 34.0), *robots)
+        whole = views.above((head, ABOVE), *over_time, (details, DETAILS + TITLES))
+        recording.send_blueprint(views.blueprint(whole, loop))  # instead of an older layout
 
 
 def _log_robots(recording: rr.RecordingStream, pair: Pair) -> tuple[dict[str, Drawn], list[Timed]]:
@@ -639,16 +638,16 @@ def _log_robots(recording: rr.RecordingStream, pair: Pair) -> tuple[dict[str, Dr
         return {}, []
     runs = {side: each.run for side, each in pair.sides}
     robots = dict(zip(runs, robot.log_robots(recording, runs, aspect=ASPECT), strict=True))
-    views = [
-        (unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0)
+    shown = [
+        (views.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0)
         for side, (_, camera) in robots.items()
     ]
     drawn = {side: each for side, (each, _) in robots.items()}
     scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
     for each, noise in zip(drawn.values(), pair.links, strict=True):
         panels.log_robot_levels(recording, each, noise, scale)
-    axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
-    return drawn, [*views, (unstable.drawing(f"/axis/{KEY.name}/right"), 8.0)]
+    views.log_scale(recording, KEY, scale, "dB re\n1 pW")
+    return drawn, [*shown, (views.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 
 def _log_details(recording: rr.RecordingStream, pair: Pair, drawn: Mapping[str, Drawn]) -> Part:
@@ -658,11 +657,11 @@ def _log_details(recording: rr.RecordingStream, pair: Pair, drawn: Mapping[str, 
     parts = log_spectra(recording, pair, joint if joint in pair.before.run.joint_names else "")
     sides, shades = dict(pair.sides), list(SIDE_COLORS.values())
     ends = panels.log_noise(recording, NOISE_PANEL, sides, shades, _sides(), NOISE_POINTS)
-    parts.append(axes.timed(NOISE_PANEL, title="Noise", name="Noise", between=ends)[0])
+    parts.append(views.timed(NOISE_PANEL, title="Noise", name="Noise", between=ends)[0])
     names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
     after = drawn.get("after")
     limbs = panels.limbs(tuple(names), after.robot if after else None)
-    return unstable.tabs(*parts, *log_joints(recording, pair, limbs))
+    return views.tabs(*parts, *log_joints(recording, pair, limbs))
 
 
 def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Part:
@@ -677,8 +676,8 @@ def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]
         "vibration_change_db": whole(pair).change,
     }
     log_report(recording, f"{pair.before.name} → {pair.after.name}", report(pair), properties)
-    axes.log_verdict(recording, *verdict(pair))
-    text = unstable.text("Before \u2192 after", "/report")
+    views.log_verdict(recording, *verdict(pair))
+    text = views.text("Before \u2192 after", "/report")
     if found:
-        text = unstable.tabs(text, unstable.events("Changes", "/events"))
-    return unstable.above((unstable.drawing("/verdict"), axes.VERDICT), (text, ABOVE))
+        text = views.tabs(text, views.events("Changes", "/events"))
+    return views.above((views.drawing("/verdict"), views.VERDICT), (text, ABOVE))

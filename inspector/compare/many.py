@@ -15,10 +15,10 @@ from inspector.analysis import Analysis, analyse
 from inspector.levels import FLOOR_DB, velocity_levels
 from inspector.library import Library
 from inspector.logs.read import Opened
-from inspector.recording import axes, panels, unstable
-from inspector.recording.axes import Label, Panel, Timed
+from inspector.recording import panels, views
 from inspector.recording.panels import HIGH_DB, LOW_DB
 from inspector.recording.run import log_report, writing
+from inspector.recording.views import Label, Panel, Timed
 from inspector.report.findings import spoken
 from noiseclassifier import Event
 from noisemodel import Block, Run
@@ -108,32 +108,32 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
     with writing(path, key, overwrite=overwrite) as recording:
         begin = min(float(side.run.time[0]) for side in several.sides)
         end = max(float(side.run.time[-1]) for side in several.sides)
-        axes.log_span(recording, begin, end)
+        views.log_span(recording, begin, end)
         failing = sum(bool(side.findings) for side in several.sides)
         told = f"FAIL   {failing} of {len(several.names)} runs" if failing else "PASS   no finding"
-        axes.log_verdict(recording, "findings" if failing else "ok", told)
+        views.log_verdict(recording, "findings" if failing else "ok", told)
         count = len(several.names)
         room = WHOLE - TABLE - CURVE
-        row = min((room / 2 - axes.AXIS) / count, HIGHEST)
+        row = min((room / 2 - views.AXIS) / count, HIGHEST)
         apart = row >= LOWEST
-        tall = row * count + axes.AXIS if apart else room - TITLES
+        tall = row * count + views.AXIS if apart else room - TITLES
         rows = [
             _log_classes(recording, several, Panel("class", tall)),
             _log_levels(recording, several, Panel("levels", tall), (begin, end)),
         ]
         if not apart:
-            rows = [(unstable.tabs(*(part for part, _ in rows)), tall + TITLES)]
+            rows = [(views.tabs(*(part for part, _ in rows)), tall + TITLES)]
         rows.append(_log_curves(recording, several, Panel("curves", CURVE)))
         properties = {"runs": len(several.names), "model": several.sides[0].model}
         title = f"{several.names[0]} and {len(several.names) - 1} more"
         log_report(recording, title, report(several), properties)
-        rest = WHOLE - axes.VERDICT - sum(size for _, size in rows)
-        verdict = (unstable.drawing("/verdict"), axes.VERDICT)
-        table = (unstable.text("Runs", "/report", titled=False), rest)
-        whole = unstable.above(verdict, table, *rows)
+        rest = WHOLE - views.VERDICT - sum(size for _, size in rows)
+        verdict = (views.drawing("/verdict"), views.VERDICT)
+        table = (views.text("Runs", "/report", titled=False), rest)
+        whole = views.above(verdict, table, *rows)
         event = several.longest
         loop = None if event is None else (event.start, event.stop)
-        recording.send_blueprint(unstable.blueprint(whole, loop))
+        recording.send_blueprint(views.blueprint(whole, loop))
 
 
 def report(several: Several) -> str:
@@ -169,20 +169,20 @@ def shortened(names: Sequence[str]) -> list[str]:
 
 def _lines(several: Several, panel: Panel) -> tuple[float, int]:
     """Width and number of the lines that make a run's row."""
-    height = (panel.height - axes.AXIS) / len(several.names)
+    height = (panel.height - views.AXIS) / len(several.names)
     lines = max(1, int(height / LINE))
     return 0.8 * height if lines == 1 else height / (lines + 1) + 1.0, lines
 
 
 def _names(several: Several, panel: Panel) -> list[Label]:
     """Names of the rows, as many as there is room for; the worst is marked."""
-    step = int(np.ceil(NAMED * len(several.names) / (panel.height - axes.AXIS)))
+    step = int(np.ceil(NAMED * len(several.names) / (panel.height - views.AXIS)))
     labels = []
-    for index, label in enumerate(axes.row_labels(shortened(several.names))):
+    for index, label in enumerate(views.row_labels(shortened(several.names))):
         worst = index == several.worst
         if index % step == 0 or worst:
             text = f"{label.text}\nworst" if worst and step == 1 else label.text
-            color = panels.readable(colors.CLASSES["impact"]) if worst else axes.INK
+            color = panels.readable(colors.CLASSES["impact"]) if worst else views.INK
             labels.append(Label(label.place, text, color=color))
     return labels
 
@@ -193,16 +193,16 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
     edges = np.unique([0.0, *(time for lane in lanes for each in lane for time in each[:2])])
     if len(edges) < 2:
         edges = np.array([0.0, 1.0])
-    rgba = np.tile(np.array(axes.EMPTY, dtype=np.uint8), (len(lanes), len(edges) - 1, 1))
+    rgba = np.tile(np.array(views.EMPTY, dtype=np.uint8), (len(lanes), len(edges) - 1, 1))
     for row, lane in enumerate(lanes):
         for start, stop, name in lane:
             first, last = np.searchsorted(edges, (start, stop))
             rgba[row, first:last] = (*colours[name], 255)
     width, lines = _lines(several, panel)
     path, names = "/class/found", several.names
-    axes.log_rows(recording, path, edges, rgba, names=names, width=width, lines=lines)
+    views.log_rows(recording, path, edges, rgba, names=names, width=width, lines=lines)
     failing = list(dict.fromkeys(e.label for side in several.sides for e in side.findings))
-    places = axes.middles(len(lanes))
+    places = views.middles(len(lanes))
     for number, name in enumerate(failing):
         marks = [
             (event.start, places[row])
@@ -211,7 +211,7 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
             if event.label == name
         ]
         time, place = zip(*sorted(marks), strict=True)
-        panels.log_marks(recording, name, number, axes.INK, time, place)
+        panels.log_marks(recording, name, number, views.INK, time, place)
     shown = [*failing, "ok"]
     key = [
         Label(
@@ -223,8 +223,8 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
         )
         for row, name in enumerate(shown)
     ]
-    axes.log_beside(recording, panel, _names(several, panel), key)
-    return axes.timed(panel, name="Classes")
+    views.log_beside(recording, panel, _names(several, panel), key)
+    return views.timed(panel, name="Classes")
 
 
 def _log_levels(
@@ -239,7 +239,7 @@ def _log_levels(
     scale = levels.JOINTS.following(found)
     width, lines = _lines(several, panel)
     left, names = _names(several, panel), [f"{name} [{scale.unit}]" for name in several.names]
-    return axes.log_levels(
+    return views.log_levels(
         recording, panel, edges, found, scale, left,
         title="Level above 10 Hz", names=names, width=width, lines=lines,
     )  # fmt: skip
@@ -258,8 +258,8 @@ def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -
     for index, color in zip(chosen, colors.of_series(len(chosen)), strict=True):
         time, level = several.levels[index]
         path, name = f"/curves/{index:03d}", several.names[index]
-        axes.log_line(recording, path, time, level, color, name=name)
+        views.log_line(recording, path, time, level, color, name=name)
     told = f"the worst\n{CURVES} runs" if len(several.names) > len(chosen) else "all runs"
-    axes.log_beside(recording, panel, panels.level_axis(), [Label(0.5, told)])
+    views.log_beside(recording, panel, panels.level_axis(), [Label(0.5, told)])
     paths, ends = ("$origin/**",), (LOW_DB, HIGH_DB)
-    return axes.timed(panel, title="", between=ends, paths=paths, legend=True)
+    return views.timed(panel, title="", between=ends, paths=paths, legend=True)

@@ -21,12 +21,19 @@ from inspector import colors
 from inspector.levels import SPECTRUM, amplitudes, extremes, in_bands, window_length
 from inspector.live.labels import Labeller
 from inspector.live.samples import SinkError
-from inspector.recording import axes, panels, unstable, viewer
+from inspector.recording import panels, viewer, views
 from inspector.recording import robot as scene
-from inspector.recording.axes import Label, Panel, log_events, scalars, style_lines
 from inspector.recording.run import writing
-from inspector.recording.unstable import TIMELINE, Camera
 from inspector.recording.viewer import HOST
+from inspector.recording.views import (
+    TIMELINE,
+    Camera,
+    Label,
+    Panel,
+    log_events,
+    scalars,
+    style_lines,
+)
 from inspector.report.findings import spoken
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
@@ -127,7 +134,7 @@ class Sink:
             ending.start()
             ending.join(FLUSH_TIMEOUT)
             if ending.is_alive():
-                unstable.abandon(self._viewer)
+                views.abandon(self._viewer)
 
 
 class _Tee:
@@ -346,7 +353,7 @@ class Drawing:
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
         self._classes = (
-            Panel("class", panels.ROW * len(self._rows) + axes.AXIS) if classes else None
+            Panel("class", panels.ROW * len(self._rows) + views.AXIS) if classes else None
         )
         self._told: str | None = None  # findings of the verdict that is drawn
         self._begun = False
@@ -374,8 +381,8 @@ class Drawing:
         recording, nothing = self._recording, [Label(0.5, "")]  # else the viewer says: no data
         style_lines(recording, NOISE, names=["simplified [rad/s]"], colours=[colors.NOISE])
         noise = Label(0.5, "noise p\u0302\n[rad/s]")
-        axes.log_beside(recording, NOISE_PANEL, [noise], nothing)
-        axes.log_beside(recording, SIGNALS_PANEL, nothing, nothing)
+        views.log_beside(recording, NOISE_PANEL, [noise], nothing)
+        views.log_beside(recording, SIGNALS_PANEL, nothing, nothing)
         # A line of one entity each: an entity each would cost a message each.
         edges = self._spectrogram.edges
         bands = rr.SeriesLines(
@@ -386,16 +393,16 @@ class Drawing:
         )
         recording.log(BANDS_PATH, bands, static=True)
         left = panels.band_axis(SPECTROGRAM_PANEL, edges, "spectrum,\nloudest\njoint")
-        axes.log_beside(recording, SPECTROGRAM_PANEL, left, SPECTRUM)
+        views.log_beside(recording, SPECTROGRAM_PANEL, left, SPECTRUM)
         if self._classes is None:
             return
         own = [self._colours[name] for name in classes]
         style_lines(recording, SCORES, names=classes, colours=own)
         shades = [self._colours[name] for name in self._rows]
         names = [spoken(name) for name in self._rows]
-        unstable.style_bands(recording, "/class/found", names, shades, unstable.COPIES)
-        named = axes.row_labels(names, list(map(panels.readable, shades)))
-        axes.log_beside(recording, self._classes, named, nothing)
+        views.style_bands(recording, "/class/found", names, shades, views.COPIES)
+        named = views.row_labels(names, list(map(panels.readable, shades)))
+        views.log_beside(recording, self._classes, named, nothing)
 
     def begin(self, time: float, signals: Mapping[str, Array]) -> None:
         """Send the layout with the first sample, whose pose places the camera."""
@@ -461,7 +468,7 @@ class Drawing:
         if self._classes is not None and title != self._told:
             self._told = title
             verdict = ("findings", f"FAIL   {title}") if title else ("ok", "PASS so far")
-            axes.log_verdict(self._recording, *verdict, time)
+            views.log_verdict(self._recording, *verdict, time)
 
     def found(self, event: Event, over: bool) -> None:
         """Add a finding that begins or is over to the list of events."""
@@ -484,29 +491,29 @@ class Drawing:
     def _layout(self) -> Blueprint:
         """Lay the recording out; every plot shows the last ten seconds."""
         over_time = [
-            axes.timed(NOISE_PANEL, title="Noise", paths=BELOW, between=None, last=SHOWN),
-            axes.timed(SPECTROGRAM_PANEL, title="Spectrum", paths=BELOW, last=SHOWN),
+            views.timed(NOISE_PANEL, title="Noise", paths=BELOW, between=None, last=SHOWN),
+            views.timed(SPECTROGRAM_PANEL, title="Spectrum", paths=BELOW, last=SHOWN),
         ]
-        left = [(unstable.events("Events", "/events"), 2.4)]
+        left = [(views.events("Events", "/events"), 2.4)]
         signals = {title: ("/joints", paths) for title, paths in self._titles.items()}
         if self._classes is not None:  # otherwise there is no verdict
-            classes = axes.timed(self._classes, title="Classes", paths=BELOW, last=SHOWN)
+            classes = views.timed(self._classes, title="Classes", paths=BELOW, last=SHOWN)
             over_time.insert(0, classes)
-            left.insert(0, (unstable.drawing("/verdict"), 0.32))
+            left.insert(0, (views.drawing("/verdict"), 0.32))
             signals["Scores"] = (SCORES, list(BELOW))
         if self._camera is not None:
-            robot = unstable.robot("Robot", "/robot", self._camera)
+            robot = views.robot("Robot", "/robot", self._camera)
             left.insert(len(left) - 1, (robot, 4.4))
         plots = [
-            axes.timed(
+            views.timed(
                 SIGNALS_PANEL, origin, title=title, name=title, between=None, paths=paths,
                 legend=True, last=SHOWN,
             )
             for title, (origin, paths) in signals.items()
         ]  # fmt: skip
-        over_time.append((unstable.tabs(*(part for part, _ in plots)), SIGNALS_PANEL.height))
-        whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*over_time), 64.0))
-        return unstable.blueprint(whole, following=True)
+        over_time.append((views.tabs(*(part for part, _ in plots)), SIGNALS_PANEL.height))
+        whole = views.beside((views.above(*left), 36.0), (views.above(*over_time), 64.0))
+        return views.blueprint(whole, following=True)
 
 
 BELOW = ("$origin/**",)
@@ -517,7 +524,7 @@ def _heat_map(level: Array) -> list[Any]:
     count, width = level.shape
     shades = colors.heat(level).reshape(-1, 4)
     return [
-        *scalars(np.tile(axes.middles(width)[::-1], (count, 1))),
+        *scalars(np.tile(views.middles(width)[::-1], (count, 1))),
         *rr.SeriesLines.columns(colors=shades).partition([width] * count),
     ]
 
@@ -525,6 +532,6 @@ def _heat_map(level: Array) -> list[Any]:
 def _found(shown: Mask) -> Iterable[Any]:
     """Columns of bands in rows of classes, drawn where a class is shown, shape (points, rows)."""
     count, (upper, lower) = shown.shape[1], panels.FOUND
-    middles = axes.TOP * (1.0 - (np.arange(count) + (upper + lower) / 2) / count)
-    bands = np.where(shown, middles, np.nan).repeat(unstable.COPIES, axis=1)
-    return unstable.band_columns(bands, axes.TOP * (lower - upper) / 2 / count)
+    middles = views.TOP * (1.0 - (np.arange(count) + (upper + lower) / 2) / count)
+    bands = np.where(shown, middles, np.nan).repeat(views.COPIES, axis=1)
+    return views.band_columns(bands, views.TOP * (lower - upper) / 2 / count)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inspector.errors import InspectorError
-from inspector.recording.axes import FARTHEST
+from inspector.recording.views import FARTHEST
 from noisemodel.run import LARGEST
 from noisemodel.types import Array, Mask
 

@@ -17,10 +17,9 @@ from rerun.components import MarkerShapeLike
 from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps
 from inspector.levels import WINDOW, Scale, Spectrogram, extremes, in_bands
-from inspector.recording import axes, unstable
-from inspector.recording.axes import Label, Panel, Timed
+from inspector.recording import views
 from inspector.recording.robot import Drawn, log_colours
-from inspector.recording.unstable import Camera, Part
+from inspector.recording.views import Camera, Label, Panel, Part, Timed
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
 from inspector.report.findings import brief, classes_of, finding_of, spoken
@@ -42,7 +41,7 @@ def log_gaps(
         stroke = np.append(np.resize(between, HATCHES + 1), np.nan)
         line, shade = np.tile(stroke, len(found)), colors.CLASSES["unknown"]
         name = "gap: no samples"
-        axes.log_line(recording, f"{path}/gap", np.concatenate(times), line, shade, name=name)
+        views.log_line(recording, f"{path}/gap", np.concatenate(times), line, shade, name=name)
 
 
 MAX_JOINTS = 10  # joints that one plot can hold
@@ -123,9 +122,9 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
         centres = (labels.start + labels.stop) / 2
         for name, score in zip(labels.classes, labels.scores.T, strict=True):
             path, called = f"/score/{name}", spoken(name)
-            axes.log_line(recording, path, centres, score, colours[name], name=called)
+            views.log_line(recording, path, centres, score, colours[name], name=called)
     if rows := listed_events(analysis):
-        axes.log_events(
+        views.log_events(
             recording,
             [event.start for _, event in rows],
             [f"{how}: {brief(analysis, event)}" for how, event in rows],
@@ -138,22 +137,22 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     lost = gaps(run)
     titles = [*map(spoken, names), *(["gap: no samples"] if lost else [])]
     count = len(titles)
-    panel = Panel("class", ROW * count + axes.AXIS)
+    panel = Panel("class", ROW * count + views.AXIS)
     for row, name in enumerate(names):
-        shades, place = (colours[name], axes.INK), (row, count)
+        shades, place = (colours[name], views.INK), (row, count)
         log_class(recording, analysis, name, place, shades, (FOUND, ANNOTATED))
         if starts := [event.start for event in analysis.findings if event.label == name]:
-            middle = axes.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
+            middle = views.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
             log_marks(recording, name, row, colours[name], starts, [middle] * len(starts))
     if lost:
-        log_gaps(recording, "/class", run, (0.1 * axes.TOP / count, 0.9 * axes.TOP / count))
-    inks = [*(readable(colours[name]) for name in names), axes.INK][:count]
+        log_gaps(recording, "/class", run, (0.1 * views.TOP / count, 0.9 * views.TOP / count))
+    inks = [*(readable(colours[name]) for name in names), views.INK][:count]
     both = labels is not None and bool(run.blocks)
     told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")] if both else []
     only = "found" if labels is not None else "annotated"
-    left, right = axes.row_labels(titles, inks), told or [Label(0.5, only)]
-    axes.log_beside(recording, panel, left, right)
-    return [axes.timed(panel)]
+    left, right = views.row_labels(titles, inks), told or [Label(0.5, only)]
+    views.log_beside(recording, panel, left, right)
+    return [views.timed(panel)]
 
 
 def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
@@ -182,7 +181,7 @@ def log_shades(
     for kind in dict.fromkeys(kind for kind, *_ in found):
         own = [(start, stop) for each, start, stop in found if each == kind]
         name, color = styles[kind]
-        unstable.log_stretches(
+        views.log_stretches(
             recording, f"{path}/{kind}", own, between=between, name=name, color=color
         )
 
@@ -211,8 +210,8 @@ def log_class(
     for (how, own), color, ends in zip(stretches.items(), shades, between, strict=True):
         called = f"{side}, {how}: {spoken(name)}" if side else f"{how}: {spoken(name)}"
         path = "/".join(["/class", *([side] if side else []), how, name])
-        low, high = (axes.TOP * (1.0 - (row + share) / count) for share in reversed(ends))
-        unstable.log_stretches(
+        low, high = (views.TOP * (1.0 - (row + share) / count) for share in reversed(ends))
+        views.log_stretches(
             recording, path, own, between=(low, high), name=called, color=color, opaque=True
         )
 
@@ -238,8 +237,8 @@ def log_marks(
     )
     path = f"/class/mark/{name}"
     recording.log(path, points, static=True)
-    columns = axes.scalars(np.array(place))
-    recording.send_columns(path, indexes=[axes.at(np.array(time))], columns=columns)
+    columns = views.scalars(np.array(place))
+    recording.send_columns(path, indexes=[views.at(np.array(time))], columns=columns)
 
 
 def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
@@ -281,7 +280,7 @@ def _curve(
     }
     log_shades(recording, f"{path}/finding", found, styles, between)
     log_gaps(recording, path, analysis.run, between)
-    return axes.timed(panel, between=between)
+    return views.timed(panel, between=between)
 
 
 def scaled(values: Array) -> tuple[float, str]:
@@ -306,11 +305,11 @@ def log_noise(
     for (which, side), noise, shade in zip(sides.items(), known, shades, strict=True):
         name = which if len(sides) > 1 else f"noise p\u0302 [{unit}]"
         time, values = extremes(side.run.time[side.run.mask], noise[:, None] / scale, points=points)
-        axes.log_line(recording, f"/noise/{which}", time, values[:, 0], shade, name=name)
+        views.log_line(recording, f"/noise/{which}", time, values[:, 0], shade, name=name)
         peak = float(values.max(initial=peak))
     top = 1.08 * max(peak, 0.01)
     right = right or [Label(min(peak / top, 0.9), f"max\n{peak * scale:.3g}")]
-    axes.log_beside(recording, panel, [Label(0.5, f"noise p\u0302\n[{unit}]")], right)
+    views.log_beside(recording, panel, [Label(0.5, f"noise p\u0302\n[{unit}]")], right)
     return 0.0, top
 
 
@@ -322,20 +321,20 @@ def _log_level(
         time, level, lowest = beside.time, beside.noise[:, None], beside.octaves[0][0]
         names = [f"{each} repetition [dB re 1 rad/s]" for each in ("quietest", "loudest")]
         path, band = "/level/repetitions", [colors.BAND, colors.BAND]
-        axes.log_lines(recording, path, time, beside.band, names=names, colours=band)
+        views.log_lines(recording, path, time, beside.band, names=names, colours=band)
     name = f"noise above {lowest:g} Hz [dB re 1 rad/s]"
-    axes.log_line(recording, "/level/noise", time, level[:, 0], colors.LEVEL, name=name)
+    views.log_line(recording, "/level/noise", time, level[:, 0], colors.LEVEL, name=name)
     peak = float(np.nanmax(level, initial=LOW_DB))
     place = min(max((peak - LOW_DB) / (HIGH_DB - LOW_DB), 0.05), 0.85)
     left = level_axis(f"level above\n{lowest:g} Hz [dB re\n1 rad/s]", -20.0)
-    axes.log_beside(recording, LEVEL, left, [Label(place, f"max\n{axes.written(peak)}")])
+    views.log_beside(recording, LEVEL, left, [Label(place, f"max\n{views.written(peak)}")])
     return _curve(recording, analysis, LEVEL, (LOW_DB, HIGH_DB))
 
 
 def level_axis(title: str = "above 10 Hz\n[dB re\n1 rad/s]", shift: float = -22.0) -> list[Label]:
     """The title and the ticks of the axis of levels."""
     marks = [
-        Label((tick - LOW_DB) / (HIGH_DB - LOW_DB), axes.written(tick), 44.0)
+        Label((tick - LOW_DB) / (HIGH_DB - LOW_DB), views.written(tick), 44.0)
         for tick in (-60.0, -40.0, -20.0, 0.0)
     ]
     return [Label(0.62, title, shift), *marks]
@@ -351,12 +350,12 @@ def _log_probability(
     middles = np.insert(middles, apart, labels.start[apart])
     failure = np.insert(failure, apart, np.nan)
     path, name = "/probability/failure", "probability of a failure"
-    axes.log_line(recording, path, middles, failure, colors.LEVEL, name=name)
+    views.log_line(recording, path, middles, failure, colors.LEVEL, name=name)
     path, name = "/probability/alarm", f"alarm threshold {alarm:g}"
     ends = run.time[[0, -1]]
-    axes.log_line(recording, path, ends, np.full(2, alarm), colors.THRESHOLD, name=name)
+    views.log_line(recording, path, ends, np.full(2, alarm), colors.THRESHOLD, name=name)
     title, mark = Label(0.5, "probability\nof a failure"), Label(alarm, f"alarm {alarm:g}")
-    axes.log_beside(recording, PROBABILITY, [title], [mark])
+    views.log_beside(recording, PROBABILITY, [title], [mark])
     return _curve(recording, analysis, PROBABILITY, (0.0, 1.05))
 
 
@@ -437,7 +436,7 @@ def log_plots(
                 if own := [name for name in joints if name in signal.joints]:
                     columns = [signal.joints.index(name) for name in own]
                     paths[limb].append(f"{path}/{number}")
-                    axes.log_lines(
+                    views.log_lines(
                         recording,
                         paths[limb][-1],
                         shown,
@@ -447,9 +446,9 @@ def log_plots(
                     )
         for limb, own in paths.items():
             if own:
-                plot = unstable.plot(title, "/joints", (*own, axes.SPAN), legend=True)
+                plot = views.plot(title, "/joints", (*own, views.SPAN), legend=True)
                 parts[limb].append(plot)
-    return [unstable.tabs(*own, name=limb) for limb, own in parts.items()]
+    return [views.tabs(*own, name=limb) for limb, own in parts.items()]
 
 
 STRIP_ROW = 18.0  # height of a row, in points; what is drawn is lower, so that rows stand apart
@@ -501,10 +500,10 @@ def log_links(
     """Log the noise of a robot's links: levels of those that vibrate most, power, colours."""
     time, level = levels.link_levels(noise)
     power = np.maximum(decibel(noise.total / REFERENCE_POWER), POWER_FLOOR_DB)
-    axes.log_line(recording, "/power/total", noise.time, power, colors.NOISE)
+    views.log_line(recording, "/power/total", noise.time, power, colors.NOISE)
     scale = levels.LINKS.following(level)
     log_robot_levels(recording, robot, noise, scale)
-    axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
+    views.log_scale(recording, KEY, scale, "dB re\n1 pW")
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
     edges = np.append(time, noise.time[-1] + width / 2)
     title, which = "Links above 10 Hz", chosen(analysis, time, level)
@@ -534,13 +533,13 @@ def log_strip(
 ) -> Timed:
     """Log levels, shape (columns, rows), of some rows; the panel is as high as these need."""
     own = [names[index] for index in which]
-    return axes.log_levels(
+    return views.log_levels(
         recording,
-        Panel(name, STRIP_ROW * len(own) + axes.AXIS),
+        Panel(name, STRIP_ROW * len(own) + views.AXIS),
         edges,
         level[:, which].T,
         scale,
-        axes.row_labels(own),
+        views.row_labels(own),
         title=title,
         names=[f"{each}{unit or f' [{scale.unit}]'}" for each in own],
         width=STRIP_WIDTH,
@@ -551,8 +550,8 @@ def log_strip(
 
 def robot_view(camera: Camera) -> Part:
     """A robot, and the scale of its colours."""
-    robot = unstable.robot("Robot, links coloured by level above 10 Hz", "/robot", camera)
-    return unstable.beside((robot, 88.0), (unstable.drawing(f"/axis/{KEY.name}/right"), 12.0))
+    robot = views.robot("Robot, links coloured by level above 10 Hz", "/robot", camera)
+    return views.beside((robot, 88.0), (views.drawing(f"/axis/{KEY.name}/right"), 12.0))
 
 
 BANDS = 48
@@ -585,7 +584,7 @@ def log_heat(
     """Log a spectrogram, as `in_levels` has it, with its axis and its scale."""
     time, edges, level = spectrum
     half = np.diff(time).min(initial=WINDOW) / 2
-    return axes.log_levels(
+    return views.log_levels(
         recording,
         panel,
         np.append(time - half, time[-1] + half),
@@ -605,8 +604,8 @@ def band_axis(panel: Panel, edges: Array, title: str) -> list[Label]:
     low, high = float(edges[0]), float(edges[-1])
     span = np.log(max(high / low, 1.01))
     marks = [
-        Label(float(np.log(tick / low) / span), axes.hertz(tick), 40.0)
-        for tick in axes.ticks(low, max(high, 1.01 * low), panel)
+        Label(float(np.log(tick / low) / span), views.hertz(tick), 40.0)
+        for tick in views.ticks(low, max(high, 1.01 * low), panel)
     ]
     return [Label(0.5, title, -22.0), *marks]
 
@@ -636,10 +635,10 @@ def log_details(
             ("velocity", names, velocity[:, joints], colors.of_series(len(names))),
         ):
             thin = extremes(run.time[part][valid], values[valid], points=DETAIL_POINTS)
-            axes.log_lines(recording, f"{path}/{kind}", *thin, names=lines, colours=shades)
+            views.log_lines(recording, f"{path}/{kind}", *thin, names=lines, colours=shades)
         title = f"Velocities [rad/s], {spoken(moment.label)} at {moment.peak:.2f} s"
         found += [
-            unstable.plot(title, f"{path}/velocity", legend=True, during=edges),
-            unstable.plot("Noise [rad/s]", f"{path}/noise", during=edges),
+            views.plot(title, f"{path}/velocity", legend=True, during=edges),
+            views.plot("Noise [rad/s]", f"{path}/noise", during=edges),
         ]
     return found

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from inspector.colors import Color
 from inspector.errors import InspectorError
-from inspector.recording import axes, unstable
-from inspector.recording.unstable import Camera
+from inspector.recording import views
+from inspector.recording.views import Camera
 from noisemodel import GeometryError, urdf
 from noisemodel.meshes import FACET, HEADER
 from noisemodel.robot import Robot
@@ -134,7 +134,7 @@ def log_robot(
     outermost = {index: _outermost(mesh.reshape(-1, 3)) for index, mesh in meshes.items()}
     outermost = outermost or dict.fromkeys(parts, np.zeros((1, 3)))
     drawn = Drawn(robot, f"robot_{side}" if side else "robot", outermost, moves, mimics)
-    unstable.log_up(recording)
+    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for link, triangles in zip(drawn.links, meshes.values(), strict=False):
         mesh = rr.Asset3D(
             contents=_stl(triangles), media_type=rr.MediaType.STL, albedo_factor=color
@@ -184,7 +184,7 @@ def log_robots(
         columns = dict(zip(run.joint_names, run.position[frames].T, strict=True))
         base = None if run.base_pose is None else run.base_pose[frames].astype(np.float64)
         poses = drawn.poses(len(frames), columns, base)
-        index = [axes.at(run.time[frames].repeat(poses.shape[1]))]
+        index = [views.at(run.time[frames].repeat(poses.shape[1]))]
         recording.send_columns(f"/{drawn.origin}/motion", index, drawn.columns(poses))
         if not len(frames):  # all of it is a gap: the robot at rest
             base, poses = None, drawn.poses(1, {}, None)
@@ -222,7 +222,7 @@ def log_colours(
         own = colours[link]
         changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
         columns = rr.Asset3D.columns(albedo_factor=own[changed])
-        recording.send_columns(drawn.path(link), [axes.at(time[changed])], columns)
+        recording.send_columns(drawn.path(link), [views.at(time[changed])], columns)
 
 
 # Of the viewer's camera, from the lower to the upper edge, in [rad].

@@ -12,9 +12,9 @@ import rerun as rr
 from inspector import levels
 from inspector.analysis import LOUDEST, Analysis, worst, worst_joint, worst_signal
 from inspector.levels import spectrogram
-from inspector.recording import axes, panels, robot, unstable
+from inspector.recording import panels, robot, views
 from inspector.recording.robot import Drawn
-from inspector.recording.unstable import Part
+from inspector.recording.views import Part
 from inspector.reference.judging import Comparison
 from inspector.report.findings import report, spoken
 from noisemodel.files import replacing
@@ -35,7 +35,7 @@ def writing(
         if _flushed(recording, temporary):
             recording.disconnect()
         else:
-            unstable.abandon(recording)
+            views.abandon(recording)
         require_whole(temporary)
 
 
@@ -52,7 +52,7 @@ def _flushed(recording: rr.RecordingStream, path: Path) -> bool:
 
 def require_whole(recording: Path) -> None:
     """Refuse a recording that rerun could not write to its end; it tells that to its log only."""
-    if unstable.has_end(recording):
+    if views.has_end(recording):
         return
     with recording.open("ab") as file:
         file.write(bytes(1 << 16))  # fails as rerun did
@@ -96,13 +96,13 @@ def write(
     run, moments = analysis.run, worst(analysis)
     beside = None if beside is None or beside.empty else beside
     with writing(path, analysis.sha256, overwrite=overwrite) as recording:
-        axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
+        views.log_span(recording, float(run.time[0]), float(run.time[-1]))
         drawn, left = None, _log_findings(recording, analysis)
         if analysis.links is not None:
             ((drawn, seen),) = robot.log_robots(recording, {"": run}, aspect=ASPECT)
             rest = WHOLE - DETAILS - sum(size for _, size in left)
             left.append((panels.robot_view(seen), rest))
-        details = unstable.tabs(*panels.log_details(recording, analysis, moments))
+        details = views.tabs(*panels.log_details(recording, analysis, moments))
         over_time = [
             *panels.log_classes(recording, analysis),
             *panels.log_curves(recording, analysis, beside),
@@ -110,26 +110,26 @@ def write(
             _log_strips(recording, analysis, drawn, beside),
         ]
         _log_text(recording, analysis)
-        whole = unstable.beside(
-            (unstable.above(*left, (details, DETAILS)), 36.0), (unstable.above(*over_time), 64.0)
+        whole = views.beside(
+            (views.above(*left, (details, DETAILS)), 36.0), (views.above(*over_time), 64.0)
         )
         failures = [(moment.start, moment.stop) for moment in moments if moment.label != LOUDEST]
         loop = failures[0] if failures else None
-        recording.send_blueprint(unstable.blueprint(whole, loop))  # instead of an older run's
+        recording.send_blueprint(views.blueprint(whole, loop))  # instead of an older run's
 
 
 def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tuple[Part, float]]:
     """Log the verdict; it, the report and the list of events, with their heights."""
     kinds = spoken(analysis.headline).partition(": ")[2] or "no finding"
     told = {"findings": f"FAIL   {kinds}", "ok": f"PASS   {kinds}", "cannot-tell": "CANNOT TELL"}
-    axes.log_verdict(recording, analysis.status, told[analysis.status])
-    text = unstable.text("Findings", "/report", titled=False)
+    views.log_verdict(recording, analysis.status, told[analysis.status])
+    text = views.text("Findings", "/report", titled=False)
     parts = [
-        (unstable.drawing("/verdict"), axes.VERDICT),
+        (views.drawing("/verdict"), views.VERDICT),
         (text, height(report(analysis))),
     ]
     if count := len(panels.listed_events(analysis)):
-        events = unstable.events("Click a time to go there", "/events")
+        events = views.events("Click a time to go there", "/events")
         parts.append((events, EVENTS + EVENT * min(count, 4)))
     return parts
 
@@ -141,14 +141,14 @@ def _log_spectra(recording: rr.RecordingStream, analysis: Analysis) -> Part:
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
     scale = levels.SPECTRUM.following(spectrum.decibel)
     name = "the noise" if joint is None else run.joint_names[joint]
-    panel, bands = axes.Panel("spectrogram", panels.HEIGHT), panels.in_levels(spectrum)
-    panels.log_gaps(recording, "/spectrogram", run, (0.0, axes.TOP))
+    panel, bands = views.Panel("spectrogram", panels.HEIGHT), panels.in_levels(spectrum)
+    panels.log_gaps(recording, "/spectrogram", run, (0.0, views.TOP))
     axis, title = "velocity\nspectrum", f"Spectrogram of {name}"
     part, _ = panels.log_heat(recording, panel, bands, scale, axis, title)
     parts = [part]
     if links is not None:
-        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", axes.ALL))
-    return unstable.tabs(*parts)
+        parts.append(views.plot("Sound power [dB re 1 pW]", "/power", views.ALL))
+    return views.tabs(*parts)
 
 
 def _log_strips(
@@ -156,7 +156,7 @@ def _log_strips(
     analysis: Analysis,
     drawn: Drawn | None,
     beside: Comparison | None,
-) -> axes.Timed:
+) -> views.Timed:
     """Log levels of joints and links; they, scores, and each limb's signals."""
     run, links = analysis.run, analysis.links
     strips = [] if beside is None else [panels.log_over(recording, beside)]
@@ -165,12 +165,12 @@ def _log_strips(
         strips.append(panels.log_links(recording, drawn, analysis, links))
     parts = [part for part, _ in strips]
     if analysis.labels is not None:
-        parts.append(unstable.plot("Scores", "/score", axes.ALL, legend=True))
+        parts.append(views.plot("Scores", "/score", views.ALL, legend=True))
     parts += panels.log_joints(
         recording, run, panels.limbs(run.joint_names, drawn.robot if drawn else None)
     )
     lowest = max((size for _, size in strips), default=160.0)
-    return unstable.tabs(*parts), lowest + TITLES
+    return views.tabs(*parts), lowest + TITLES
 
 
 def height(markdown: str) -> float:

@@ -341,7 +341,7 @@ def shoot(recording: Path, output: Path, seconds: float, *, overwrite: bool = Fa
 @contextmanager
 def headless_viewer() -> "Iterator[ViewerClient]":
     """Run rerun's viewer without a window, on loopback, and end it with all its children."""
-    from inspector.recording import unstable
+    from rerun.experimental import ViewerClient
 
     port = free_port()
     start = ("--headless", "--port", str(port), "--hide-welcome-screen")
@@ -355,7 +355,7 @@ def headless_viewer() -> "Iterator[ViewerClient]":
             if problem := process.ended():
                 raise ViewerError(problem)
             with suppress(Exception):  # the client raises what it likes until the viewer is up
-                client = unstable.client(f"rerun+http://{HOST}:{port}/proxy")
+                client = ViewerClient.connect(f"rerun+http://{HOST}:{port}/proxy")
                 client.get_state()
                 return client
             return None
