@@ -5,10 +5,9 @@ of which some may not count. Both are localised by the same words.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from inspector.analysis import Analysis
 from inspector.errors import Status
@@ -32,7 +31,6 @@ WORDS = {
 }
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}  # how people count them
 LEAST = 0.05  # joints with a smaller share are left out
-Item = TypeVar("Item")
 
 
 def spoken(text: str) -> str:
@@ -243,13 +241,14 @@ class Group:
 
     def found(self, *, fails: bool) -> list[tuple[Finding, Beside | None, str]]:
         """Findings that fail their runs, or that do not; repetitions of one finding count once."""
+        beside = {verdict.path: verdict.beside for verdict in self.verdicts}
         every = [
-            (verdict, event)
+            (verdict.path, event)
             for verdict in self.verdicts
             for event in (verdict.failing if fails else verdict.excused)
         ]
-        groups = folded(every, lambda each: (each[0].path, each[1]), len(self.verdicts))
-        return [(event, verdict.beside, runs) for (verdict, event), runs in groups]
+        groups = folded(every, len(self.verdicts))
+        return [(event, beside[path], runs) for path, event, runs in groups]
 
     @property
     def words(self) -> str:
@@ -264,35 +263,31 @@ class Group:
         return list(dict.fromkeys(each.told for one in self.verdicts for each in one.missing))
 
 
-def folded(
-    items: Sequence[Item], of: Callable[[Item], tuple[Path, Finding]], runs: int
-) -> list[tuple[Item, str]]:
-    """Findings of repetitions: the loudest of those that are one, and how many of the runs have it.
+def folded(found: Iterable[tuple[Path, Finding]], runs: int) -> list[tuple[Path, Finding, str]]:
+    """Findings of repetitions by run: the loudest of those that are one, and how many runs have it.
 
     Args:
-        of: Run and finding of an item.
+        runs: How many repetitions there are.
     """
-    groups: list[list[Item]] = []
-    for item in items:
-        run, event = of(item)
+    groups: list[list[tuple[Path, Finding]]] = []
+    for run, event in found:
         for group in groups:
-            path, other = of(group[0])
+            path, other = group[0]
             joint = event.evidence.joint
-            near = abs(event.start - other.start) <= TOGETHER
             same = event.label == other.label or joint == other.evidence.joint is not None
+            near = abs(event.start - other.start) <= TOGETHER
             if same and near and run != path and event.became == other.became:
-                group.append(item)
+                group.append((run, event))
                 break
         else:
-            groups.append([item])
+            groups.append([(run, event)])
     result = []
     for group in groups:
-        (label, _), *_ = Counter(of(each)[1].label for each in group).most_common(1)
-        named = [each for each in group if of(each)[1].label == label]
-        number = len({of(each)[0] for each in group})
-        ranks = [(of(each)[1].evidence.over_db or 0.0, of(each)[1].score) for each in named]
-        worst = named[ranks.index(max(ranks))]
-        result.append((worst, f"{number} of {counted(runs, 'run')}" if runs > 1 else ""))
+        (label, _), *_ = Counter(event.label for _, event in group).most_common(1)
+        named = [each for each in group if each[1].label == label]
+        worst = max(named, key=lambda each: (each[1].evidence.over_db or 0.0, each[1].score))
+        number = len({run for run, _ in group})
+        result.append((*worst, f"{number} of {counted(runs, 'run')}" if runs > 1 else ""))
     return result
 
 

@@ -9,9 +9,8 @@ import json
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -36,7 +35,7 @@ from inspector.report.findings import (
     told,
 )
 from inspector.text import counted, program_version
-from inspector.verdict import UNREAD, Finding, Verdict, counts, exit_status
+from inspector.verdict import UNREAD, Verdict, counts, exit_status
 
 ANNOTATIONS = 10  # GitHub silently drops what goes beyond ten of a kind per step
 COMMENT = 60_000  # most characters of the Markdown: GitHub refuses comments of more than 65,536
@@ -56,21 +55,14 @@ REPEATED = r"\d+% by \d+ repetitions? of "  # what the line on the reference say
 AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
 
 
-class Outcome(StrEnum):
-    """What a case is as a test, by its element in JUnit XML."""
-
-    PASSED = ""
-    FAILURE = "failure"
-    ERROR = "error"
-    SKIPPED = "skipped"
-
-
+# What a case is as a test, by its element in JUnit XML.
+PASSED, FAILURE, ERROR, SKIPPED = "", "failure", "error", "skipped"
 OUTCOMES = {
-    Status.FINDINGS: Outcome.FAILURE,
-    Status.BAD_INPUT: Outcome.ERROR,
-    Status.INTERNAL_ERROR: Outcome.ERROR,
-    Status.CANNOT_TELL: Outcome.SKIPPED,
-    Status.OK: Outcome.PASSED,
+    Status.FINDINGS: FAILURE,
+    Status.BAD_INPUT: ERROR,
+    Status.INTERNAL_ERROR: ERROR,
+    Status.CANNOT_TELL: SKIPPED,
+    Status.OK: PASSED,
 }
 
 
@@ -82,7 +74,7 @@ class Case:
     path: Path  # the file that it is about
     status: str  # what became of it, as machines read it
     words: str  # and as people do
-    outcome: Outcome
+    outcome: str  # of OUTCOMES
     rank: tuple[float, ...]  # sorts cases, the worst first
     kind: str  # of a failure or an error
     sentences: tuple[str, ...] = ()  # what fails it
@@ -133,9 +125,9 @@ def junit(job: Job) -> str:
         "testsuite",
         name="inspector",
         tests=str(len(job.cases)),
-        failures=str(outcomes[Outcome.FAILURE]),
-        errors=str(outcomes[Outcome.ERROR]),
-        skipped=str(outcomes[Outcome.SKIPPED]),
+        failures=str(outcomes[FAILURE]),
+        errors=str(outcomes[ERROR]),
+        skipped=str(outcomes[SKIPPED]),
         time=f"{sum(case.seconds for case in job.cases):.3f}",
     )
     properties = ET.SubElement(suite, "properties")
@@ -154,7 +146,7 @@ def junit(job: Job) -> str:
         if case.outcome:
             sentences = case.sentences or (case.message,)
             element = ET.SubElement(node, case.outcome, message=_plain("; ".join(sentences)))
-            if case.outcome is not Outcome.SKIPPED:
+            if case.outcome != SKIPPED:
                 element.set("type", _plain(case.kind))
             element.text = _plain("\n".join([*sentences, *filter(None, [case.trace])]))
         if case.picture is not None:
@@ -176,8 +168,8 @@ def github(job: Job) -> str:
     Files that cannot be read take five of ten errors at most where others fail.
     """
     bad, failed, skipped = (
-        [case for case in job.ranked if case.outcome is outcome]
-        for outcome in (Outcome.ERROR, Outcome.FAILURE, Outcome.SKIPPED)
+        [case for case in job.ranked if case.outcome == outcome]
+        for outcome in (ERROR, FAILURE, SKIPPED)
     )
     shown = [*bad[: max(ANNOTATIONS // 2, ANNOTATIONS - len(failed))], *failed][:ANNOTATIONS]
     lines = [_annotation("error", case) for case in shown]
@@ -191,14 +183,12 @@ def github(job: Job) -> str:
 
 
 def _annotation(kind: str, case: Case) -> str:
-    about = {"file": str(case.path)}
-    if case.name != about["file"]:
-        about["title"] = case.name
-    listed = ",".join(
-        f"{key}={_escaped(value).replace(':', '%3A').replace(',', '%2C')}"
-        for key, value in about.items()
+    file, name = (
+        _escaped(each).replace(":", "%3A").replace(",", "%2C")
+        for each in (str(case.path), case.name)
     )
-    return f"::{kind} {listed}::{_escaped(f'{case.status}: {case.told}')}"
+    title = "" if name == file else f",title={name}"
+    return f"::{kind} file={file}{title}::{_escaped(f'{case.status}: {case.told}')}"
 
 
 def _escaped(value: str) -> str:
@@ -212,37 +202,31 @@ def sarif(job: Job) -> str:
     Files that cannot be read and what cannot be told are notifications of the tool.
     """
     results = [result for case in job.ranked for result in _results(case)][:RESULTS]
+    known, level = dict.fromkeys(result["ruleId"] for result in results), {"level": "error"}
     rules = [
-        {
-            "id": rule,
-            "shortDescription": {"text": RULES.get(rule) or _described(rule)},
-            "defaultConfiguration": {"level": "error"},
-        }
-        for rule in dict.fromkeys(result["ruleId"] for result in results)
+        {"id": rule, "shortDescription": {"text": _described(rule)}, "defaultConfiguration": level}
+        for rule in known
     ]
     notes = [
         {
-            "level": "error" if case.outcome is Outcome.ERROR else "warning",
+            "level": "error" if case.outcome == ERROR else "warning",
             "message": {"text": f"{case.status}: {case.message}"},
             "locations": [_location(case.path)],
         }
         for case in job.ranked
-        if case.outcome in (Outcome.ERROR, Outcome.SKIPPED)
+        if case.outcome in (ERROR, SKIPPED)
     ]
     invocation = {
-        "executionSuccessful": all(case.outcome is not Outcome.ERROR for case in job.cases),
+        "executionSuccessful": all(case.outcome != ERROR for case in job.cases),
         "exitCode": job.exit_status,
         "toolExecutionNotifications": notes,
     }
     driver = {"name": "noise-inspector", "version": program_version(), "rules": rules}
     remark = {"remark": job.remarks[0]} if job.remarks else {}
-    run = {
-        "tool": {"driver": driver},
-        "invocations": [invocation],
-        "results": results,
-        "properties": {"counts": job.counts, **remark},
-    }
-    return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
+    about = {"counts": job.counts, **remark}
+    run = {"tool": {"driver": driver}, "invocations": [invocation], "results": results}
+    whole = {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [{**run, "properties": about}]}
+    return json.dumps(whole, indent=2)
 
 
 def _results(case: Case) -> Iterator[dict[str, Any]]:
@@ -275,17 +259,13 @@ def _uri(path: Path) -> str:
 
 def _described(rule: str) -> str:
     label = rule.removeprefix("missing-")
-    if label != rule:
-        return f"A required finding of class {label.replace('-', ' ')} was not found."
-    return f"The noise of the joints shows a failure of class {label}."
+    wanted = f"A required finding of class {label.replace('-', ' ')} was not found."
+    other = f"The noise of the joints shows a failure of class {label}."
+    return RULES.get(rule) or (wanted if label != rule else other)
 
 
 def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
-    """Write a job for its summary or a comment: a table, the worst first, and a picture.
-
-    Args:
-        notes: Title of what does not fail its case.
-    """
+    """Write a job for its summary or a comment: a table, the worst first, and a picture."""
     ranked = job.ranked
     shown = [case for case in ranked if case.outcome or not case.quiet]
     lines, tail = [marker, f"### {job.title}: {job.summary}", ""], [""]
@@ -315,7 +295,8 @@ def _cell(value: object) -> str:
 
 def _code(path: object) -> str:
     """A path that stays in its cell."""
-    return f"`{' '.join(str(path).split()).replace('`', chr(39)).replace('|', chr(92) + '|')}`"
+    line = " ".join(str(path).split())
+    return f"`{line.replace('`', chr(39)).replace('|', chr(92) + '|')}`"
 
 
 def _cut(head: list[str], lines: list[str], room: int) -> list[str]:
@@ -351,9 +332,6 @@ def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
     """Verdicts as text: a line for each finding; of several runs a row per scenario, worst first.
 
     Bad inputs are left out: the command line prints them on stderr.
-
-    Args:
-        verbose: Whether to name the runs of each scenario, and their models.
     """
     read = [each for each in verdicts if each.status not in UNREAD]
     if len(verdicts) == 1 and read:
@@ -393,11 +371,11 @@ def _rows(group: Group) -> Iterator[tuple[str, ...]]:
     if group.worst.status is Status.CANNOT_TELL:
         others = [*others, group.worst.message]
     cells += [(each,) for each in others]
-    for each in cells[:MOST] or [("",)]:
+    left = len(cells) - MOST
+    more = [(f"and {left} more (--format json)",)] if left > 0 else []
+    for each in [*cells[:MOST], *more] or [("",)]:
         yield (name, status, *each)
         name = status = ""
-    if (left := len(cells) - MOST) > 0:
-        yield ("", "", f"and {left} more (--format json)")
 
 
 def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
@@ -448,12 +426,12 @@ def _case(verdict: Verdict) -> Case:
         path=verdict.path,
         status=verdict.status,
         words=WORDS[verdict.status],
-        outcome=Outcome.SKIPPED if verdict.ignored else OUTCOMES[verdict.status],
+        outcome=SKIPPED if verdict.ignored else OUTCOMES[verdict.status],
         rank=verdict.severity,
         kind=kind,
         sentences=tuple(failing(verdict)),
         rules=(
-            *((each.label, _span(each)) for each in verdict.failing),
+            *((each.label, _rounded(each, "start", "stop")) for each in verdict.failing),
             *((each.rule, {}) for each in verdict.missing),
         ),
         message=verdict.message,
@@ -465,8 +443,8 @@ def _case(verdict: Verdict) -> Case:
     )
 
 
-def _span(event: Finding) -> dict[str, float]:
-    return {"start": round(event.start, 6), "stop": round(event.stop, 6)}
+def _rounded(of: object, *names: str, digits: int = 6) -> dict[str, float]:
+    return {name: round(getattr(of, name), digits) for name in names}
 
 
 def _of_group(group: Group) -> Case:
@@ -481,28 +459,22 @@ def _of_group(group: Group) -> Case:
     )
 
 
-def _job(verdicts: Sequence[Verdict], cases: Iterable[Case]) -> Job:
+def _job(verdicts: Sequence[Verdict], *, by_run: bool) -> Job:
+    """All runs as cases, or all scenarios."""
+    cases = map(_case, each_missing(verdicts)) if by_run else map(_of_group, groups(verdicts))
     remarks = (IGNORED,) if any(each.unknown is Unknown.IGNORE for each in verdicts) else ()
     number, status = counts(verdicts), exit_status(verdicts)
     return Job("Noise", summary(verdicts), number, tuple(cases), status, remarks)
 
 
-def _by_run(verdicts: Sequence[Verdict]) -> Job:
-    return _job(verdicts, map(_case, each_missing(verdicts)))
-
-
-def _by_scenario(verdicts: Sequence[Verdict]) -> Job:
-    return _job(verdicts, map(_of_group, groups(verdicts)))
-
-
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
     "text": text,
     "json": as_json,
-    "junit": lambda verdicts: junit(_by_run(verdicts)),
-    "github": lambda verdicts: github(_by_scenario(verdicts)),
-    "sarif": lambda verdicts: sarif(_by_run(verdicts)),
+    "junit": lambda verdicts: junit(_job(verdicts, by_run=True)),
+    "github": lambda verdicts: github(_job(verdicts, by_run=False)),
+    "sarif": lambda verdicts: sarif(_job(verdicts, by_run=True)),
     "markdown": lambda verdicts: markdown(
-        _by_scenario(verdicts),
+        _job(verdicts, by_run=False),
         head="| scenario | status | findings |",
         notes="Findings that do not count",
     ),
@@ -541,20 +513,16 @@ def _told(of: diff.Row) -> list[str]:
 
 def _folded(of: diff.Row, kind: str) -> list[str]:
     """Findings of a kind, one line for what repetitions share."""
-    runs = len(of.before if kind == RESOLVED else of.after)
-    own = [each for each in of.findings if each.kind == kind]
-    groups = folded(own, lambda each: (each.run, each.event), runs)
-    lines = [
-        f"{kind}: {told(each.event, None, number, short=True)}"
-        for each, number in groups[:MOST_OF_KIND]
-    ]
+    own = [(each.run, each.event) for each in of.findings if each.kind == kind]
+    groups = folded(own, len(of.before if kind == RESOLVED else of.after))
+    shown = groups[:MOST_OF_KIND]
+    lines = [f"{kind}: {told(event, None, number, short=True)}" for _, event, number in shown]
     left = len(groups) - MOST_OF_KIND
     return lines + ([f"and {left} more {kind} (--format json)"] if left > 0 else [])
 
 
 def diff_json(found: Difference) -> str:
     """The difference as JSON, ``noise-diff/2``; its schema is docs/noise-diff-2.schema.json."""
-    alone = [(each, path) for each in found.alone for path in (*each.before, *each.after)]
     whole = {
         "format": "noise-diff/2",
         "version": program_version(),
@@ -570,7 +538,8 @@ def diff_json(found: Difference) -> str:
                 "side": "candidate" if of.after else "reference",
                 "findings": [_finding_as_dict(each) for each in of.findings if each.run == path],
             }
-            for of, path in alone
+            for of in found.alone
+            for path in (*of.before, *of.after)
         ],
         "failed": {str(each.path): each.message for each in found.failed},
     }
@@ -592,9 +561,7 @@ def _row_as_dict(of: diff.Row) -> dict[str, Any]:
                 "kind": "joint and band" if each.signal == "velocity" else "tracking error",
                 "joint": each.joint,
                 "band_hz": list(each.band),
-                "change": round(each.change, 3),
-                "low": round(each.low, 3),
-                "high": round(each.high, 3),
+                **_rounded(each, "change", "low", "high", digits=3),
             }
             for each in of.changes
         ],
@@ -607,8 +574,7 @@ def _finding_as_dict(each: diff.ChangedFinding) -> dict[str, Any]:
         "kind": each.kind,
         "run": str(each.run),
         "label": each.event.label,
-        "start": round(each.event.start, 6),
-        "stop": round(each.event.stop, 6),
+        **_rounded(each.event, "start", "stop"),
         "level_db": each.event.evidence.level_db,
         "change_db": each.event.evidence.over_db,
     }
@@ -649,20 +615,8 @@ def _diff_summary(found: Difference) -> str:
 def _of_difference(found: Difference) -> Job:
     """All scenarios as cases, and the files that cannot be compared."""
     cases = [_of_row(found, each, place) for place, each in enumerate(found.rows)]
-    cases += [
-        Case(
-            name=str(each.path),
-            path=each.path,
-            status=each.status,
-            words=each.status.replace("-", " "),
-            outcome=Outcome.ERROR if found.gate.failed else Outcome.SKIPPED,
-            rank=(list(EXIT).index(each.status),),
-            kind=each.status,
-            message=each.message,
-            trace=each.trace,
-        )
-        for each in found.failed
-    ]
+    outcome = ERROR if found.gate.failed else SKIPPED
+    cases += [replace(_case(each), outcome=outcome, seconds=0.0) for each in found.failed]
     number, status = _diff_counts(found), found.exit_status
     return Job("Noise beside the runs before", _diff_summary(found), number, cases, status)
 
