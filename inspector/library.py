@@ -55,14 +55,12 @@ def demo_run() -> Path:
 def model_files(chosen: Sequence[str | Path] | None = None) -> tuple[Path, ...]:
     """Name model files: those chosen, which may be names of models that ship, or all of these."""
     shipped = {path.stem: path for path in sorted(folder("models").glob("*.npz"))}
-    found = []
-    for path in map(Path, chosen or shipped.values()):
-        known = shipped.get(str(path))
-        if known is None and not path.exists():
-            raise InspectorError(
-                f"{path}: no such model; name a file, or one that ships: {', '.join(shipped)}"
-            )
-        found.append(path if path.exists() else shipped[str(path)])
+    given = map(Path, chosen or shipped.values())
+    found = [path if path.exists() else shipped.get(str(path), path) for path in given]
+    if missing := next((path for path in found if not path.exists()), None):
+        raise InspectorError(
+            f"{missing}: no such model; name a file, or one that ships: {', '.join(shipped)}"
+        )
     also_reading(found)
     return tuple(found)
 
@@ -98,8 +96,7 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
         run = nm.decimated(run, rate)
         left = f"nothing above {rate / 2:g} Hz is left"
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}: {left}."
-    lasting, bursts = _line_detectors(run)
-    pieces = _watched(run, lasting, bursts)
+    pieces, lasting, bursts = _watched(run)
     labels = classifier.classify_pieces(pieces, run.rate, start=float(run.time[0]), whole=True)
     if not (lasting.examined or len(labels.events())) and nc.lasting.MEASURED in signal_names(run):
         raise CannotTellError(
@@ -120,28 +117,30 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
 
 def lines(run: nm.Run) -> tuple[Events, Events]:
     """What lasts in a run, and its bursts."""
-    lasting, bursts = _line_detectors(run)
-    for _ in _watched(run, lasting, bursts):
+    pieces, lasting, bursts = _watched(run)
+    for _ in pieces:
         pass
     return lasting.events, bursts.events
 
 
-def _line_detectors(run: nm.Run) -> tuple[nc.Lasting, nc.Bursts]:
-    start = float(run.time[0])
-    return nc.Lasting(run.rate, start=start), nc.Bursts(run.rate, start=start, whole=True)
-
-
 def _watched(
-    run: nm.Run, lasting: nc.Lasting, bursts: nc.Bursts
-) -> Iterator[tuple[dict[str, Real], Mask]]:
-    """Signals of a run piece by piece, in which lines are looked for, too, up to the end."""
-    for piece in pieces_of(run):
-        signals = _signals(piece)
-        lasting.push(signals, piece.mask)
-        bursts.push(signals, piece.mask)
-        yield signals, piece.mask
-    lasting.finish()
-    bursts.finish()
+    run: nm.Run,
+) -> tuple[Iterator[tuple[dict[str, Real], Mask]], nc.Lasting, nc.Bursts]:
+    """Signals of a run piece by piece, and the lines that have been found in them at the end."""
+    start = float(run.time[0])
+    lasting = nc.Lasting(run.rate, start=start)
+    bursts = nc.Bursts(run.rate, start=start, whole=True)
+
+    def pieces() -> Iterator[tuple[dict[str, Real], Mask]]:
+        for piece in pieces_of(run):
+            signals = _signals(piece)
+            lasting.push(signals, piece.mask)
+            bursts.push(signals, piece.mask)
+            yield signals, piece.mask
+        lasting.finish()
+        bursts.finish()
+
+    return pieces(), lasting, bursts
 
 
 def nearest(
