@@ -20,7 +20,7 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import extents
 from inspector.errors import InspectorError, OptionError
-from inspector.library import lines
+from inspector.library import lines, signals_of
 from inspector.logs.clocks import without_hold
 from inspector.logs.plausibility import check_joints
 from inspector.signals import without_placeholder
@@ -113,10 +113,9 @@ def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
     decimated = nm.decimated(chosen, lower)
     if not (decimated.blocks or "events" in run.meta or bare_too):
         raise InspectorError(f"{path}: has no annotated blocks")
-    signals = nc.signals.named({**nm.norms(decimated), **nm.by_joint(decimated)})
     found = nc.Recording(
         name=_name(path, run.robot),
-        signal=nc.signals.without_zero_error(signals),
+        signal=signals_of(decimated),
         rate=lower,
         blocks=tuple(nc.Block(b.start, b.stop, b.label) for b in decimated.blocks),
         start=float(decimated.time[0]),
