@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -20,29 +20,24 @@ from inspector.errors import IGNORED, InspectorError, Status, Unknown
 from inspector.levels import FLOOR_DB, STEP, velocity_levels
 from inspector.library import (
     CannotTellError,
-    Labelled,
     Library,
     label_run,
     load_library,
 )
-from inspector.localisation import extent
+from inspector.localisation import Localisation, extent, localise
 from inspector.logs.clocks import without_hold
 from inspector.logs.read import Opened, open_run
+from inspector.order import Order, order
 from inspector.signals import without_placeholder
 from noiseclassifier import Event
 from noiseclassifier.lasting import joined
 from noisemodel import Block, Run
 from noisemodel.files import replacing
-from noisemodel.noise import vibrating
+from noisemodel.noise import LinkNoise, link_noise, vibrating
 from noisemodel.robot import is_name
 from noisemodel.run import is_robot_file
 from noisemodel.runfile import pieces
-from noisemodel.types import Array, Real
-
-if TYPE_CHECKING:
-    from inspector.localisation import Localisation
-    from inspector.order import Order
-    from noisemodel.noise import LinkNoise
+from noisemodel.types import Array
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -63,7 +58,7 @@ class Analysis:
     notes: tuple[str, ...] = ()  #: what was done to the run before it was labelled, sentences
     unknown: Unknown = Unknown.FINDING  #: what becomes of `unknown` frames
     sha256: str = ""  #: of the file that the run came from
-    links: "LinkNoise | None" = None  #: None unless it was asked for and the run has a robot
+    links: LinkNoise | None = None  #: None unless it was asked for and the run has a robot
     missing: tuple[str, ...] = ()  #: what the run lacks to show the robot, and why, sentences
     assumed: str = ""  #: when its log was read, in a line
     alarm: float | None = None  #: threshold of the model, a probability; None without one
@@ -87,10 +82,8 @@ class Analysis:
         return velocity_levels(run.velocity, run.mask, run.rate, start=float(run.time[0]))
 
     @cached_property
-    def localisations(self) -> "dict[Event | nm.Block, Localisation]":
+    def localisations(self) -> dict[Event | nm.Block, Localisation]:
         """The localisation of each finding, and of each annotated failure."""
-        from inspector.localisation import localise
-
         frame = 0.0 if self.labels is None else float(self.labels.stop[0] - self.labels.start[0])
         found = localise(self.run, self.spans, frame=frame)
         events = zip(self.spans, self.findings, strict=True)
@@ -98,10 +91,8 @@ class Analysis:
         return {named.get(failure, failure): each for failure, each in found.items()}
 
     @cached_property
-    def orders(self) -> "dict[Event, Order]":
+    def orders(self) -> dict[Event, Order]:
         """Findings whose vibration goes with the speed of a joint."""
-        from inspector.order import order
-
         found = ((event, order(self.run, event)) for event in self.findings)
         return {event: known for event, known in found if known is not None}
 
@@ -194,16 +185,14 @@ def analyse(
 ) -> Analysis:
     """Label a run, and audit it; a log is opened first.
 
-    The arrays of a run are read when they are needed, and only those that the models and the audit
-    need, piece by piece where they stay in their file (`noisemodel.Run.load`, ``on_demand``).
+    Arrays are read when they are needed, piece by piece where they stay in their file
+    (`noisemodel.Run.load`, ``on_demand``). A run that no model can label is no error: its status is
+    `cannot-tell`.
 
     Args:
         library: Models to choose from, see `inspector.load_library`; those that ship unless given.
         name: Name of the run; by default the file's name.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
-
-    Returns:
-        The analysis. A run that no model can label is no error: its status is `cannot-tell`.
 
     Raises:
         RunFileError: If the file is damaged, or holds a run that is wrong.
@@ -219,24 +208,31 @@ def analyse(
     run, left_out = without_placeholder(run)
     slower = without_hold(run)
     seen = audit(run, library, slower=slower)
-    notes = (left_out,) if left_out else ()
-    empty = Analysis(
-        name=name or "run",
-        status=Status.CANNOT_TELL,
-        run=run,
-        audit=seen,
-        notes=notes,
-        unknown=unknown,
-        sha256=sha256,
-        assumed=assumed,
-    )
+    about: dict[str, Any] = {"name": name or "run", "run": run, "audit": seen, "unknown": unknown}
+    about |= {"sha256": sha256, "assumed": assumed}
     try:
-        found = _labelled(empty, label_run(run, library, slower=slower), library)
+        labelled = label_run(run, library, slower=slower)
+        labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
+        spans, findings = extents(run, labels, labelled.lasting, labelled.bursts)
     except (CannotTellError, nc.SignalError, nm.RunError) as error:
-        return replace(empty, reason=str(error))
-    if seen.observable or found.findings:
-        return found
-    return replace(found, status=Status.CANNOT_TELL, reason=" ".join(summary(seen)))
+        notes = (left_out,) if left_out else ()
+        return Analysis(status=Status.CANNOT_TELL, reason=str(error), notes=notes, **about)
+    known = len(labels) if findings else int((labels.label != nc.UNKNOWN).sum())
+    status, reason = status_of(known, findings), "" if known else f"every frame is {nc.UNKNOWN}"
+    if not findings and not seen.observable:
+        status, reason = Status.CANNOT_TELL, " ".join(summary(seen))
+    return Analysis(
+        status=status,
+        reason=reason,
+        labels=labels,
+        model=labelled.model,
+        model_sha256=library[labelled.model].sha256,
+        alarm=labelled.alarm,
+        spans=spans,
+        findings=findings,
+        notes=tuple(filter(None, [left_out, labelled.remark])),
+        **about,
+    )
 
 
 def analyse_file(
@@ -262,8 +258,6 @@ def analyse_file(
 
 def with_links(analysis: Analysis, kind: str) -> Analysis:
     """Add the noise link by link, if the run names a robot that is known and holds positions."""
-    from noisemodel.noise import link_noise
-
     run = analysis.run
     found = replace(analysis, missing=tuple(_missing(run)))
     if not kind or not robot_known(run) or run.position is None:
@@ -277,26 +271,6 @@ def with_links(analysis: Analysis, kind: str) -> Analysis:
 def robot_known(run: nm.Run) -> bool:
     """Whether a run names a robot that can be read by its name, or a URDF or an MJCF."""
     return run.robot is not None and (is_name(run.robot) or is_robot_file(run.robot))
-
-
-def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis:
-    """Add labels to an analysis, with the findings and the status that follow from them."""
-    reported = empty.unknown is Unknown.FINDING
-    labels = replace(labelled.labels, unknown_is_finding=reported)
-    spans, findings = extents(empty.run, labels, labelled.lasting, labelled.bursts)
-    known = int((labels.label != nc.UNKNOWN).sum())
-    return replace(
-        empty,
-        status=status_of(len(labels) if findings else known, findings),
-        reason="" if findings or known else f"every frame is {nc.UNKNOWN}",
-        labels=labels,
-        model=labelled.model,
-        model_sha256=library[labelled.model].sha256,
-        alarm=labelled.alarm,
-        spans=spans,
-        findings=findings,
-        notes=(*empty.notes, *([labelled.remark] if labelled.remark else [])),
-    )
 
 
 def extents(
@@ -459,16 +433,24 @@ def default_kinds(run: Run) -> tuple[str, ...]:
     return ("simplified", "paper") if whole else ("simplified",)
 
 
-def estimate(run: Run, kind: str, *, geometry: str = "auto") -> Estimate:
+def estimate(run: Run, kind: str) -> Estimate:
     """Compute a noise over time."""
     if kind == "simplified":
-        return _simplified(run)
+        parts, powers = run.joint_names, [np.square(run.velocity.astype(np.float64))]
+        if run.velocity_desired is not None:
+            parts += tuple(f"{name}, desired" for name in run.desired_joint_names)
+            powers.append(np.square(run.velocity_desired.astype(np.float64)))
+        if run.base_velocity is not None:
+            parts += ("base",)
+            base = np.square(run.base_velocity.astype(np.float64))
+            powers.append(base.sum(axis=1, keepdims=True))
+        return Estimate(kind, "rad/s", np.hstack(powers), parts)
     if kind not in nm.KINDS:
         raise nm.UnknownKindError(kind, KINDS)
     if run.robot is None or not robot_known(run):
         raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {run.robot!r}")
     robot = nm.Robot.load(run.robot, floating_base=True if run.base_pose is not None else None)
-    surface = nm.Surface.of(robot, geometry)
+    surface = nm.Surface.of(robot, "auto")
     q_desired, v_desired = robot.desired(run) or (None, None)
     noise = nm.extended(
         robot, surface, *robot.configuration(run), kind, q_desired=q_desired, v_desired=v_desired
@@ -509,17 +491,3 @@ def write_csv(
     csv = {"fmt": "%.9g", "delimiter": ",", "comments": "", "encoding": "utf-8"}
     with replacing(path, overwrite=overwrite) as temporary:
         np.savetxt(temporary, columns[run.mask], header=",".join(names), **csv)
-
-
-def _simplified(run: Run) -> Estimate:
-    def power(signal: Real) -> Array:
-        return np.square(signal.astype(np.float64))
-
-    parts, powers = list(run.joint_names), [power(run.velocity)]
-    if run.velocity_desired is not None:
-        parts += [f"{name}, desired" for name in run.desired_joint_names]
-        powers.append(power(run.velocity_desired))
-    if run.base_velocity is not None:
-        parts.append("base")
-        powers.append(power(run.base_velocity).sum(axis=1, keepdims=True))
-    return Estimate("simplified", "rad/s", np.hstack(powers), tuple(parts))

@@ -32,7 +32,7 @@ from inspector.analysis import (
 from inspector.audit import audit
 from inspector.errors import InspectorError, Status, Unknown
 from inspector.levels import STEP
-from inspector.library import demo_run, load_library, model_files
+from inspector.library import Labelled, demo_run, load_library, model_files
 from inspector.report import findings, html
 from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
@@ -190,9 +190,7 @@ def test_a_run_of_unknown_frames_alone_is_not_ok_when_they_are_ignored(monkeypat
 
     def unknown(run, library, **_):
         labels = analysed("uuuu").labels
-        return module.Labelled(
-            labels, next(iter(library)), "4 of 4 frames are out of distribution."
-        )
+        return Labelled(labels, next(iter(library)), "4 of 4 frames are out of distribution.")
 
     monkeypatch.setattr(module, "label_run", unknown)
     assert module.analyse(moving(), LIBRARY).status is Status.FINDINGS
