@@ -30,7 +30,8 @@ import noiseclassifier as nc
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library, nearest, signal_names
 from inspector.logs.clocks import hold_length, without_hold
-from inspector.logs.plausibility import check_joints, limit_warnings
+from inspector.logs.mapping import check_joints
+from inspector.logs.motion import limit_warnings
 from inspector.logs.read import Reading, left_out, open_source, sources
 from inspector.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.text import counted, plain

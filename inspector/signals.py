@@ -7,7 +7,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from inspector.logs.clocks import hold_length
-from inspector.logs.plausibility import contradictions, derived
+from inspector.logs.motion import contradictions, derived
 from noiseclassifier import LogBands
 from noisemodel import Run
 from noisemodel.run import ORDER, WINDOW, stretches

@@ -22,7 +22,7 @@ from inspector.analysis import extents
 from inspector.errors import InspectorError, OptionError
 from inspector.library import lines, signals_of
 from inspector.logs.clocks import without_hold
-from inspector.logs.plausibility import check_joints
+from inspector.logs.mapping import check_joints
 from inspector.signals import without_placeholder
 from inspector.text import progress
 from inspector.verdict import resumed

@@ -17,7 +17,7 @@ from commandline import call
 from inspector import read_log
 from inspector.errors import InspectorError
 from inspector.logs.mapping import read_options
-from inspector.logs.plausibility import contradictions
+from inspector.logs.motion import contradictions
 
 DEG = 180 / np.pi
 SAMPLES = 1200

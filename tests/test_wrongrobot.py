@@ -5,7 +5,8 @@ import pytest
 from commandline import call
 
 import noisemodel as nm
-from inspector.logs.plausibility import WrongRobotError, check_joints, limit_warnings
+from inspector.logs.mapping import WrongRobotError, check_joints
+from inspector.logs.motion import limit_warnings
 from noisemodel.robot import Limits, joint_limits, limits_of
 
 PANDA = tuple(f"panda_joint{number}" for number in range(1, 8))

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal, NoReturn, TypeVar, get_args
 import typer
 
 from inspector.errors import OUTPUT_LOST, InspectorError, Unknown, worst
-from inspector.logs.mapping import read_options
-from inspector.logs.plausibility import check_joints, limit_warnings
+from inspector.logs.mapping import check_joints, read_options
+from inspector.logs.motion import limit_warnings
 from inspector.logs.read import Opened, Reading, open_run
 from noisemodel import OutputError, Run
 from noisemodel.files import refuse_existing, write_whole

@@ -27,7 +27,8 @@ from inspector.live.samples import (
     rows_of,
     widths_of,
 )
-from inspector.logs.plausibility import LONG, LimitWatch, check_joints
+from inspector.logs.mapping import check_joints
+from inspector.logs.motion import LONG, LimitWatch
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from noiseclassifier import Event, merged
 from noisemodel.files import beyond, limit

@@ -30,11 +30,11 @@ from inspector.logs.names import (
     number_of,
     without_unit,
 )
-from inspector.logs.plausibility import WrongRobotError, known_limits
 from inspector.text import toml_shown
 from noiseclassifier.jsontext import from_toml, text_of
-from noisemodel import Robot, Run
+from noisemodel import Robot, RobotError, Run, UnknownJointError, UnknownRobotError
 from noisemodel.files import replacing
+from noisemodel.robot import Limits, joint_limits
 from noisemodel.run import LONGEST, SHORTEST
 from noisemodel.runfile import ArchiveError, one_line
 from noisemodel.types import Array, Mask, Real
@@ -237,6 +237,58 @@ class LogReader:
     read: Callable[[str], Log]  # one episode, by its name
     listing: Callable[[], tuple[str, ...]]  # the contents, without reading all, a line each
     run: Callable[[], Run] | None = None  # of a run file
+
+
+# Joints of a robot
+
+
+class WrongRobotError(UnknownJointError):
+    """A run names a joint that its robot does not have."""
+
+    def __init__(self, joint: str, robot: str, known: Sequence[str]) -> None:
+        super().__init__(joint, robot, known)
+        self.args = (f"{self}; is it another robot? (--robot NAME; --robot none for no robot)",)
+
+
+def known_limits(robot: str | None) -> tuple[Mapping[str, Limits], str]:
+    """Limits of a robot's joints by name, or none, and why its file cannot be read."""
+    try:
+        return ({} if robot is None else joint_limits(robot)), ""
+    except UnknownRobotError:  # a mere name, which tells runs apart
+        return {}, ""
+    except RobotError as error:
+        return {}, str(error)
+
+
+def check_joints(joints: Sequence[str], robot: str | None) -> tuple[str, ...]:
+    """Joints of a robot that a run lacks, which are assumed stationary.
+
+    Raises:
+        WrongRobotError: If the run names a joint that the robot lacks; not if it cannot be read.
+    """
+    known, _ = known_limits(robot)
+    names = _named(joints, known)
+    if unknown := [name for name in names if known and name not in known]:
+        raise WrongRobotError(unknown[0], str(robot), tuple(known))
+    return tuple(name for name in known if name not in names)
+
+
+def named(run: Run) -> Run:
+    """Give joints that a run numbers, since its file does not name them, its robot's names."""
+    names = _named(run.joint_names, known_limits(run.robot)[0])
+    if names == run.joint_names or len(names) != len(run.joint_names):
+        return run
+    same = run.desired_joint_names == run.joint_names
+    desired = names if same else run.desired_joint_names
+    return replace(run, joint_names=names, desired_joint_names=desired)
+
+
+def _named(joints: Sequence[str], known: Mapping[str, Limits]) -> tuple[str, ...]:
+    """Names of joints; the robot's names replace mere numbers if it has as many joints."""
+    numbered = all(joint == f"joint{place}" for place, joint in enumerate(joints, start=1))
+    if numbered and len(joints) <= len(known) and not set(joints) & set(known):
+        return tuple(known)[: len(joints)]
+    return tuple(joints)
 
 
 # Options

@@ -16,10 +16,16 @@ from pathlib import Path
 from typing import Any
 
 from inspector.errors import InspectorError, LogError
-from inspector.logs.mapping import LogReader, ReadOptions, read_options, reading
-from inspector.logs.motion import Imported, prepared, run_of
+from inspector.logs.mapping import (
+    LogReader,
+    ReadOptions,
+    check_joints,
+    named,
+    read_options,
+    reading,
+)
+from inspector.logs.motion import Imported, contradictions, limit_warnings, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
-from inspector.logs.plausibility import check_joints, contradictions, limit_warnings, named
 from inspector.text import counted, printable
 from noisemodel import NoiseModelError, OutputError, Robot, Run, RunFileError, runfile
 from noisemodel.files import also_reading, refuse_existing
