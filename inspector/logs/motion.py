@@ -1,30 +1,22 @@
 """A run made of logs: signals in SI units, finite and in order, on one time base.
 
 Degrees are converted, samples without a value and stretches in which a log froze become gaps,
-clocks are synchronised, and missing velocities are differentiated.
+clocks are synchronised, and missing velocities are differentiated. `limit_warnings` and
+`contradictions` tell of a run that it is of another robot, in another unit, or at another rate.
 """
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.clocks import (
-    clocks_of,
-    common_time,
-    hold_length,
-    in_seconds,
-    no_overlap,
-    ordered,
-    resampled,
-    synchronise,
-    updates,
-)
+from inspector.logs import clocks
 from inspector.logs.mapping import UNIFORM, Log, ReadOptions, Stamps, Track, known_limits, tracks_of
 from inspector.logs.names import listed
 from inspector.text import counted, plain
@@ -56,7 +48,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
     found, not_read, told = tracks_of(log, options, robot)
     remarks = [*log.remarks, *told]
     _refuse_quaternion(path, found, options)
-    timed = in_seconds(path, found, options)
+    timed = clocks.in_seconds(path, found, options)
     tracks = [track for track in timed if len(track.values) > 1]
     if not any(track.joints for track in tracks):
         raise LogError(path, "1 sample; a run needs at least 2")
@@ -64,7 +56,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
         remarks.append(f"logged once only, left out: {listed(once)}")
     tracks = [t for each in tracks if (t := _finite(path, each, remarks)) is not None]
     tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks)
-    increasing, order = ordered(path, tracks)
+    increasing, order = clocks.ordered(path, tracks)
     tracks = _without_frozen(increasing, remarks)
     return replace(
         log,
@@ -112,19 +104,18 @@ def _finite(path: Path, track: Track, remarks: list[str]) -> Track | None:
         raise track.fault(path, f"column {track.labels[column]!r} holds {value}", sample)
     empty = np.atleast_1d(lacking.all(axis=0))
     if empty.any():
-        remarks.append(f"all nan, left out: {listed(_chosen(track.labels, empty))}")
-        kept = np.flatnonzero(~empty)
-        if not len(kept) or not track.joints:
+        remarks.append(f"all nan, left out: {listed([*compress(track.labels, empty)])}")
+        if empty.all() or not track.joints:
             return None
-        track, lacking = _columns(track, kept.tolist()), lacking[:, kept]
+        track, lacking = _columns(track, ~empty), lacking[:, ~empty]
     if not lacking.any():
         return track
     missing = np.atleast_1d(lacking.any(axis=1))
-    labels = dict.fromkeys(_chosen(track.labels, np.atleast_1d(lacking.any(axis=0))))
+    labels = [*dict.fromkeys(compress(track.labels, np.atleast_1d(lacking.any(axis=0))))]
     first = track.stamps.time[np.argmax(missing)] - track.stamps.time[0]
     remarks.append(
         f"{counted(int(missing.sum()), 'sample')} without a number, marked as"
-        f" not valid: {listed(list(labels))}, the first at {first:.6g} s"
+        f" not valid: {listed(labels)}, the first at {first:.6g} s"
     )
     places, values = np.arange(len(missing)), np.array(track.values)
     for column, nan in zip(values.T, lacking.T, strict=True):  # lest they spoil others
@@ -156,17 +147,9 @@ def _believable(path: Path, track: Track, remarks: list[str]) -> Track:
     return replace(track, values=np.where(runaway, np.nan, track.values))
 
 
-def _chosen(names: Sequence[str], chosen: Mask) -> list[str]:
-    return [name for name, is_one in zip(names, chosen, strict=True) if is_one]
-
-
-def _columns(track: Track, kept: Sequence[int]) -> Track:
-    return replace(
-        track,
-        joints=tuple(track.joints[place] for place in kept),
-        labels=tuple(track.labels[place] for place in kept),
-        values=track.values[:, kept],
-    )
+def _columns(track: Track, kept: Mask) -> Track:
+    joints, labels = (tuple(compress(each, kept)) for each in (track.joints, track.labels))
+    return replace(track, joints=joints, labels=labels, values=track.values[:, kept])
 
 
 FROZEN = 0.2  # least time for which a frozen log repeats a row, in [s]
@@ -177,7 +160,7 @@ FROZEN_WAY = 0.05  # least way that joints should have gone in that time, in [ra
 def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
     """Tracks whose samples are missing where all rows are one, and joints should move."""
     found = list(tracks)
-    for stamps in clocks_of(tracks):
+    for stamps in clocks.clocks_of(tracks):
         ours = [track for track in tracks if track.stamps is stamps and track.joints]
         measured = [track for track in ours if not track.is_desired]
         if "position" not in {track.signal for track in measured}:
@@ -192,13 +175,10 @@ def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
                 f"{last - first} samples from {at:.6g} s on repeat one, while joints should move"
                 f" at {speed:.2g} rad/s: the log froze, marked as not valid"
             )
-        if frozen.any():
-            found = [
-                replace(t, missing=frozen if t.missing is None else t.missing | frozen)
-                if t.stamps is stamps
-                else t
-                for t in found
-            ]
+        for place, track in enumerate(found):
+            if frozen.any() and track.stamps is stamps:
+                missing = frozen if track.missing is None else track.missing | frozen
+                found[place] = replace(track, missing=missing)
     return found
 
 
@@ -262,13 +242,12 @@ def _in_si(
         gripper = [bool(re.search("gripper|finger", joint)) for joint in track.joints]
         angles = np.array([not (log.units and each) for each in gripper])
         if units == "degrees" and not angles.all():
-            remark = (
-                f"left out, since grippers have no angles: {listed(_chosen(track.joints, ~angles))}"
-            )
+            names = listed([*compress(track.joints, ~angles)])
+            remark = f"left out, since grippers have no angles: {names}"
             remarks += [] if remark in remarks else [remark]
             if not angles.any():
                 continue
-            track = _columns(track, np.flatnonzero(angles).tolist())
+            track = _columns(track, angles)
         angular = _angular(track, kinds)
         if angular.any() and (units == "degrees" or track.quantity in in_degrees):
             values = np.where(angular, np.deg2rad(track.values), track.values)
@@ -294,18 +273,17 @@ def _in_degrees(tracks: Sequence[Track], kinds: Mapping[str, str]) -> tuple[str,
     they match them. Without velocities, positions have to reach beyond ``NORMALISED``.
     """
     by_signal = {track.signal: track for track in reversed(tracks)}
-    for suffix in ("", "_desired"):
-        position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
-        if position is None:
-            continue
-        reach = _reach_to_and_fro(position, kinds)
-        if velocity is None:
-            return ("position", "velocity") if reach > NORMALISED else ()
-        ratio = _ratio(position, velocity)
-        for known, quantities in MATCHES.items():
-            if abs(ratio / known - 1) <= CLOSE and (reach or "position" not in quantities):
-                return quantities
+    suffix = "" if "position" in by_signal else "_desired"
+    position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
+    if position is None:
         return ()
+    reach = _reach_to_and_fro(position, kinds)
+    if velocity is None:
+        return ("position", "velocity") if reach > NORMALISED else ()
+    ratio = _ratio(position, velocity)
+    for known, quantities in MATCHES.items():
+        if abs(ratio / known - 1) <= CLOSE and (reach or "position" not in quantities):
+            return quantities
     return ()
 
 
@@ -351,12 +329,8 @@ def _refuse_degrees(path: Path, track: Track, kinds: Mapping[str, str]) -> None:
         beyond = np.abs(track.values[:, place]) > LARGEST[track.quantity]
         if beyond.any():
             sample = int(np.argmax(beyond))
-            raise track.fault(
-                path,
-                f"column {track.labels[place]!r} holds {track.values[sample, place]:g}, too much"
-                f" for radians; {HINT}",
-                sample,
-            )
+            held = f"column {track.labels[place]!r} holds {track.values[sample, place]:g}"
+            raise track.fault(path, f"{held}, too much for radians; {HINT}", sample)
 
 
 # Targets that are held
@@ -373,12 +347,12 @@ def _without_held_targets(tracks: Sequence[Track], remarks: list[str]) -> list[T
     """
     logged = {joint for t in tracks if t.signal == "velocity_desired" for joint in t.joints}
     moving = [track for track in tracks if track.signal in ("position", "velocity")]
-    measured = max((hold_length(track.values) for track in moving), default=1.0)
+    measured = max((clocks.hold_length(track.values) for track in moving), default=1.0)
     found = []
     for track in tracks:
         if track.signal == "position_desired" and not logged & set(track.joints):
             values = np.asarray(track.values, dtype=np.float64)
-            hold, places = hold_length(values), updates(values)
+            hold, places = clocks.hold_length(values), clocks.updates(values)
             if places is not None and hold >= SLOWER * measured:
                 track = _joined(track, values, places)
                 nominal = track.stamps.clock.nominal
@@ -436,7 +410,7 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
         logs[:] = _with_desired(*logs)
     main = _main(logs[0], options)
     every = [track for log in logs for track in log.tracks]
-    tracks, said, offset = synchronise(
+    tracks, said, offset = clocks.synchronise(
         logs[-1].path, every, main, rate=options.rate, offset=options.offset
     )
     del every
@@ -444,10 +418,10 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     remarks += [f"{logs[-1].path.name}: {said}"] if said else []
     own = next(t.stamps for t in tracks if t.signal == main.signal and t.joints == main.joints)
     kept = _without_held_targets(tracks, remarks)
-    time, valid = common_time(kept, next(track for track in kept if track.stamps is own))
+    time, valid = clocks.common_time(kept, next(track for track in kept if track.stamps is own))
     if len(time) < 2 or not valid.any():
         others = [each.stamps for each in tracks if each.stamps is not own]
-        raise LogError(logs[-1].path, no_overlap(others[-1] if others else own, own))
+        raise LogError(logs[-1].path, clocks.no_overlap(others[-1] if others else own, own))
     start = own.start + Decimal(str(time[0]))
     meta: dict[str, Any] = {
         **{key: value for log in logs for key, value in log.meta.items()},
@@ -462,7 +436,7 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     parts: dict[str, Track] = {}
     while kept:
         track = kept.pop(0)
-        track = replace(track, values=resampled(time, valid, track, slack))
+        track = replace(track, values=clocks.resampled(time, valid, track, slack))
         if before := parts.get(track.signal):
             values = np.hstack((before.values, track.values))
             track = replace(before, joints=before.joints + track.joints, values=values)
@@ -647,20 +621,18 @@ class LimitWatch:
         )
         span = upper - lower
         slack = np.where(np.isfinite(span), FAR_POSITION * span, 0.0)
-        self._lower, self._upper = lower - slack, upper + slack
-        self._fast = FAR_VELOCITY * velocity
-        self._counts = {name: np.zeros(len(joints), dtype=int) for name in ("position", "velocity")}
-        self._farthest = {name: np.zeros(len(joints)) for name in self._counts}
+        fast = FAR_VELOCITY * velocity
+        self._bounds = {"position": (lower - slack, upper + slack), "velocity": (-fast, fast)}
+        self._counts = {name: np.zeros(len(joints), dtype=int) for name in self._bounds}
+        self._farthest = {name: np.zeros(len(joints)) for name in self._bounds}
 
     def add(self, position: Real | None, velocity: Real) -> None:
         """Count the samples of a stretch, shape (samples, joints), in SI; nan is not counted."""
-        if position is not None:
-            self._note("position", position, (position < self._lower) | (position > self._upper))
-        self._note("velocity", velocity, np.abs(velocity) > self._fast)
-
-    def _note(self, name: str, values: Real, beyond: Mask) -> None:
-        self._counts[name] += np.count_nonzero(beyond, axis=0)
-        if beyond.any():
+        for name, values in (("position", position), ("velocity", velocity)):
+            lower, upper = self._bounds[name]
+            if values is None or not (beyond := (values < lower) | (values > upper)).any():
+                continue
+            self._counts[name] += np.count_nonzero(beyond, axis=0)
             outside = np.vstack((self._farthest[name], np.where(beyond, values, 0.0)))
             outside = np.abs(outside) if name == "velocity" else outside
             farthest = np.abs(outside).argmax(axis=0)[None]
@@ -673,11 +645,10 @@ class LimitWatch:
             if not len(beyond):
                 continue
             worst = int(beyond[np.argmax(counts[beyond])])
-            limits, rate = self._limits[worst], "/s" if name == "velocity" else ""
-            unit = ("rad" if limits.turns else "m") + rate
-            allowed = (
-                f"{limits.velocity:.3g}" if rate else f"{limits.lower:.3g} to {limits.upper:.3g}"
-            )
+            limits, unit = self._limits[worst], "rad" if self._limits[worst].turns else "m"
+            allowed = f"{limits.lower:.3g} to {limits.upper:.3g}"
+            if name == "velocity":
+                allowed, unit = f"{limits.velocity:.3g}", f"{unit}/s"
             others = f" ({len(beyond) - 1} more joints too)" if len(beyond) > 1 else ""
             yield (
                 f"{self._joints[worst]} reaches {self._farthest[name][worst]:.3g} {unit}, far"
@@ -748,7 +719,7 @@ def contradictions(run: Run) -> Iterator[str]:
 
 
 def _joints(run: Run, chosen: Mask) -> str:
-    names = [name for name, is_one in zip(run.joint_names, chosen, strict=True) if is_one]
+    names = [*compress(run.joint_names, chosen)]
     return "all joints" if len(names) == len(run.joint_names) > 1 else listed(names)
 
 
