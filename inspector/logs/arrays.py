@@ -32,8 +32,8 @@ from inspector.logs.mapping import (
     LogReader,
     ReadOptions,
     Stamps,
+    errors_of,
     no_motion,
-    reading,
 )
 from inspector.logs.names import (
     SIGNALS,
@@ -406,7 +406,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    with reading(path), path.open("rb") as stream:
+    with errors_of(path), path.open("rb") as stream:
         try:
             if stream.read(len(MAGIC_PREFIX)) != MAGIC_PREFIX:
                 return runfile.read_npz(path)
@@ -484,7 +484,7 @@ def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log
 def _variables(path: Path) -> dict[str, NDArray[Any]]:
     """Arrays of numbers in a file, and in the fields of a struct."""
     found: dict[str, NDArray[Any]] = {}
-    with reading(path, (struct_error, ValueError)):  # such as of a shape that no array has
+    with errors_of(path, (struct_error, ValueError)):  # such as of a shape that no array has
         for data in _unpacked_variables(path.read_bytes()):
             texts = (part[1:] for part in _elements(data, 8, len(data)) if part[0] in (1, 2))
             name = data[slice(*next(texts, (0, 0)))].decode("latin1")

@@ -34,7 +34,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zstandard import ZstdDecompressor
 
 from inspector.errors import LogError
-from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, reading
+from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, errors_of
 from inspector.logs.names import listed
 from inspector.text import counted, natural
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
@@ -311,7 +311,7 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
     """Contents of a bag, read through; readers have the messages of topics with wanted names."""
     bag, unpack = Bag(), Unpacker(path)
     taken = odd = 0
-    with reading(path):
+    with errors_of(path):
         for each in _records(path, bag.lost, unpack):
             if isinstance(each, Topic):
                 if each.name not in bag.topics:

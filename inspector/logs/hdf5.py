@@ -28,7 +28,7 @@ from inspector.logs.arrays import (
     part_of,
     stated_rate,
 )
-from inspector.logs.mapping import Log, LogReader, ReadOptions, reading
+from inspector.logs.mapping import Log, LogReader, ReadOptions, errors_of
 from inspector.logs.names import TIMES, listed
 from inspector.text import counted
 from noisemodel.runfile import check_unpacked
@@ -49,7 +49,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of an HDF5 file."""
     with path.open("rb") as stream:
         is_matlab = stream.read(len(MATLAB)) == MATLAB
-    with reading(path, DAMAGE), h5py.File(path) as file:
+    with errors_of(path, DAMAGE), h5py.File(path) as file:
         home, episodes = _episodes(path, file, is_matlab=is_matlab)
     return LogReader(
         "MATLAB 7.3" if is_matlab else "HDF5",
@@ -78,7 +78,7 @@ def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str
 
 
 def _read(path: Path, options: ReadOptions, home: str, episode: str, *, is_matlab: bool) -> Log:
-    with reading(path, DAMAGE, f"{episode or 'it'} is damaged"), h5py.File(path) as file:
+    with errors_of(path, DAMAGE, f"{episode or 'it'} is damaged"), h5py.File(path) as file:
         group = _own(path, file[f"{home}/{episode}"], file) if home else file
         datasets, left_out = _wanted(group, options)
         arrays: Arrays = _values(path, file, datasets)
@@ -166,7 +166,7 @@ def _datasets(group: Any, mapped: Collection[str]) -> dict[str, Any]:
 
 def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...]:
     rows = [f"{counted(len(episodes), 'episode')}: {listed(episodes)}"] if episodes[0] else []
-    with reading(path, DAMAGE, f"{episodes[0] or 'it'} is damaged"), h5py.File(path) as file:
+    with errors_of(path, DAMAGE, f"{episodes[0] or 'it'} is damaged"), h5py.File(path) as file:
         found = _datasets(file[f"{home}/{episodes[0]}"] if home else file, ())
         rows += (f"{name}  {each.dtype} {each.shape}" for name, each in found.items())
     return tuple(rows)

@@ -43,7 +43,7 @@ from noisemodel.types import Array, Mask, Real
 
 
 @contextmanager
-def reading(
+def errors_of(
     path: Path, damage: tuple[type[Exception], ...] = (), what: str = "damaged or cut off"
 ) -> Iterator[None]:
     """Errors of reading a file as errors of a log; those that libraries raise for damage, too."""

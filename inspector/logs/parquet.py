@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.arrays import CELLS, floats, log_of
 from inspector.logs.clocks import stamps_of
-from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, no_motion, reading
+from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, errors_of, no_motion
 from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
@@ -76,7 +76,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 def _schema(path: Path) -> Any:
     """Names and types of the columns."""
-    with reading(path, DAMAGE):
+    with errors_of(path, DAMAGE):
         check_regular(path)
         return pyarrow.parquet.read_schema(path)
 
@@ -96,7 +96,7 @@ def _table(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any:
     filters = [(EPISODE, "==", int(episode))] if episode else None
     tables = []
     for path in paths:
-        with reading(path, DAMAGE):
+        with errors_of(path, DAMAGE):
             unpacked, width = unpacked_size(path, {*columns, *([EPISODE] if episode else [])})
             if width > limit("columns"):
                 raise ArchiveError(f"lists of {width} numbers in a row, {beyond('columns')}")
@@ -291,7 +291,7 @@ def _data_set(path: Path, folder: Path, options: ReadOptions) -> LogReader:
 
 
 def _info(path: Path) -> dict[str, Any]:
-    with reading(path, (OSError, ValueError), "cannot be read"):
+    with errors_of(path, (OSError, ValueError), "cannot be read"):
         info: dict[str, Any] = from_json(text_of(path))
     features = info.get("features") if isinstance(info, dict) else None
     if not isinstance(features, dict) or not all(isinstance(f, dict) for f in features.values()):

@@ -20,9 +20,9 @@ from inspector.logs.mapping import (
     LogReader,
     ReadOptions,
     check_joints,
+    errors_of,
     named,
     read_options,
-    reading,
 )
 from inspector.logs.motion import Imported, contradictions, limit_warnings, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
@@ -72,7 +72,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 def _module_of_folder(folder: Path) -> str:
     """What reads a folder that is one log, a LeRobot data set or a bag; empty for one of logs."""
-    with reading(folder):
+    with errors_of(folder):
         if (folder / INFO).is_file():
             return "parquet"
         files = [each for each in folder.iterdir() if not each.name.startswith(".")]
@@ -81,7 +81,7 @@ def _module_of_folder(folder: Path) -> str:
 
 
 def _is_folder(path: Path) -> bool:
-    with reading(path):  # such as one whose name has more than 255 characters
+    with errors_of(path):  # such as one whose name has more than 255 characters
         return path.is_dir()
 
 
@@ -95,7 +95,7 @@ def _module_of(path: Path) -> str:
             "a folder that is neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
             " (meta/info.json); name its files one by one",
         )
-    with reading(path):
+    with errors_of(path):
         runfile.check_regular(path)
         with path.open("rb") as stream:
             head = stream.read(16)
@@ -215,8 +215,8 @@ def _read_episode(
     name = _name(path, episode)
     if opened.run and not desired:
         run = opened.run()
-        robot_name = options.robot or run.robot
-        return Imported(replace(run, robot=robot_name), ("a run file, unchanged",), name)
+        run = replace(run, robot=options.robot or run.robot)
+        return Imported(run, ("a run file, unchanged",), name)
     logs = [prepared(opened.read(episode), options, robot)]
     if desired:
         same_episode = episode if episode in desired.episodes else desired.episodes[0]
@@ -309,7 +309,14 @@ def sources(
         new = [log for log in logs if os.path.realpath(log) not in seen]  # may link to itself
         seen.update(map(os.path.realpath, new))
         also_reading(new)
-        found += (Source(log, each) for log in new for each in _episodes(log, reading))
+        for log in new:
+            episodes: Iterable[str] = ("",)
+            if _is_folder(log) or not _is_npz(log):
+                try:
+                    episodes = readers_of(log, reading)
+                except (InspectorError, NoiseModelError):
+                    episodes = reading.episodes or ("",)
+            found += (Source(log, each) for each in episodes)
     if reading.desired and len(found) > 1:
         raise InspectorError(
             f"{reading.desired}: belongs to one log, {len(found)} are given (--desired)"
@@ -379,16 +386,6 @@ def assumed(imported: Imported, path: Path) -> str:
 def _listed(run: Run) -> str:
     names = run.joint_names
     return ", ".join(names) if len(names) <= 3 else f"{names[0]} to {names[-1]}"
-
-
-def _episodes(path: Path, reading: Reading) -> tuple[str, ...]:
-    """The episodes of a log; none of one that cannot be listed, or of a run file."""
-    if not _is_folder(path) and _is_npz(path):
-        return ("",)
-    try:
-        return tuple(readers_of(path, reading))
-    except (InspectorError, NoiseModelError):
-        return reading.episodes or ("",)
 
 
 def _run_file(path: Path, reading: Reading) -> Run | None:
@@ -465,7 +462,11 @@ def import_logs(
     reads = [read for _, read in jobs]
     for read, target in progress(zip(reads, targets, strict=True), len(jobs)):
         try:
-            yield _written(read(), target, overwrite=overwrite)
+            imported = read()
+            run = imported.run
+            run.save(target, overwrite=overwrite)
+            remarks = (*imported.remarks, *contradictions(run), *limit_warnings(run))
+            yield Written(target, run.duration, run.rate, remarks)
         except (InspectorError, NoiseModelError) as error:
             if len(targets) == 1 and not several:
                 raise
@@ -491,11 +492,3 @@ def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path
     except OSError as error:
         raise InspectorError(f"{output}: cannot be created ({error.strerror})") from error
     return targets
-
-
-def _written(imported: Imported, target: Path, *, overwrite: bool) -> Written:
-    """Write a run."""
-    run = imported.run
-    run.save(target, overwrite=overwrite)
-    remarks = (*imported.remarks, *contradictions(run), *limit_warnings(run))
-    return Written(target, run.duration, run.rate, remarks)
