@@ -181,36 +181,31 @@ def log_of(
 def _arms(arrays: Arrays, roles: Collection[str]) -> dict[str, tuple[str, ...]]:
     """Names of the joints of robosuite's arrays, if there are several arms."""
     arms = {name: match["arm"] for name in roles if (match := ARMS.fullmatch(name))}
-    if len({*arms.values()}) < 2:
-        return {}
-    widths = {name: arrays[name].size // len(arrays[name]) for name in arms}
     return {
-        name: tuple(f"{arm}_joint_{number}" for number in range(widths[name]))
+        name: tuple(f"{arm}_joint_{number}" for number in range(arrays[name][0].size))
         for name, arm in arms.items()
+        if len({*arms.values()}) > 1
     }
 
 
 def gathered(log: Log, options: ReadOptions) -> Log:
     """Log of a table with the columns of MuJoCo's state as arrays; itself if it has none."""
     mapped = {entry.source for entry in options.entries}
-    groups: dict[str, dict[int, Field]] = {}
+    found: dict[str, dict[int, Field]] = {}
     for each in log.fields:
         if match := CELLS.fullmatch(each.name):
-            groups.setdefault(match["array"].lower(), {})[int(match["number"])] = each
-    for name in [n for n, each in groups.items() if mapped & {c.name for c in each.values()}]:
-        del groups[name]
+            found.setdefault(match["array"].lower(), {})[int(match["number"])] = each
+    groups = {n: g for n, g in found.items() if not mapped & {c.name for c in g.values()}}
     if not {QPOS, QVEL} & set(groups):
         return log
     columns = {id(each) for members in groups.values() for each in members.values()}
     fields = [each for each in log.fields if id(each) not in columns]
-    arrays: dict[str, Real] = {}
-    for name, members in groups.items():
-        arrays[name] = np.hstack([members[number].values for number in sorted(members)])
-        signal = COMMAND if meaning(name) == COMMAND else ""
-        stamps = log.fields[0].stamps
-        fields.append(Field(name, arrays[name], stamps, signal=signal, source=log.path.name))
-    suggested = _of_mujoco(arrays, {name: meaning(name) for name in arrays})
-    return replace(log, fields=tuple(fields), suggested=tuple(suggested))
+    arrays = {n: np.hstack([g[number].values for number in sorted(g)]) for n, g in groups.items()}
+    roles = {name: meaning(name) for name in arrays}
+    for name, values in arrays.items():
+        signal, stamps = COMMAND if roles[name] == COMMAND else "", log.fields[0].stamps
+        fields.append(Field(name, values, stamps, signal=signal, source=log.path.name))
+    return replace(log, fields=tuple(fields), suggested=tuple(_of_mujoco(arrays, roles)))
 
 
 def floats(values: NDArray[Any]) -> Real:
@@ -229,7 +224,7 @@ def episodes_of(arrays: Arrays) -> dict[str, slice]:
     return {str(n): part for n, part in enumerate(found)} if len(found) > 1 else {"": slice(None)}
 
 
-def part_of(arrays: Arrays, episode: str) -> Arrays:
+def part_of(arrays: Arrays, episode: str) -> dict[str, NDArray[Any]]:
     """Arrays of which those that have as many samples as the longest are cut to an episode."""
     part = episodes_of(arrays)[episode]
     samples = max((len(each) for each in arrays.values() if each.ndim), default=0)
@@ -258,7 +253,7 @@ def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
         elif roles[name] == COMMAND and each.ndim == 1:
             roles[name] = ""
     robots = {match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
-    chosen = {"robot"} & robots or {min(robots, default="")}
+    chosen = "robot" if "robot" in robots else min(robots, default="")
     first: dict[str, str] = {}  # of MuJoCo's arrays the one of the shortest name
     for name in sorted(roles, key=len):
         if roles[name] in (QPOS, QVEL, FORCE):
@@ -268,7 +263,7 @@ def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
         for name, what in roles.items()
         if what != COPY
         and first.get(what, name) == name
-        and (name in mapped or not (match := STATES.fullmatch(name)) or match["robot"] in chosen)
+        and (name in mapped or not (match := STATES.fullmatch(name)) or match["robot"] == chosen)
     }
 
 
@@ -347,18 +342,14 @@ def _nothing(path: Path, arrays: Arrays, not_read: Sequence[str]) -> LogError:
     """Error of a file that is not known to hold motion: what it holds, and what to type."""
     if arrays and all(each.ndim == 1 for each in arrays.values()):
         return no_motion(path, [*arrays, *not_read])
-    wide = [(n, each) for n, each in arrays.items() if each.ndim == 2 and meaning(n) != COMMAND]
-    name, values = max(wide, key=lambda each: len(each[1]), default=("qpos", np.zeros((2, 7))))
-    half = values.shape[1] // 2
+    wide = [n for n, each in arrays.items() if each.ndim == 2 and meaning(n) != COMMAND]
+    name = max(wide, key=lambda each: len(arrays[each]), default="qpos")
     example = f"--map position={name}"
-    if "obs" in name and half:
+    if "obs" in name and (half := arrays[name].shape[1] // 2):
         example += f"[0:{half}] --map velocity={name}[{half}:{2 * half}]"
     shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])
-    return LogError(
-        path,
-        "the file holds no known joint positions or velocities; name them, such as"
-        f" {example}; it has {shapes or NO_ARRAYS}",
-    )
+    problem = "the file holds no known joint positions or velocities; name them, such as"
+    return LogError(path, f"{problem} {example}; it has {shapes or NO_ARRAYS}")
 
 
 # NumPy's files

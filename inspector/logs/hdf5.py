@@ -14,20 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.arrays import (
-    COPY,
-    EPISODE_ENDS,
-    RATES,
-    STATES,
-    STEPS,
-    Arrays,
-    episodes_of,
-    log_of,
-    log_of_variables,
-    meaning,
-    part_of,
-    stated_rate,
-)
+from inspector.logs import arrays
 from inspector.logs.mapping import Log, LogReader, ReadOptions, errors_of
 from inspector.logs.names import TIMES, listed
 from inspector.text import counted
@@ -39,7 +26,7 @@ NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
 # Errors that h5py raises for damaged files.
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
 SMALL = 8 * 2**20  # bytes up to which a dataset is read whatever its name is
-NAMES = {*TIMES, *EPISODE_ENDS}
+NAMES = {*TIMES, *arrays.EPISODE_ENDS}
 
 MATLAB = b"MATLAB 7.3"  # the first bytes of a file that MATLAB wrote
 REFERENCES = "#refs#"  # the group in which MATLAB keeps the cells and objects of a file
@@ -72,32 +59,31 @@ def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str
             if found := [n for n in groups.values() if home == EPISODES or NUMBERED.fullmatch(n)]:
                 found.sort(key=lambda name: [int(number) for number in re.findall(r"\d+", name)])
                 return home, tuple(found)
-    flags = {name: file.get(name) for name in EPISODE_ENDS}
+    flags = {name: file.get(name) for name in arrays.EPISODE_ENDS}
     datasets = {name: each for name, each in flags.items() if isinstance(each, h5py.Dataset)}
-    return "", tuple(episodes_of(_values(path, file, datasets)))
+    return "", tuple(arrays.episodes_of(_values(path, file, datasets)))
 
 
 def _read(path: Path, options: ReadOptions, home: str, episode: str, *, is_matlab: bool) -> Log:
     with errors_of(path, DAMAGE, f"{episode or 'it'} is damaged"), h5py.File(path) as file:
         group = _own(path, file[f"{home}/{episode}"], file) if home else file
         datasets, left_out = _wanted(group, options)
-        arrays: Arrays = _values(path, file, datasets)
+        values = _values(path, file, datasets)
         attributes = {**_single(file.attrs), **_single(group.attrs)}
     if is_matlab:
-        return log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
-    arrays = arrays if home else part_of(arrays, episode)
-    return log_of(
-        path,
-        {name: each for name, each in arrays.items() if each.dtype.kind in "iuf"},
-        options,
-        stated=stated_rate({**attributes, **arrays}),
-        not_read=left_out,
-    )
+        turned = {name: each.T for name, each in values.items()}
+        return arrays.log_of_variables(path, turned, options)
+    if not home:
+        values = arrays.part_of(values, episode)
+    numbers = {name: each for name, each in values.items() if each.dtype.kind in "iuf"}
+    stated = arrays.stated_rate({**attributes, **values})
+    return arrays.log_of(path, numbers, options, stated=stated, not_read=left_out)
 
 
 def _single(attributes: Any) -> dict[str, Any]:
     """Attributes that state a rate or a step; others may be of any size, and are not read."""
-    known = [written for name in (*RATES, *STEPS) for written in (name, name.upper(), name.title())]
+    names = (*arrays.RATES, *arrays.STEPS)
+    known = [written for name in names for written in (name, name.upper(), name.title())]
     about = {name: attributes.get_id(name) for name in known if name in attributes}
     return {
         name: attributes[name]
@@ -139,8 +125,9 @@ def _wanted(group: Any, options: ReadOptions) -> tuple[dict[str, Any], list[str]
 
 
 def _is_known(name: str, mapped: Collection[str]) -> bool:
-    known = meaning(name) not in ("", COPY) or STATES.fullmatch(name) is not None
-    return known or name in mapped or name.rpartition("/")[2].lower() in NAMES
+    if name in mapped or name.rpartition("/")[2].lower() in NAMES:
+        return True
+    return arrays.meaning(name) not in ("", arrays.COPY) or bool(arrays.STATES.fullmatch(name))
 
 
 def _datasets(group: Any, mapped: Collection[str]) -> dict[str, Any]:

@@ -367,19 +367,13 @@ class ReadOptions:
             form = re.compile(f"{re.escape(before)}(.+){re.escape(after)}")
             free = {n: match[1] for n in names if n not in taken and (match := form.fullmatch(n))}
             if not free:
-                raise LogError(
-                    path,
-                    f"the pattern {entry.target}={entry.source} fits no column that is free;"
-                    f" columns are {listed(names)}",
-                )
+                problem = f"the pattern {entry.target}={entry.source} fits no column that is free"
+                raise LogError(path, f"{problem}; columns are {listed(names)}")
             for name, joint in free.items():
                 new = Entry(entry.signal, entry.joint.replace(JOINT, joint), name)
-                if new.target in targets:
-                    raise LogError(
-                        path,
-                        f"{targets[new.target].source!r} and {name!r} are both mapped to"
-                        f" {new.target}; map one of them",
-                    )
+                if other := targets.get(new.target):
+                    both = f"{other.source!r} and {name!r} are both mapped to {new.target}"
+                    raise LogError(path, f"{both}; map one of them")
                 targets[new.target] = new
                 taken.add(name)
         return replace(self, entries=tuple(targets.values())) if patterns else self
@@ -481,12 +475,9 @@ def read_options(
 def _setting(name: str, value: Any) -> Any:
     """Setting of a saved mapping, its type checked."""
     lists = name in ("joints", "topics", "columns")
-    kinds: Mapping[str, tuple[type, ...]] = {"rate": (int, float), "offset": (int, float)}
-    if name == "force":
-        correct = isinstance(value, bool)
-    else:
-        wanted = kinds.get(name, (list,) if lists else (str,))
-        correct = isinstance(value, wanted) and not isinstance(value, bool)
+    numbers: tuple[type, ...] = (int, float) if name in ("rate", "offset") else (str,)
+    wanted = (list,) if lists else (bool,) if name == "force" else numbers
+    correct = isinstance(value, wanted) and isinstance(value, bool) == (name == "force")
     if not correct or (lists and not all(isinstance(each, str) for each in value)):
         raise InspectorError(f"{name} = {toml_shown(value)} is of another type than expected")
     return tuple(value) if lists else value
@@ -684,23 +675,18 @@ def _unique(log: Log, choices: Sequence[_Choice]) -> list[_Choice]:
         if rank < before:
             found[target] = choice
         elif rank == before and other is not choice:
-            raise _both(log, target[1], other, choice)
+            old, new, (signal, joint) = other.field, choice.field, target
+            if new.source == old.source and new.joints != old.joints:
+                problem = f"{new.source}: the set of joints changes within the log; split it there"
+                raise LogError(log.path, problem)
+            names = f"{other.label!r} and {choice.label!r}"
+            how = f"--map '{Entry(signal, joint, '').target}={choice.label}'"
+            if new.source != old.source:
+                names, how = f"{old.source} and {new.source}", "--topic"
+            what = f"{signal} of " + (f"joint {joint!r}" if joint else "the base")
+            raise LogError(log.path, f"{names} both hold {what}; choose with {how}")
     kept = {id(choice) for choice in found.values()}
     return [choice for choice in choices if id(choice) in kept]
-
-
-def _both(log: Log, joint: str, before: _Choice, after: _Choice) -> LogError:
-    """Error of two columns that hold the same signal."""
-    old, new = before.field, after.field
-    if new.source == old.source and new.joints != old.joints:
-        problem = f"{new.source}: the set of joints changes within the log; split it there"
-        return LogError(log.path, problem)
-    target = Entry(after.signal, joint, "").target
-    names, how = f"{before.label!r} and {after.label!r}", f"--map '{target}={after.label}'"
-    if new.source != old.source:
-        names, how = f"{old.source} and {new.source}", "--topic"
-    what = f"{after.signal} of " + (f"joint {joint!r}" if joint else "the base")
-    return LogError(log.path, f"{names} both hold {what}; choose with {how}")
 
 
 def _targets(log: Log, choices: Sequence[_Choice]) -> tuple[list[_Choice], list[str]]:
