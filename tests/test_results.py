@@ -13,9 +13,8 @@ from inspector.errors import InspectorError, Status
 from inspector.library import demo_run
 from inspector.localisation import Localisation
 from inspector.order import Order
-from inspector.report import history
+from inspector.report import html
 from inspector.report.formats import FORMATS, as_json
-from inspector.report.html import index_page
 from inspector.verdict import Beside, Evidence, Finding, Missing, Verdict, read_results
 
 
@@ -167,7 +166,7 @@ def test_whatever_stands_in_a_result_is_shown_or_refused_in_one_line(tmp_path):
             except InspectorError as error:
                 refused.append(str(error))
                 continue
-            for write in (*FORMATS.values(), index_page):
+            for write in (*FORMATS.values(), html.index_page):
                 assert isinstance(write(found), str)
     assert len(refused) > 500
     assert all("no results of classify" in each for each in refused)
@@ -199,19 +198,19 @@ def test_a_history_of_200_commits_names_its_steps(tmp_path):
                     run = replace(run, status=Status.FINDINGS, events=(blow,))
                 verdicts.append(run)
         results(tmp_path / f"{commit}-c{commit:03d}.json", *verdicts)
-    found = history.read(tmp_path)
+    found = html.read_history(tmp_path)
     assert found.commits[:3] == ("c000", "c001", "c002")  # 10 comes after 9
     series = {(each.name, each.unit): each for each in found.series}
-    (first, louder), (second, quieter) = history.changes(series["pick", "dB"])
+    (first, louder), (second, quieter) = html.changes(series["pick", "dB"])
     assert (first, second) == (60, 150)
     assert (louder, quieter) == (pytest.approx(6.0, abs=0.5), pytest.approx(-3.0, abs=0.5))
-    rises = history.changes(series["scan", "dB"])  # a drift of 8 dB
+    rises = html.changes(series["scan", "dB"])  # a drift of 8 dB
     assert 1 < len(rises) < 4
     assert 4.0 < sum(by for _, by in rises) < 8.0
-    assert history.changes(series["calm", "dB"]) == []
-    assert [commit for commit, _ in history.changes(series["pick, wrist", "findings"])] == [60]
-    assert [commit for commit, _ in history.changes(series["pick, wrist", "dB"])] == [60, 150]
-    assert history.changes(series["pick, elbow", "dB"]) == []
+    assert html.changes(series["calm", "dB"]) == []
+    assert [commit for commit, _ in html.changes(series["pick, wrist", "findings"])] == [60]
+    assert [commit for commit, _ in html.changes(series["pick, wrist", "dB"])] == [60, 150]
+    assert html.changes(series["pick, elbow", "dB"]) == []
     (tmp_path / "200-broken.json").write_text("{")
     status, out, err = call("history", tmp_path, "-o", tmp_path / "page.html")
     assert status == 3
@@ -237,7 +236,7 @@ def test_results_without_a_number_all_count(tmp_path):
     names = {"2024-01-05", "2024-01-06", "nightly-3f2a", "nightly-9c1b", "-3", "last"}
     for name in names:
         results(tmp_path / f"{name}.json", Verdict(Path("a.npz"), Status.OK))
-    found = history.read(tmp_path)
+    found = html.read_history(tmp_path)
     assert (found.notes, set(found.commits)) == ((), names)
 
 

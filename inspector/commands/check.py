@@ -402,15 +402,13 @@ def history(
     Files are in order of their names, and named after their commit behind the last dash:
     0061-3f2a1c9.json. The exit status is 3 if one cannot be read; the others are shown.
     """
-    from inspector.report.history import page, read
-
     if output:
         refuse_existing(output, overwrite=overwrite)
-    found = read(results)
+    found = html.read_history(results)
     for line in found.lines():
         typer.echo(line)
     for problem in found.problems:
         typer.echo(f"inspector: {problem}", err=True)
     if output:
-        write_whole(output, page(found), overwrite=overwrite)
+        write_whole(output, html.history_page(found), overwrite=overwrite)
     raise typer.Exit(EXIT[Status.BAD_INPUT] if found.problems else 0)
