@@ -10,6 +10,7 @@ from base64 import b64encode
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -65,12 +66,7 @@ def page(
     verdict: Verdict | None = None,
     beside: Comparison | None = None,
 ) -> str:
-    """Write the page of an inspected run; it says the same as `findings.report`.
-
-    Args:
-        audit: What the log can show, a line each; may be empty.
-        verdict: The verdict beside a reference, and how the run compares with it in `beside`.
-    """
+    """Write the page of an inspected run, beside a reference too; it says what a recording says."""
     html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
     add_text(body, "p", spoken(analysis.headline), "verdict")
@@ -86,7 +82,7 @@ def page(
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
         _add_list(body, "Does not count", excused(verdict))
     add_text(body, "h2", "Over time")
-    image = f"data:image/png;base64,{_encoded(picture(analysis, beside))}"
+    image = f"data:image/png;base64,{b64encode(picture(analysis, beside)).decode()}"
     described = f"Noise, classes and spectrograms over {analysis.run.duration:.2f} s"
     ET.SubElement(body, "img", src=image, alt=f"{described}; the lists have the findings")
     add_text(body, "h2", "Sound")
@@ -94,7 +90,7 @@ def page(
         add_text(body, "p", "The log's rate is too low for audible frequencies.", "note")
     else:
         gain = common_gain([sound])
-        source = f"data:audio/wav;base64,{_encoded(sound.file(gain))}"
+        source = f"data:audio/wav;base64,{b64encode(sound.file(gain)).decode()}"
         ET.SubElement(body, "audio", controls="controls", src=source)
         span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.what}"
         add_text(body, "p", f"{span}, {sound.description(gain)}. {AUDIBLE}", "note")
@@ -136,25 +132,12 @@ def written(html: ET.Element) -> str:
     return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
 
 
-def _add_table(body: ET.Element, head: Sequence[str]) -> ET.Element:
-    """Add a table without rows; returns its body."""
-    frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
-    row = ET.SubElement(ET.SubElement(frame, "thead"), "tr")
-    for cell in head:
-        add_text(row, "th", cell)
-    return ET.SubElement(frame, "tbody")
-
-
 def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
     if lines:
         add_text(body, "h2", title)
         items = ET.SubElement(body, "ul")
         for line in lines:
             add_text(items, "li", line.strip())
-
-
-def _encoded(data: bytes) -> str:
-    return b64encode(data).decode("ascii")
 
 
 # --- the page of many runs
@@ -229,7 +212,11 @@ def index_page(verdicts: Sequence[Verdict]) -> str:
     shared = [fact for fact in first if others and all(fact in facts for facts in others)]
     for fact in shared:
         add_text(body, "p", fact, "note")
-    rows = _add_table(body, ("status", "run", "findings"))
+    frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
+    head = ET.SubElement(ET.SubElement(frame, "thead"), "tr")
+    for cell in ("status", "run", "findings"):
+        add_text(head, "th", cell)
+    rows = ET.SubElement(frame, "tbody")
     for number, verdict in enumerate(ranked, 1):
         _add_row(rows, verdict, number)
     add_text(body, "h2", "Pictures")
@@ -240,16 +227,16 @@ def index_page(verdicts: Sequence[Verdict]) -> str:
 
 def _facts(verdict: Verdict) -> list[str]:
     """By which model and reference a run was judged, and what limits that."""
-    model = f"model {verdict.model}" if verdict.model else ""
-    message = verdict.message if verdict.model else ""
+    model, message = (f"model {verdict.model}", verdict.message) if verdict.model else ("", "")
     return list(filter(None, [model, _judged_by(verdict), message, verdict.assumed]))
 
 
 def _judged_by(verdict: Verdict) -> str:
     """By which reference a run was judged, in a line; empty without one."""
-    if verdict.beside is None:
-        return f"reference: {verdict.expectations}" if verdict.expectations else ""
-    return f"reference: {verdict.beside.path}, {verdict.beside.words}"
+    by = verdict.expectations
+    if verdict.beside is not None:
+        by = f"{verdict.beside.path}, {verdict.beside.words}"
+    return by and f"reference: {by}"
 
 
 def _add_row(rows: ET.Element, verdict: Verdict, number: int) -> None:
@@ -307,17 +294,15 @@ line { stroke: #d55e00; stroke-width: 2; stroke-dasharray: 6 4; } .step { color:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """What became of a scenario, or of a joint in it, at each commit; NaN where it was not run."""
+    """What became of a scenario, or of a joint in it, at each commit; NaN where it was not run.
 
-    scenario: str
+    Levels are over a reference: results without one have findings only.
+    """
+
+    name: str  # how it is called
     joint: str
     unit: str
     value: Array
-
-    @property
-    def name(self) -> str:
-        """How it is called."""
-        return f"{self.scenario}, {self.joint}" if self.joint else self.scenario
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,62 +312,60 @@ class History:
     commits: tuple[str, ...]
     series: tuple[Series, ...]
     problems: tuple[str, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...]
 
     def lines(self) -> Iterator[str]:
         """The changes, a line each."""
         yield f"{counted(len(self.commits), 'commit')}, {self.commits[0]} to {self.commits[-1]}"
         yield from self.notes
         for series in self.series:
-            for commit, by in changes(series):
-                yield f"{series.name}: {self.told(series, commit, by)}"
+            yield from (f"{series.name}: {told}" for told in self.told(series))
 
-    def told(self, series: Series, commit: int, by: float) -> str:
-        """A change in words."""
-        number = f"{commit + 1} of {len(self.commits)}"
-        return f"{by:+.1f} {series.unit} at {self.commits[commit]} ({number})"
+    def told(self, series: Series) -> list[str]:
+        """The changes of a series in words."""
+        of, count = self.commits, len(self.commits)
+        return [
+            f"{by:+.1f} {series.unit} at {of[commit]} ({commit + 1} of {count})"
+            for commit, by in changes(series)
+        ]
 
 
 def read_history(folder: Path) -> History:
     """Read the results of a folder, one per commit; what is no result is named and left out.
 
     Files are in order of their names, numbers by their value. A name that is a number, a dash and
-    the rest is of that number, and called the rest: ``0061-3f2a1c9.json``. Of results with one number, as a rebase leaves them, the file that was modified last counts.
+    the rest is of that number, and called the rest: ``0061-3f2a1c9.json``. Of results with one
+    number, as a rebase leaves them, the file that was modified last counts.
     """
     commits, results, problems, notes = [], [], [], []
-    last: dict[str, Path] = {}
+    last: dict[str, tuple[Path, str]] = {}
     for path in sorted(folder.glob("*.json"), key=lambda path: (path.stat().st_mtime, path)):
-        number = _named(path)[0]
+        number, _, name = path.stem.rpartition("-")
+        if not number.isdigit():
+            number = name = path.stem
         if number in last:
-            notes.append(f"{last[number].name}: replaced by {path.name}")
-        last[number] = path
-    for path in sorted(last.values(), key=lambda path: natural(path.stem)):
+            notes.append(f"{last[number][0].name}: replaced by {path.name}")
+        last[number] = path, name
+    for path, name in sorted(last.values(), key=lambda each: natural(each[0].stem)):
         try:
             results.append(read_results(path))
-            commits.append(_named(path)[1])
+            commits.append(name)
         except InspectorError as error:
             problems.append(str(error))
     if not commits:
         why = f"; {problems[0]}" if problems else ""
         raise InspectorError(f"{folder}: no result of `classify --write json=FILE`{why}")
-
     series = list(_series(results))
     series.sort(key=lambda each: -max([abs(by) for _, by in changes(each)], default=0.0))
     return History(tuple(commits), tuple(series), tuple(problems), tuple(notes))
 
 
-def _named(path: Path) -> tuple[str, str]:
-    """Number and name of a commit; both are the whole name of a file without a number."""
-    number, _, name = path.stem.rpartition("-")
-    return (number, name) if number.isdigit() else (path.stem, path.stem)
-
-
 def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
     """The series of each scenario, and of its joints."""
-    count = len(results)
-    runs: dict[str, Array] = defaultdict(lambda: np.full(count, np.nan))
-    over: dict[tuple[str, str], Array] = defaultdict(lambda: np.full(count, np.nan))
-    found: dict[tuple[str, str], Array] = defaultdict(lambda: np.zeros(count))
+    nowhere, none = (partial(np.full, len(results), value) for value in (np.nan, 0.0))
+    runs: dict[str, Array] = defaultdict(nowhere)
+    over: dict[tuple[str, str], Array] = defaultdict(nowhere)
+    found: dict[tuple[str, str], Array] = defaultdict(none)
     for commit, verdicts in enumerate(results):
         for group in groups(verdicts):
             name = group.worst.scenario or str(Path(group.name).with_suffix(""))
@@ -397,23 +380,21 @@ def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
                     joint = where.joints[0][0] if where and where.joints else ""
                     for key in dict.fromkeys([(name, ""), (name, joint)]):
                         found[key][commit] += 1
-    yield from (Series(*of, "dB", level) for of, level in over.items())
-    for name in runs:
-        found.setdefault((name, ""), np.zeros(count))
-    for (name, joint), number in found.items():
-        yield Series(name, joint, "findings", number / runs[name])
+    every = [("dB", *each) for each in over.items()]
+    found = {(name, ""): none() for name in runs} | found
+    every += [("findings", of, number / runs[of[0]]) for of, number in found.items()]
+    for unit, (name, joint), value in every:
+        yield Series(f"{name}, {joint}" if joint else name, joint, unit, value)
 
 
 def changes(series: Series) -> list[tuple[int, float]]:
     """Steps of a series, by commit and size; commits at which it was not run do not count."""
     there = np.flatnonzero(~np.isnan(series.value))
-    value = series.value[there]
-    least = LEAST_DB if series.unit == "dB" else LEAST_FINDINGS
+    value, least = series.value[there], LEAST_DB if series.unit == "dB" else LEAST_FINDINGS
     edges = [*_stretches(value, least), len(value)]
     levels = [float(value[first:last].mean()) for first, last in pairwise(edges)]
-    steps = zip(edges[1:], pairwise(levels), strict=False)
-    found = [(int(there[first]), after - before) for first, (before, after) in steps]
-    return [(commit, by) for commit, by in found if abs(by) >= least]
+    steps = zip(there[edges[1:-1]].tolist(), np.diff(levels).tolist(), strict=True)
+    return [(commit, by) for commit, by in steps if abs(by) >= least]
 
 
 def _stretches(value: Array, least: float) -> list[int]:
@@ -448,31 +429,28 @@ def history_page(history: History) -> str:
     for problem in (*history.problems, *history.notes):
         add_text(body, "p", problem, "note")
     for series in history.series:
-        found = changes(series)
+        found = history.told(series)
         if series.joint and not found:
             continue
         add_text(body, "h2", series.name)
-        for commit, by in found:
-            add_text(body, "p", history.told(series, commit, by), "step")
-        _draw(body, history, series, found)
+        for step in found:
+            add_text(body, "p", step, "step")
+        _draw(body, history, series)
     return written(html)
 
 
-def _draw(
-    body: ET.Element, history: History, series: Series, found: Sequence[tuple[int, float]]
-) -> None:
+def _draw(body: ET.Element, history: History, series: Series) -> None:
     """Draw a series: a point for each commit, a line at each step."""
     value = series.value
     low, high = min(0.0, float(np.nanmin(value))), max(float(np.nanmax(value)), 1.0)
     x = (np.arange(len(value)) + 0.5) * WIDTH / len(value)
     y = HEIGHT - 10 - (value - low) / (high - low) * (HEIGHT - 20)
     drawn = ET.SubElement(body, "svg", viewBox=f"0 0 {WIDTH} {HEIGHT}", role="img")
-    for commit, _ in found:
+    for commit, _ in changes(series):
         at = f"{x[commit] - WIDTH / len(value) / 2:.1f}"
         ET.SubElement(drawn, "line", x1=at, x2=at, y1="0", y2=str(HEIGHT))
     for place in np.flatnonzero(~np.isnan(value)):
         point = ET.SubElement(drawn, "circle", cx=f"{x[place]:.1f}", cy=f"{y[place]:.1f}", r="3")
-        told = f"{history.commits[place]}: {value[place]:.1f} {series.unit}"
-        add_text(point, "title", told)
+        add_text(point, "title", f"{history.commits[place]}: {value[place]:.1f} {series.unit}")
     unit = "dB over the reference" if series.unit == "dB" else "findings per run"
     add_text(body, "p", f"{unit}, {low:.1f} to {high:.1f}", "note")
