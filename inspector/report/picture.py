@@ -44,9 +44,10 @@ def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
     """Draw a run; how it compares with a reference takes the place of the probability."""
     run, links = analysis.run, analysis.links
     names = classes_of(analysis)
-    strips = [_strip(analysis, *analysis.joint_levels, run.joint_names)]
+    strips = {"joints": (levels.JOINTS, _strip(analysis, *analysis.joint_levels, run.joint_names))}
     if links is not None:
-        strips.append(_strip(analysis, *levels.link_levels(links), links.links))
+        strip = _strip(analysis, *levels.link_levels(links), links.links)
+        strips["links"] = levels.LINKS, strip
     beside = None if beside is None or beside.empty else beside
     over = [] if beside is None else beside.loudest(SHOWN)
     alarmed = analysis.labels is not None and analysis.alarm is not None and beside is None
@@ -58,10 +59,11 @@ def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
         "probability": (0.8 * alarmed, 0.0),
         "over": (ROW * len(over), TITLE),
         "spectrogram": (2.0, 0.0),
-        "joints": (ROW * len(strips[0][2]), TITLE),
-        "links": (ROW * len(strips[1][2]) if links is not None else 0.0, TITLE),
+        **{name: (ROW * len(rows), TITLE) for name, (_, (*_, rows)) in strips.items()},
     }
-    figure, axes = _panels(panels, (*names, *strips[0][2], *strips[-1][2]))
+    figure, axes = _panels(
+        panels, (*names, *(n for _, (*_, rows) in strips.values() for n in rows))
+    )
     if "classes" in axes:
         _classes(axes["classes"], analysis, names, told)
     _noise(axes["noise"], analysis)
@@ -76,10 +78,12 @@ def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
     scale = levels.SPECTRUM.following(spectrum.decibel)
     title = f"{'noise' if worst is None else _short(run.joint_names[worst])}\n[Hz]"
     _spectrum(axes["spectrogram"], spectrum, scale, title)
-    if "joints" in axes:
-        _strips(axes["joints"], strips[0], levels.JOINTS.following(strips[0][1]), "joints")
-    if "links" in axes:
-        _strips(axes["links"], strips[1], levels.LINKS.following(strips[1][1]), "links")
+    for name, (own, (time, level, rows)) in strips.items():
+        if name not in axes:
+            continue
+        scale = own.following(level)
+        _heat(axes[name], time, range(len(rows)), np.maximum(level, scale.low), scale)
+        _rows(axes[name], rows, f"{name} above 10 Hz")
     for name, panel in axes.items():
         _gaps(panel, analysis, named=name == "noise")
     axes["noise"].set_xlim(run.time[0], run.time[-1])
@@ -217,24 +221,16 @@ def _over(axes: "Axes", beside: Comparison) -> None:
     """Draw by how much each joint is louder than the reference: those that are most."""
     which = beside.loudest(SHOWN)
     joints = [beside.joints[place] for place in which]
-    rows = np.arange(len(joints), dtype=np.float64)
+    over, rows, most = beside.by_joint[:, which].T, range(len(joints)), MOST_OVER_DB
     image = axes.pcolormesh(
-        beside.time,
-        rows,
-        beside.by_joint[:, which].T,
-        cmap="RdBu_r",
-        vmin=-MOST_OVER_DB,
-        vmax=MOST_OVER_DB,
-        shading="nearest",
+        beside.time, rows, over, cmap="RdBu_r", shading="nearest", vmin=-most, vmax=most
     )
     for start, stop, evidence in beside.exceedances:
         if evidence.joint in joints and evidence.peak is not None:
             row = joints.index(evidence.joint)
             axes.plot([start, stop], [row, row], color=INK, linewidth=1.5)
             axes.plot(evidence.peak, row, "o", color=INK, markersize=4)
-    axes.set_yticks(rows, list(map(_short, joints)), parse_math=False)
-    axes.invert_yaxis()
-    axes.set_title("joints over the reference", fontsize=9, loc="left")
+    _rows(axes, joints, "joints over the reference")
     _bar(axes, image, "[dB]")
 
 
@@ -272,21 +268,14 @@ def _strip(
     return time + levels.STEP / 2, level[:, which].T, [names[index] for index in which]
 
 
-def _strips(
-    axes: "Axes",
-    strip: tuple[Array, Array, list[str]],
-    scale: Scale,
-    title: str,
-) -> None:
-    time, level, names = strip
-    rows = np.arange(len(names), dtype=np.float64)
-    _heat(axes, time, rows, np.maximum(level, scale.low), scale)
-    axes.set_yticks(rows, list(map(_short, names)), parse_math=False)
+def _rows(axes: "Axes", names: Sequence[str], title: str) -> None:
+    """Name rows at the left, the first above."""
+    axes.set_yticks(range(len(names)), list(map(_short, names)), parse_math=False)
     axes.invert_yaxis()
-    axes.set_title(f"{title} above 10 Hz", fontsize=9, loc="left")
+    axes.set_title(title, fontsize=9, loc="left")
 
 
-def _heat(axes: "Axes", time: Array, rows: Array, level: Array, scale: Scale) -> None:
+def _heat(axes: "Axes", time: Array, rows: Array | range, level: Array, scale: Scale) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
     shades = LinearSegmentedColormap.from_list("heat", list(colors.HEAT / 255))
