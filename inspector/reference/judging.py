@@ -17,11 +17,11 @@ end, where a longer run may stay. So each row of costs follows from the row befo
 repetitions at once.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,11 +169,13 @@ class Cells:
     octaves: Octaves
 
     @classmethod
-    def shared(cls, run: Levels, others: Sequence[Levels]) -> "Cells":
-        """Those of a run that all others have."""
+    def shared(
+        cls, run: Levels, others: Sequence[Levels], by: Callable[[Iterable[bool]], bool] = all
+    ) -> "Cells":
+        """Those of a run that all others have, or any."""
         return cls(
-            tuple(j for j in run.joints if all(j in each.joints for each in others)),
-            tuple(o for o in run.octaves if all(o in each.octaves for each in others)),
+            tuple(j for j in run.joints if by(j in each.joints for each in others)),
+            tuple(o for o in run.octaves if by(o in each.octaves for each in others)),
         )
 
     def unknown(self, frames: int) -> Real32:
@@ -289,37 +291,33 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     margins: dict[Kind, Margin] = {}
     matched, aligned, told = _matching(run, known, cells.joints) if over.size else ([], [], [])
     remarks += told
-    references = _repetitions(matched)
     quieter, band = 0.0, np.full((frames, 2), np.nan)
-    if references:
-        quieter = _quieter(run, references, aligned, cells)
-        band = _band(references, aligned, cells)
-        over, covered = _over_repetitions(run, references, aligned, cells)
+    if aligned:
+        quieter, band = _quieter(run, aligned, cells), _band(aligned, cells)
+        over, covered = _over_repetitions(run, aligned, cells)
         kind[covered] = KINDS.index(Kind.REPETITIONS)
-        scores = [score for scenario in known for score in scenario.scores_db]
-        margins[Kind.REPETITIONS] = margin_of(scores)
-        longest = max(each.duration for each in references)
+        margins[Kind.REPETITIONS] = margin_of([db for each in known for db in each.scores_db])
+        longest = max(each.duration for each, _ in aligned)
         if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
             remarks.append(
                 f"longer than its scenario, {run.duration:.1f} of {longest:.1f} s: the rest is"
                 " compared with other motions"
             )
     left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
-    others = _repetitions([each for each in known if each not in matched]) or references
+    others = _repetitions([each for each in known if each not in matched] or matched)
     if over.size and len(left) and others:
         found = _over_others(run, left, others, cells)
         covered = np.asarray(np.isfinite(found).any(axis=(1, 2, 3)))
         over[left[covered]] = found[covered]
         kind[left[covered]] = KINDS.index(Kind.OTHER_MOTIONS)
-        scores = [score for scenario in known for score in scenario.elsewhere_db]
-        margins[Kind.OTHER_MOTIONS] = margin_of(scores)
+        margins[Kind.OTHER_MOTIONS] = margin_of([db for each in known for db in each.elsewhere_db])
     score = scores_of(over)
     return Comparison(
         run,
         cells.joints,
         cells.octaves,
         tuple(each.name for each in matched),
-        len(references),
+        len(aligned),
         kind,
         over,
         score,
@@ -340,7 +338,7 @@ def leave_one_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
         cells = Cells.shared(run, others)
         aligned = _aligned(run, others, cells.joints)
         if aligned:
-            found.append(_top(scores_of(_over_repetitions(run, others, aligned, cells)[0])))
+            found.append(_top(scores_of(_over_repetitions(run, aligned, cells)[0])))
     return tuple(score for score in found if np.isfinite(score))
 
 
@@ -377,11 +375,7 @@ def _common(
         there = " or ".join(sorted(set(others))) or "nothing"
         return Cells((), ()), [f"no reference: it is of {there}, and the run of {own}"]
     every = _repetitions(known)
-    cells = Cells(
-        tuple(j for j in run.joints if any(j in each.joints for each in every)),
-        tuple(o for o in run.octaves if any(o in each.octaves for each in every)),
-    )
-    remarks = []
+    cells, remarks = Cells.shared(run, every, any), []
     if lacking := [joint for joint in run.joints if joint not in cells.joints]:
         remarks.append(f"no reference for joints {', '.join(lacking[:5])}")
     if len(cells.octaves) < len(run.octaves):
@@ -396,19 +390,18 @@ def _common(
 
 def _matching(
     run: Levels, known: Sequence[Scenario], joints: Sequence[str]
-) -> tuple[list[Scenario], "list[Aligned]", list[str]]:
+) -> tuple[list[Scenario], "Paths", list[str]]:
     """Scenarios of the run's motion, of several the one with its name; all their repetitions."""
     usable = [each for each in known if len(each.repetitions[-1].guide)]
     named = [each for each in usable if each.name == run.name]
     aligned = _aligned(run, _repetitions(named), joints)
     # A run that lies on the motion of its name needs no other scenario.
-    if aligned and aligned[-1].share >= SAME_NAME:
+    if aligned and aligned[-1][1].share >= SAME_NAME:
         return named, aligned, []
-    aligned = _aligned(run, [each.repetitions[-1] for each in usable], joints)
-    least = max(SAME_MOTION, ALIKE * max((each.share for each in aligned), default=0.0))
     # Nothing is aligned where no joint is shared.
-    pairs = zip(usable, aligned, strict=False)
-    found = [each for each, own in pairs if own.share >= least]
+    shares = [own.share for _, own in _aligned(run, [e.repetitions[-1] for e in usable], joints)]
+    least = max(SAME_MOTION, ALIKE * max(shares, default=0.0))
+    found = [each for each, own in zip(usable, shares, strict=False) if own >= least]
     told = []
     if len(found) > 1:
         names = ", ".join(each.name for each in found)
@@ -425,7 +418,7 @@ def share_of_motion(run: Levels, other: Levels) -> float:
     """Share of a run that lies on the motion of another."""
     if not len(run.guide) or not len(other.guide) or not set(run.joints) & set(other.joints):
         return 0.0
-    return _aligned(run, [other], run.joints)[0].share
+    return _aligned(run, [other], run.joints)[0][1].share
 
 
 # --- exceedances
@@ -473,18 +466,18 @@ def _spread(level: Real32) -> Real32:
 
 
 def _over_repetitions(
-    run: Levels, references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells
+    run: Levels, aligned: "Paths", cells: Cells
 ) -> tuple[Real32, NDArray[np.bool_]]:
     """Exceedance over the loudest repetition, NaN without one, and frames that one covers."""
     loudest = cells.unknown(len(run.guide))
-    for each, path in zip(references, aligned, strict=True):
+    for each, path in aligned:
         loud = _spread(cells.of(each))[path.frame]
         loud[~path.same] = np.nan
         np.fmax(loudest, loud, out=loudest)
         del loud  # as large as a run
-    floor = _floor(references, cells)
+    floor = _floor([each for each, _ in aligned], cells)
     over = _raised(cells.of(run), floor) - _raised(loudest, floor)
-    return over, np.any([path.same for path in aligned], axis=0)
+    return over, np.any([path.same for _, path in aligned], axis=0)
 
 
 def _over_others(
@@ -551,23 +544,21 @@ def _nearest(
     return near, close
 
 
-def _quieter(
-    run: Levels, references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells
-) -> float:
+def _quieter(run: Levels, aligned: "Paths", cells: Cells) -> float:
     """By how much the run is quieter than each repetition in its loudest joint, in [dB]."""
-    floor, margins = _floor(references, cells), []
+    floor, margins = _floor([each for each, _ in aligned], cells), []
     own = _raised(_spread(cells.of(run)), floor)
-    for repetition, path in zip(references, aligned, strict=True):
+    for repetition, path in aligned:
         over = _raised(cells.of(repetition)[path.frame], floor) - own
         over[~path.same] = np.nan
         margins.append(_top(scores_of(over)))
     return max(0.0, min((each for each in margins if np.isfinite(each)), default=0.0))
 
 
-def _band(references: Sequence[Levels], aligned: "Sequence[Aligned]", cells: Cells) -> Array:
+def _band(aligned: "Paths", cells: Cells) -> Array:
     """Quietest and loudest repetition at each frame of the run, shape (frames, 2)."""
-    low = high = np.full(len(aligned[0].frame), np.nan)
-    for each, path in zip(references, aligned, strict=True):
+    low = high = np.full(len(aligned[0][1].frame), np.nan)
+    for each, path in aligned:
         noise = np.where(path.same, cells.noise(each)[path.frame], np.nan)
         low, high = np.fmin(low, noise), np.fmax(high, noise)
     return np.stack((low, high), axis=1)
@@ -630,7 +621,10 @@ class Aligned:
         return float(np.mean(self.same))
 
 
-def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> list[Aligned]:
+Paths: TypeAlias = list[tuple[Levels, Aligned]]
+
+
+def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> Paths:
     """Where the run lies in each of the others, by the joints that all have; nothing without one.
 
     Positions count from zero if some are integrated.
@@ -644,7 +638,7 @@ def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> li
     if any(each.guided_by.endswith("velocities") for each in runs):
         firsts = [each.first[at] for each, at in zip(runs, places, strict=True)]
         guides = [guide - first for guide, first in zip(guides, firsts, strict=True)]
-    return align(guides[0], guides[1:])
+    return list(zip(others, align(guides[0], guides[1:]), strict=True))
 
 
 def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:

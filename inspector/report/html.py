@@ -381,7 +381,7 @@ def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
                     for key in dict.fromkeys([(name, ""), (name, joint)]):
                         found[key][commit] += 1
     every = [("dB", *each) for each in over.items()]
-    found = {(name, ""): none() for name in runs} | found
+    found |= {(name, ""): none() for name in runs if (name, "") not in found}
     every += [("findings", of, number / runs[of[0]]) for of, number in found.items()]
     for unit, (name, joint), value in every:
         yield Series(f"{name}, {joint}" if joint else name, joint, unit, value)
