@@ -17,14 +17,7 @@ import numpy as np
 import rerun as rr
 
 from inspector import colors
-from inspector.analysis import (
-    Analysis,
-    analyse,
-    robot_known,
-    with_links,
-    worst_joint,
-    worst_signal,
-)
+from inspector.analysis import Analysis, analyse, robot_known, with_links, worst_joint, worst_signal
 from inspector.errors import InspectorError
 from inspector.levels import FLOOR_DB, LINKS, SPECTRUM, STEP, Spectrogram, link_levels, spectrogram
 from inspector.library import Library

@@ -300,11 +300,7 @@ def frozen(run: Levels, references: Sequence[Levels]) -> float | None:
 
 
 def judge(
-    verdict: Verdict,
-    reference: Reference | None = None,
-    *,
-    gate: Gate | None = None,
-    today: date,
+    verdict: Verdict, reference: Reference | None = None, *, gate: Gate | None = None, today: date
 ) -> Verdict:
     """Apply what a reference wants and waives on a day, and a gate, to what was found in a run."""
     if verdict.status in UNREAD:
