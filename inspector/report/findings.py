@@ -7,6 +7,7 @@ of which some may not count. Both are localised by the same words.
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 
 from inspector.analysis import Analysis
@@ -82,12 +83,7 @@ def facts(analysis: Analysis) -> str:
 
 
 def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "", found: str = "") -> str:
-    """Class, time, score, novelty and localisation of an event, in a line.
-
-    Args:
-        bold: Mark about the class.
-        found: What became of an annotated failure.
-    """
+    """Class, what became of it, time, score, novelty and localisation of an event, in a line."""
     stage, joints, band, links = localised(analysis, event)
     named = {"joints": joints, "loudest links": links, "": band, "first in": stage}
     where = "; ".join(f"{name} {part}".strip() for name, part in named.items() if part)
@@ -113,14 +109,17 @@ def annotated(analysis: Analysis, *, bold: str = "") -> list[str]:
     """Annotated failures and what became of them; where one was found, that says the rest."""
     lines = []
     for block in analysis.run.blocks:
-        became = matched(analysis, block)
         if block.label == "ok":
             continue
-        if finding_of(analysis, block) is not None:
+        if event := finding_of(analysis, block):
             when = interval(block.start, block.stop)
-            lines.append(f"{bold}{spoken(block.label)}{bold}, {when}: found, {became}")
+            found = f"found, {event.start:.2f} s to {event.stop:.2f} s"
+            lines.append(f"{bold}{spoken(block.label)}{bold}, {when}: {found}")
             continue
-        found = f", found {became}" if became not in ("", "no") else ", not found" if became else ""
+        there = [e for e in analysis.findings if e.start < block.stop and block.start < e.stop]
+        others = ", ".join(map(spoken, sorted({event.label for event in there})))
+        found = f", found as {others}" if others else ", not found"
+        found = "" if analysis.labels is None else found
         lines.append(sentence(analysis, block, bold=bold, found=found))
     return lines
 
@@ -134,17 +133,6 @@ def finding_of(analysis: Analysis, block: Block) -> Event | None:
     }
     longest = max(shared, key=shared.__getitem__, default=None)
     return longest if longest is not None and shared[longest] > 0.0 else None
-
-
-def matched(analysis: Analysis, block: Block) -> str:
-    """What became of an annotated failure: when it was found, in words; nothing of `ok`."""
-    if block.label == "ok" or analysis.labels is None:
-        return ""
-    event = finding_of(analysis, block)
-    if event is not None:
-        return f"{event.start:.2f} s to {event.stop:.2f} s"
-    others = {e.label for e in analysis.findings if e.start < block.stop and block.start < e.stop}
-    return f"as {', '.join(map(spoken, sorted(others)))}" if others else "no"
 
 
 def classes_of(analysis: Analysis) -> tuple[str, ...]:
@@ -264,11 +252,7 @@ class Group:
 
 
 def folded(found: Iterable[tuple[Path, Finding]], runs: int) -> list[tuple[Path, Finding, str]]:
-    """Findings of repetitions by run: the loudest of those that are one, and how many runs have it.
-
-    Args:
-        runs: How many repetitions there are.
-    """
+    """Findings by run: of those that are one the loudest, and how many of so many runs have it."""
     groups: list[list[tuple[Path, Finding]]] = []
     for run, event in found:
         for group in groups:
@@ -329,13 +313,10 @@ def table(rows: Sequence[Sequence[str]], gap: str = "   ") -> list[str]:
     A row of fewer cells ends with a sentence, which may reach over the columns to its right.
     """
     most = max(map(len, rows), default=0)
-    widths = [0] * most
-    for cells in rows:
-        for place, cell in enumerate(cells if len(cells) == most else cells[:-1]):
-            widths[place] = max(widths[place], len(cell))
+    kept = [cells if len(cells) == most else cells[:-1] for cells in rows]
+    widths = [max(map(len, column)) for column in zip_longest(*kept, fillvalue="")]
     lines = []
     for cells in rows:
-        padded = [cell.ljust(width) for cell, width in zip(cells, widths, strict=False)]
-        used = [cell for cell, width in zip(padded, widths, strict=False) if width or cell]
-        lines.append(gap.join(used).rstrip())
+        pairs = zip(cells, widths, strict=False)
+        lines.append(gap.join(cell.ljust(width) for cell, width in pairs if width or cell).rstrip())
     return lines
