@@ -8,7 +8,7 @@ from inspector.levels import SPECTRUM
 from inspector.library import label_run
 from inspector.live.drawing import LiveRobot, Messages, SpectrogramStream
 from inspector.live.labels import Labeller, noise_signal
-from inspector.live.samples import Clock, Warnings
+from inspector.live.session import Clock, Warnings
 from inspector.recording import robot as scene
 from inspector.recording.robot import FIELD_OF_VIEW, sight
 

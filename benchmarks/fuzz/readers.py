@@ -28,7 +28,7 @@ from inspector.errors import InspectorError
 from inspector.export import read_labels
 from inspector.library import load_library, model_files
 from inspector.live import pipe
-from inspector.live.samples import Clock, Warnings
+from inspector.live.session import Clock, Warnings
 from inspector.logs.clocks import ordered, stamps_of
 from inspector.logs.mapping import ReadOptions, Track, parse_mapping
 from inspector.logs.names import (

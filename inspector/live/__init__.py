@@ -8,7 +8,7 @@ what is drawn comes in columns. Nothing is dropped silently: what cannot be show
 warned of once per kind.
 """
 
-from inspector.live.samples import LiveError, SinkError
-from inspector.live.session import LiveSession, Summary
+from inspector.live.drawing import SinkError
+from inspector.live.session import LiveError, LiveSession, Summary
 
 __all__ = ["LiveError", "LiveSession", "SinkError", "Summary"]

@@ -18,9 +18,9 @@ from rerun.blueprint import Blueprint
 
 import noisemodel as nm
 from inspector import colors
+from inspector.errors import InspectorError
 from inspector.levels import SPECTRUM, amplitudes, extremes, in_bands, window_length
 from inspector.live.labels import Labeller
-from inspector.live.samples import SinkError
 from inspector.recording import panels, viewer, views
 from inspector.recording import robot as scene
 from inspector.recording.run import writing
@@ -48,6 +48,10 @@ CHECK_INTERVAL = 1.0  # time between checks that the viewer is still there, in [
 LATE = 10.0  # how far behind the stream a viewer may be before it is sent no more, in [s]
 FLUSH_TIMEOUT = 5.0  # how long the last messages may take, in [s]
 MEMORY = "2GB"  # what a viewer that is opened here may keep; then it drops the oldest
+
+
+class SinkError(InspectorError):
+    """A viewer or a file that nothing can be drawn into."""
 
 
 class Sink:

@@ -19,8 +19,7 @@ from typing import Any, BinaryIO, TypeAlias, TypeVar
 import numpy as np
 
 from inspector.errors import EXIT, Status
-from inspector.live.samples import SIGNALS, LiveError
-from inspector.live.session import LiveSession, Summary
+from inspector.live.session import SIGNALS, LiveError, LiveSession, Summary
 from inspector.logs.clocks import UNITS
 from inspector.logs.csv import numbers_in
 from inspector.logs.names import (
