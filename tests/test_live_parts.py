@@ -125,10 +125,9 @@ def test_rates_that_no_model_fits_have_no_labels_and_a_remark(rate, remark):
     library = {"slow": fixed(), "fast": fixed(rate=10_000.0)}  # that take the noise alone
     labeller = Labeller(library, rate, {"velocity": 3})
     assert labeller.remark.startswith(remark)
-    assert labeller.push(np.ones((900, 3)), np.ones(900, dtype=bool)) is None
+    assert labeller.push(np.ones((900, 3)), np.ones(900, dtype=bool), 0.9) is None
     labeller.skip(100)
     assert labeller.classes == ()
-    assert labeller.elapsed == 1000 / rate
 
 
 def streamed(run):
@@ -136,7 +135,9 @@ def streamed(run):
     labeller = Labeller({"general": trained()}, run.rate, {"velocity": 3, "velocity_desired": 3})
     motion = np.hstack((run.velocity, run.velocity_desired))
     ones = np.ones(len(motion), dtype=bool)
-    parts = [labeller.push(motion[i : i + 37], ones[i : i + 37]) for i in range(0, len(motion), 37)]
+    pieces = [slice(i, min(i + 37, len(motion))) for i in range(0, len(motion), 37)]
+    parts = [labeller.push(motion[p], ones[p], p.stop / run.rate) for p in pieces]
+    parts = [part for part in parts if part is not None]
     fields = ("start", "label", "scores")
     return labeller, {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in fields

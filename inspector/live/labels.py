@@ -41,6 +41,7 @@ class Labeller:
         self.classes, self.length, self.hop = tuple[str, ...](), 0.0, 0.0
         self._stream: nc.Stream | None = None
         self._samples = 0
+        self._shift: float | None = None  # from the first sample to the clock of the samples, [s]
         self._base, self._joints, desired = (widths.get(name, 0) for name in NOISY)
         kinds = ("desired", "measured", "error") if desired else ("measured",)
         there = (NOISE, *kinds, *(f"{kind}_joints" for kind in kinds))
@@ -61,13 +62,8 @@ class Labeller:
         self._stream = nc.Stream(chosen, rate=rate, joints=self._joints)
         self._lasting, self._bursts = nc.Lasting(rate), nc.Bursts(rate)
 
-    @property
-    def elapsed(self) -> float:
-        """Time since the first sample, lost ones counted, in [s]: the clock of the labels."""
-        return self._samples / self.rate
-
-    def push(self, motion: Array, valid: Mask) -> Labels | None:
-        """Take a motion, shape (samples, columns); labels now complete, None without a model."""
+    def push(self, motion: Array, valid: Mask, end: float) -> Labels | None:
+        """Take a motion, shape (samples, columns), that ends at a time; labels now complete."""
         self._samples += len(motion)
         if self._stream is None:
             return None
@@ -77,17 +73,24 @@ class Labeller:
         )
         self._lasting.push(followed, valid)
         self._bursts.push(followed, valid)
-        return self._stream.push(signals, valid)
+        labels = self._stream.push(signals, valid)
+        if not len(labels):
+            return None
+        shift = end - self._samples / self.rate
+        self._shift = shift if self._shift is None else self._shift
+        return replace(labels, start=labels.start + shift, stop=labels.stop + shift)
 
     @property
     def lasting(self) -> tuple[Event, ...]:
-        """What lasts, and bursts, so far, on the clock of the labels."""
-        return () if self._stream is None else (*self._lasting.events, *self._bursts.events)
+        """What lasts, and bursts, so far."""
+        shift = self._shift or 0.0
+        found = () if self._stream is None else (*self._lasting.events, *self._bursts.events)
+        return tuple(replace(e, start=e.start + shift, stop=e.stop + shift) for e in found)
 
     @property
     def decided(self) -> float:
-        """Time before which nothing begins any more that lasts, on the clock of the labels."""
-        return inf if self._stream is None else self._lasting.decided
+        """Time before which nothing begins any more that lasts."""
+        return inf if self._stream is None else self._lasting.decided + (self._shift or 0.0)
 
     def finish(self) -> None:
         """End the signal."""

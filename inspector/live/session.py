@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 from pathlib import Path
@@ -382,7 +382,6 @@ class LiveSession:
         self._samples = self._unconfirmed = 0  # since the viewer was last known to be there
         self._counts: Counter[str] = Counter()  # frames that were labelled, by class
         self._levels: Levels | None = None
-        self._shift: float | None = None  # from the clock of the labels to that of the samples
         self._closed = False
         self._sink = Sink(Path(save) if save else None, connect, overwrite=overwrite)
 
@@ -559,16 +558,7 @@ class LiveSession:
     @property
     def _found(self) -> tuple[Event, ...]:
         """The findings so far, as if the signal ended here."""
-        return self._with_lasting(self._findings.events)
-
-    def _with_lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
-        """Findings of the labels and of what lasts, on the clock of the samples."""
-        shift = self._shift or 0.0
-        lasting = (
-            replace(each, start=each.start + shift, stop=each.stop + shift)
-            for each in self._labeller.lasting
-        )
-        return merged(*events, *lasting)
+        return merged(*self._findings.events, *self._labeller.lasting)
 
     def _tell(self, event: Event, over: bool) -> None:
         self._drawing.found(event, over)
@@ -616,16 +606,13 @@ class LiveSession:
 
     def _label(self, time: Array, motion: Array, valid: Mask) -> None:
         """Label and draw a stretch without missing samples."""
-        labels = self._labeller.push(motion, valid)
-        if labels is None or not len(labels):
-            return
         end = float(time[-1]) + 1.0 / self._rate
-        shift = end - self._labeller.elapsed
-        labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
+        labels = self._labeller.push(motion, valid, end)
+        if labels is None:
+            return
         self._findings.add(labels)
-        self._shift = shift if self._shift is None else self._shift
-        told = self._with_lasting(self._findings.confirmed)
-        decided = min(self._findings.decided, self._labeller.decided + self._shift)
+        told = merged(*self._findings.confirmed, *self._labeller.lasting)
+        decided = min(self._findings.decided, self._labeller.decided)
         self._news.update(told, decided, float(labels.stop[-1]))
         self._counts.update(labels.raw.tolist())
         self._drawing.labels(labels)
