@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from ctypes.util import find_library
 from dataclasses import dataclass
@@ -219,13 +219,7 @@ def serving(recording: Path, *, port: int = 0) -> Iterator[tuple[str, Process]]:
     made to point to this machine (DNS rebinding) could read a recording from it. So rerun serves
     the empty viewer only, and the recording comes from here, to those who ask for this host.
     """
-
-    class Relay(_Relay):
-        """Of this recording."""
-
-    with socketserver.ThreadingTCPServer((HOST, free_port(port)), Relay, False) as server:
-        server.allow_reuse_address = server.daemon_threads = True
-        server.server_bind()
+    with _Server((HOST, free_port(port)), _Relay) as server:
         taken = server.server_address[1]
         page, other = (free_port(other=taken) for _ in range(2))
         ports = ("--web-viewer-port", str(page), "--port", str(other))
@@ -235,9 +229,8 @@ def serving(recording: Path, *, port: int = 0) -> Iterator[tuple[str, Process]]:
                     silent = f"the viewer does not respond on port {page}"
                     late = f"{silent}, {SERVE_TIMEOUT:g} s after its start"
                     raise ViewerError(viewer.ended() or late)
-                Relay.recording, Relay.page = recording, page
-                Relay.hosts = {f"{name}:{taken}" for name in (HOST, "localhost")}
-                server.server_activate()
+                server.recording, server.page = recording, page
+                server.hosts = {f"{name}:{taken}" for name in (HOST, "localhost")}
                 Thread(target=server.serve_forever, daemon=True).start()
                 address = f"http://{HOST}:{taken}"
                 try:
@@ -251,27 +244,31 @@ def serving(recording: Path, *, port: int = 0) -> Iterator[tuple[str, Process]]:
 RECORDING = "/recording.rrd"
 
 
+class _Server(socketserver.ThreadingTCPServer):
+    allow_reuse_address = daemon_threads = True
+    recording: Path
+    page: int  # port of the viewer's page
+    hosts: Collection[str]  # that are answered
+
+
 class _Relay(BaseHTTPRequestHandler):
     """Hands out the recording, and the viewer's page."""
 
-    recording: Path
-    page: int
-    hosts: set[str]
+    server: _Server
 
     def do_GET(self) -> None:  # as the base class names it
         """Answer a request."""
-        if self.headers.get("Host") not in self.hosts:
+        if self.headers.get("Host") not in self.server.hosts:
             self.send_error(403, "this host is not served")
             return
         if self.path.partition("?")[0] == RECORDING:
-            with self.recording.open("rb") as file:
-                size = self.recording.stat().st_size
-                self._head(
-                    200, {"Content-Type": "application/octet-stream", "Content-Length": size}
-                )
+            with self.server.recording.open("rb") as file:
+                size = os.fstat(file.fileno()).st_size
+                kind = "application/octet-stream"
+                self._head(200, {"Content-Type": kind, "Content-Length": size})
                 shutil.copyfileobj(file, self.wfile)
             return
-        upstream = HTTPConnection(HOST, self.page, timeout=SERVE_TIMEOUT)
+        upstream = HTTPConnection(HOST, self.server.page, timeout=SERVE_TIMEOUT)
         try:
             accepted = {"Accept-Encoding": self.headers.get("Accept-Encoding", "identity")}
             upstream.request("GET", self.path, headers=accepted)
