@@ -27,6 +27,7 @@ from inspector import colors
 from inspector.colors import Color
 from inspector.errors import InspectorError
 from inspector.levels import Scale
+from noiseclassifier.matching import union
 from noisemodel.types import Array, Real
 
 Part: TypeAlias = rrb.View | rrb.Container  # a view, or views that are arranged
@@ -161,7 +162,9 @@ def blueprint(
 ) -> rrb.Blueprint:
     """Fill the window with a part; playing repeats a stretch of time, if there is one, in [s]."""
     playing: Literal["following", "paused"] = "following" if following else "paused"
-    selected = None if loop is None else rrb.components.AbsoluteTimeRange(*map(_nanoseconds, loop))
+    selected = None
+    if loop is not None:
+        selected = rrb.components.AbsoluteTimeRange(*(round(1e9 * each) for each in loop))
     time = rrb.TimePanel(
         state="collapsed",
         timeline=TIMELINE,
@@ -201,18 +204,12 @@ def log_stretches(
         return
     copies = COPIES if opaque else 1
     middle, half = (between[0] + between[1]) / 2, (between[1] - between[0]) / 2
-    apart: list[tuple[int, int]] = []
-    for start, stop in sorted(
-        (_nanoseconds(start), _nanoseconds(stop)) for start, stop in stretches
-    ):
-        if apart and start <= apart[-1][1] + 1:
-            start, stop = apart[-1][0], max(stop, apart.pop()[1])
-        apart.append((start, stop))
-    # A value that is none ends a band.
-    times = np.array([(start, stop, stop + 1) for start, stop in apart], dtype=np.int64).ravel()
+    whole = np.round(1e9 * np.array(stretches)).astype(np.int64)
+    start, after = union(whole + np.array([0, 1])).T
+    apart = np.stack((start, after - 1, after), axis=1)  # a value that is none ends a band
     values = np.tile([middle, middle, np.nan], len(apart))[:, None].repeat(copies, axis=1)
     style_bands(recording, path, [name], [color], copies)
-    index = rr.TimeColumn(TIMELINE, duration=times.astype("timedelta64[ns]"))
+    index = rr.TimeColumn(TIMELINE, duration=apart.ravel().astype("timedelta64[ns]"))
     recording.send_columns(path, indexes=[index], columns=band_columns(values, half))
 
 
@@ -235,10 +232,6 @@ def style_bands(
 def band_columns(middles: Array, half: float) -> Iterable[Any]:
     """Columns of bands along a plot, shape (points, bands); NaN draws nothing."""
     return rr.Measurements.columns(values=middles, variances=np.full_like(middles, half**2))
-
-
-def _nanoseconds(seconds: float) -> int:
-    return round(seconds * 1e9)
 
 
 def abandon(recording: rr.RecordingStream) -> None:
