@@ -70,16 +70,21 @@ HEAT = np.array(
 )
 
 
+# Blue is before and quieter, orange is after and louder; what did not change is grey.
+BEFORE, SAME, AFTER = (86, 180, 233), (62, 68, 80), (240, 160, 30)
+
+
 def heat(level: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Colour levels from 0 to 1; `inspector.levels` has the scales in decibels.
+    """Colour levels from 0 to 1, by red, green, blue and opacity, shape (…, 4)."""
+    return _between(HEAT, level)
 
-    Args:
-        level: Any shape.
 
-    Returns:
-        Red, green, blue and opacity, shape (…, 4).
-    """
-    place = np.clip(level, 0.0, 1.0) * (len(HEAT) - 1)
-    steps = np.arange(len(HEAT))
-    channels = [np.interp(place, steps, HEAT[:, channel]) for channel in range(3)]
+def diverging(level: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Colour changes: blue at 0, grey at 0.5, orange at 1."""
+    return _between(np.array([BEFORE, SAME, AFTER], dtype=np.float64), level)
+
+
+def _between(shades: NDArray[np.float64], level: NDArray[np.floating]) -> NDArray[np.uint8]:
+    place, steps = np.asarray(level) * (len(shades) - 1), np.arange(len(shades))
+    channels = [np.interp(place, steps, shades[:, channel]) for channel in range(3)]
     return np.stack([*channels, np.full(place.shape, 255.0)], axis=-1).astype(np.uint8)

@@ -26,6 +26,7 @@ from recordings import (
 from rerun.chunk import RrdReader
 from test_pair_pair import compared
 
+from inspector import colors
 from inspector.compare import write
 from inspector.levels import LINKS as LINK_SCALE
 from inspector.levels import link_levels
@@ -89,8 +90,8 @@ def test_every_entity_has_its_columns_and_there_is_no_other(whole):
 def test_both_noises_lie_over_each_other_in_two_colours_and_twice_is_6_db(whole):
     path, pair = whole
     for name, side, color in (
-        ("before", pair.before, panels.BEFORE),
-        ("after", pair.after, panels.AFTER),
+        ("before", pair.before, colors.BEFORE),
+        ("after", pair.after, colors.AFTER),
     ):
         time, noise = scalars(path, f"/noise/{name}")
         scale = side.noise[5] / noise[5, 0]
@@ -176,9 +177,9 @@ def test_both_robots_are_seen_from_one_place_and_coloured_by_one_scale_of_levels
 def test_colours_distinguish_louder_from_quieter_and_grow_with_the_change():
     levels = np.array([-12.0, 0.0, 3.0, 40.0])
     quieter, same, louder, much = panels.CHANGE.colours(levels, shades=25)[:, :3]
-    assert tuple(quieter) == panels.BEFORE
-    assert tuple(same) == panels.SAME
-    assert tuple(much) == panels.AFTER
+    assert tuple(quieter) == colors.BEFORE
+    assert tuple(same) == colors.SAME
+    assert tuple(much) == colors.AFTER
     assert same[0] < louder[0] < much[0]
 
 
@@ -210,7 +211,7 @@ def test_a_run_beside_itself_changes_nothing_that_is_drawn(tmp_path):
     path = tmp_path / "out.rrd"
     assert not scalars(path, "/change/noise")[1].any()
     rgba = read(path, "/spectrogram/change/**", "SeriesLines:colors")[1]
-    assert {row[0] for row in rgba} == {int.from_bytes([*panels.SAME, 255], "big")}
+    assert {row[0] for row in rgba} == {int.from_bytes([*colors.SAME, 255], "big")}
     assert [e for e in entities(path) if e.startswith("/level/change/")] == [
         "/level/change/unchanged"
     ]

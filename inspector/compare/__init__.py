@@ -477,13 +477,13 @@ def report(pair: Pair) -> str:
 
 # --- the recording
 
-SIDE_COLORS = {"before": panels.BEFORE, "after": panels.AFTER}
+SIDE_COLORS = {"before": colors.BEFORE, "after": colors.AFTER}
 # Of changes: the colour of the run that has them.
 SHADES = {
-    NEW: panels.AFTER,
-    LOUDER: panels.AFTER,
-    RESOLVED: panels.BEFORE,
-    QUIETER: panels.BEFORE,
+    NEW: colors.AFTER,
+    LOUDER: colors.AFTER,
+    RESOLVED: colors.BEFORE,
+    QUIETER: colors.BEFORE,
     UNCHANGED: views.INK,
 }
 NOISE_POINTS = 60_000  # of each run's noise

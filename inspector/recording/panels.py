@@ -11,7 +11,6 @@ from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from rerun.components import MarkerShapeLike
 
 from inspector import colors, levels
@@ -470,20 +469,9 @@ def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> list[
     return [log_strip(recording, "joints", title, edges, level, names, which, scale)]
 
 
-# Blue is before and quieter, orange is after and louder; what did not change is grey.
-BEFORE, AFTER, SAME = (86, 180, 233), (240, 160, 30), (62, 68, 80)
-
-
-def diverging(place: Array) -> NDArray[np.uint8]:
-    """Colour changes, red, green, blue and opacity: blue at 0, grey at 0.5, orange at 1."""
-    scale = np.array([BEFORE, SAME, AFTER], dtype=np.float64)
-    channels = [np.interp(place, (0.0, 0.5, 1.0), scale[:, channel]) for channel in range(3)]
-    return np.stack([*channels, np.full(np.shape(place), 255.0)], axis=-1).astype(np.uint8)
-
-
 # Of levels; what is beyond is as blue or as orange as can be. The number of colours is odd, so that
 # no change has one of its own.
-CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging, shades=25)
+CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=colors.diverging, shades=25)
 
 
 def log_over(recording: rr.RecordingStream, beside: Comparison) -> Timed:
