@@ -20,7 +20,7 @@ from inspector.analysis import Analysis, analyse, with_links
 from inspector.errors import Status
 from inspector.library import Library, load_library
 from inspector.reference import store
-from inspector.reference.judging import Comparison
+from inspector.reference.judging import Comparison, Expected
 from inspector.reference.levels import Levels, levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, classes_found, judge
@@ -28,7 +28,6 @@ from inspector.report.findings import told
 from inspector.signals import without_placeholder
 from inspector.text import counted
 from inspector.verdict import EXPECTED, Finding, Verdict
-from noiseclassifier import Event
 from noisemodel import Run
 
 # A class of findings; or a class, and from when to when, in [s].
@@ -81,25 +80,30 @@ class Noise:
             raise ValueError("no run to check; expected one at least")
         folder = Path(self._node.path).parent
         with _readable():
-            loaded = [each if isinstance(each, Run) else Run.load(each) for each in given]
+            loaded = [(each if isinstance(each, Run) else Run.load(each), each) for each in given]
             accepted = store.find(folder) or folder / store.FOLDER
             if reason := self._config.getoption("--noise-accept"):
-                self._accept(loaded, given, scenario, reason, accepted)
+                self._accept(loaded, scenario, reason, accepted)
                 return []
             there = accepted.exists()
             reference = Reference.load(accepted) if there else Reference(accepted, stored=True)
+        stretches = [Expected(*((each,) if isinstance(each, str) else each)) for each in allowed]
         verdicts = []
-        for run, source in zip(loaded, given, strict=True):
+        for run, source in loaded:
             shown = "the run" if isinstance(source, Run) else str(source)
             with _readable():
                 analysis, verdict, comparison = self._judged(run, scenario, reference)
             if verdict.status is Status.CANNOT_TELL and Status.CANNOT_TELL not in allowed:
                 cause = f"cannot tell whether {shown} is quiet: {analysis.reason}"
                 pytest.fail(cause, pytrace=False)
-            events = [event for event in verdict.failing if not _allows(allowed, event)]
+            events = [
+                event
+                for event in verdict.failing
+                if not any(each.covers(event.label, event.start, event.stop) for each in stretches)
+            ]
             if events or verdict.missing:
                 left = self._leave(stem, analysis, comparison, shown)
-                pytest.fail(_told(analysis, verdict, events, shown, left), pytrace=False)
+                pytest.fail(_told(verdict, events, shown, left), pytrace=False)
             verdicts.append(verdict)
         return verdicts
 
@@ -115,16 +119,11 @@ class Noise:
         return analysis, judge(verdict, reference, today=date.today()), comparison
 
     def _accept(
-        self,
-        runs: Sequence[Run],
-        given: Sequence[Given],
-        scenario: str,
-        reason: str,
-        accepted: Path,
+        self, runs: Sequence[tuple[Run, Given]], scenario: str, reason: str, accepted: Path
     ) -> None:
         """Accept runs as repetitions of a scenario; another test process may do so, too."""
         measured, events = [], {}
-        for place, (run, source) in enumerate(zip(runs, given, strict=True), 1):
+        for place, (run, source) in enumerate(runs, 1):
             file = str(source) if source is not run else f"{self._node.nodeid} {place}"
             measured.append(_levels(run, scenario, file=file, sha256=store.digest(run)))
             events[file] = self._judged(run, scenario)[1].events
@@ -173,15 +172,9 @@ def _levels(run: Run, scenario: str, **known: str) -> Levels:
     return levels(without_placeholder(run)[0], name=scenario, **known)
 
 
-def _told(
-    analysis: Analysis,
-    verdict: Verdict,
-    events: Sequence[Finding],
-    shown: str,
-    left: dict[str, Path],
-) -> str:
+def _told(verdict: Verdict, events: Sequence[Finding], shown: str, left: dict[str, Path]) -> str:
     """What fails a test, the worst in the first line, and the files that are left."""
-    by = verdict.beside.words if verdict.beside else f"by model {analysis.model}"
+    by = verdict.beside.words if verdict.beside else f"by model {verdict.model}"
     number = counted(len(events) + len(verdict.missing), "finding")
     first = told(events[0], verdict.beside, short=True) if events else str(verdict.missing[0])
     lines = [f"noise: {first} ({verdict.path})", f"{number} in {shown}, {by}"]
@@ -201,21 +194,8 @@ def _readable() -> Iterator[None]:
         raise pytest.fail.Exception(str(error), pytrace=False) from None
 
 
-def _allows(allowed: Iterable[Allowed], event: Event) -> bool:
-    return any(
-        each == event.label
-        if isinstance(each, str)
-        else each[0] == event.label and each[1] <= event.start and event.stop <= each[2]
-        for each in allowed
-    )
-
-
 def name_of(test: str) -> str:
-    """Name the files of a test by its node id, differently for each test.
-
-    Args:
-        test: The node id. Where another test could have its name, a hash of it is added.
-    """
+    """Name files by the id of a test, with a hash where another test could have its name."""
     shown = test.replace(".py::", "::").replace("/", ".")
     words = re.split(r"[^\w.]+", shown, flags=re.ASCII)
     name = "-".join(word for word in words if word).lstrip(".") or "run"

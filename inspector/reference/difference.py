@@ -46,8 +46,9 @@ class Outcome(StrEnum):
 
 
 ORDER = list(Outcome)
-# What fails whatever the levels are.
+# What fails whatever the levels are, and what one side lacks.
 BROKEN = (Outcome.MISSING, Outcome.FROZEN, Outcome.CUT)
+ALONE = (Outcome.MISSING, Outcome.ADDED)
 
 
 @dataclass(frozen=True)
@@ -123,14 +124,13 @@ class Difference:
     @property
     def outcome(self) -> Outcome:
         """The worst of all scenarios."""
-        found = (row.outcome for row in self.rows)
-        return min(found, key=ORDER.index, default=Outcome.INCONCLUSIVE)
+        outcomes = (row.outcome for row in self.rows)
+        return min(outcomes, key=ORDER.index, default=Outcome.INCONCLUSIVE)
 
     @property
     def alone(self) -> tuple[Row, ...]:
         """Scenarios that one side lacks."""
-        outcomes = (Outcome.MISSING, Outcome.ADDED)
-        return tuple(row for row in self.rows if row.outcome in outcomes)
+        return tuple(row for row in self.rows if row.outcome in ALONE)
 
     def status(self, row: Row) -> Status:
         """Whether a scenario fails."""
@@ -175,12 +175,7 @@ def difference(
     unknown: Unknown = Unknown.FINDING,
     jobs: Jobs = 1,
 ) -> Difference:
-    """Compare the runs of a folder with the runs of another.
-
-    Args:
-        margin: Least margin from which a run is louder, in [dB].
-        jobs: How many runs to work on at once.
-    """
+    """Compare the runs of a folder with the runs of another; a run is louder from a margin on."""
     sides, failed, name = [], [], ""
     for path in (before, after):
         root, of = path if path.is_dir() else None, sources([path])[0]
@@ -195,8 +190,7 @@ def difference(
         sides.append(dict(sorted(side.items())))
         if not before.is_dir() and not after.is_dir():  # two files that are named are a pair
             name = "".join(side)
-    first, second = sides
-    rows = _rows(first, second, margin)
+    rows = _rows(sides[0], sides[1], margin)
     rows.sort(key=lambda row: (ORDER.index(row.outcome), not row.new, row.name))
     result = Difference(tuple(rows), tuple(failed), margin=margin)
     if all(sides) and len(result.alone) == len(rows):
@@ -226,27 +220,23 @@ def _paths(runs: Sequence[_Run]) -> tuple[Path, ...]:
     return tuple(each.verdict.path for each in runs)
 
 
-def _scenarios(runs: Sequence[_Run]) -> tuple[Scenario, ...]:
-    return of_runs([each.levels for each in runs])
-
-
 def _rows(
     before: Mapping[str, list[_Run]], after: Mapping[str, list[_Run]], margin: float
 ) -> list[Row]:
     """A row for each scenario of either side."""
-    rows, known = [], {name: _scenarios(runs) for name, runs in before.items()}
+    rows = []
+    known = {name: of_runs([each.levels for each in runs]) for name, runs in before.items()}
     for name, runs in before.items():
         if name in after:
             rows.append(_row(name, runs, after[name], known[name], margin))
         else:
-            reason = f"{len(runs)} before, none after"
-            rows.append(Row(name, Outcome.MISSING, reason, _paths(runs)))
+            why = f"{len(runs)} before, none after"
+            rows.append(Row(name, Outcome.MISSING, why, _paths(runs)))
     every = [scenario for each in known.values() for scenario in each]
     for name in [name for name in after if name not in before]:
         verdicts = [each.compare(name, every)[1] for each in after[name]]
-        findings = tuple(_findings(verdicts, (), NEW))
-        paths = _paths(after[name])
-        rows.append(Row(name, Outcome.ADDED, "only after", (), paths, findings=findings))
+        new, paths = tuple(_findings(verdicts, (), NEW)), _paths(after[name])
+        rows.append(Row(name, Outcome.ADDED, "only after", (), paths, findings=new))
     return rows
 
 
@@ -259,7 +249,7 @@ def _row(
 ) -> Row:
     """Compare a scenario."""
     found, verdicts = zip(*(each.compare(name, scenarios) for each in later), strict=True)
-    others = _scenarios(later)
+    others = of_runs([each.levels for each in later])
     back, were = zip(*(each.compare(name, others) for each in earlier), strict=True)
     margin = max([least, *(each.margins[Kind.REPETITIONS].db for each in found if each.scenarios)])
     scores = [each.worst for each in found if each.scenarios and np.isfinite(each.worst)]

@@ -173,6 +173,11 @@ def beside(
     least = margins[Kind.REPETITIONS].db if Kind.REPETITIONS in margins else float("inf")
     quieter = comparison.quieter if comparison.quieter > least else 0.0
     peaks = zip(comparison.joints, comparison.peaks.tolist(), strict=True)
+    words, by = [str(comparison)], comparison.run.guided_by
+    if quieter:
+        words.append(f"{quieter:.1f} dB quieter than each repetition")
+    if by.startswith("measured"):
+        words.append(f"aligned by {by}: the log has no desired motion")
     known = Beside(
         path=str(reference.path),
         scenarios=comparison.scenarios,
@@ -183,7 +188,7 @@ def beside(
         joints_db={joint: round(peak, 2) for joint, peak in peaks if np.isfinite(peak)},
         quieter_db=round(quieter, 2),
         failures=tuple(_failures(comparison, reference)),
-        words=_words(comparison, quieter),
+        words="; ".join(filter(None, [*words, *comparison.remarks])),
     )
     covered = known.shares[Kind.GENERAL] < 1.0
     status = verdict.status
@@ -204,15 +209,6 @@ def seen(analysis: Analysis, verdict: Verdict) -> Analysis:
     """The analysis with the findings that are left beside a reference, as pictures show it."""
     found = tuple(event for event in verdict.failing if not event.evidence.excused)
     return replace(analysis, status=verdict.status, findings=found, spans=found)
-
-
-def _words(comparison: Comparison, quieter: float) -> str:
-    parts = [str(comparison)]
-    if quieter:
-        parts.append(f"{quieter:.1f} dB quieter than each repetition")
-    if comparison.run.guided_by.startswith("measured"):
-        parts.append(f"aligned by {comparison.run.guided_by}: the log has no desired motion")
-    return "; ".join(filter(None, [*parts, *comparison.remarks]))
 
 
 def _events(
@@ -246,11 +242,9 @@ def _events(
 
 def _named(labels: Labels | None, each: Exceedance, absorbed: Sequence[Finding]) -> Finding:
     """What the general model has for a stretch: its class, score and novelty."""
-    named = [event for event in absorbed if event.label != UNKNOWN]
-    if named:
-        return max(
-            named, key=lambda event: min(event.stop, each.stop) - max(event.start, each.start)
-        )
+    if named := [event for event in absorbed if event.label != UNKNOWN]:
+        shared = [min(event.stop, each.stop) - max(event.start, each.start) for event in named]
+        return named[shared.index(max(shared))]
     if labels is None:
         return Finding(LOUDER, each.start, each.stop, 0.0)
     inside = (labels.start < each.stop) & (labels.stop > each.start)
