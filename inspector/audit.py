@@ -28,7 +28,7 @@ import numpy as np
 
 import noiseclassifier as nc
 from inspector.errors import InspectorError, without_path
-from inspector.library import Library, nearest, signal_names
+from inspector.library import Library, signal_names
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.mapping import check_joints
 from inspector.logs.motion import limit_warnings
@@ -88,7 +88,7 @@ def observable_classes(
     """Determine the observability of each failure class."""
     logged = 2 * bandwidth.nyquist
     try:
-        name, chosen = nearest(library, rate, signals, logged=logged)
+        name, chosen = nc.nearest(library, rate, signals, logged=logged)
     except nc.ModelsError as error:
         models = library.values()
         known = [each.recipe if isinstance(each, nc.General) else each.profile for each in models]

@@ -1,6 +1,6 @@
 """The demo run and the models: those that ship, the one for a run, and what it labels."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -85,7 +85,7 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
     """
     slower = without_hold(run) if slower is None else slower
     try:
-        name, classifier = nearest(library, slower.rate, signal_names(slower), logged=run.rate)
+        name, classifier = nc.nearest(library, slower.rate, signal_names(slower), logged=run.rate)
     except nc.ModelsError as error:
         held = "" if slower is run else "measured values are held: "
         raise CannotTellError(f"{held}{error}") from error
@@ -141,23 +141,6 @@ def _watched(
         bursts.finish()
 
     return pieces(), lasting, bursts
-
-
-def nearest(
-    library: Library, rate: float, signals: Collection[str], *, logged: float
-) -> tuple[str, nc.Classifier]:
-    """Model of the nearest rate at or below the rate of a log's values, bound to them.
-
-    Where values are held, the rate at which they were logged is higher, in [Hz]: if no model takes
-    the rate of the values, it is one of a single rate that takes this one.
-    """
-    try:
-        return nc.nearest(library, rate, signals)
-    except nc.ModelsError:
-        single = {name: each for name, each in library.items() if isinstance(each, nc.Classifier)}
-        if logged == rate or not single:
-            raise
-        return nc.nearest(single, logged, signals)
 
 
 def signals_of(run: nm.Run) -> dict[str, Real]:

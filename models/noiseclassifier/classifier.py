@@ -456,11 +456,19 @@ def load(path: str | Path) -> Model:
 
 
 def nearest(
-    models: Mapping[str, Model], rate: float, signals: Collection[str] = (NOISE,)
+    models: Mapping[str, Model],
+    rate: float,
+    signals: Collection[str] = (NOISE,),
+    *,
+    logged: float | None = None,
 ) -> tuple[str, Classifier]:
     """Model of the nearest rate at or below the signals' rate, in [Hz], by name and bound to them.
 
     Of models of one rate, it is the one of most signals. A general model has any rate.
+
+    Args:
+        logged: Rate at which values that are held were logged, in [Hz]: if no model takes their own
+            rate, it is a model of one rate that takes this one.
 
     Raises:
         MissingSignalError: If each model needs a signal that is missing.
@@ -479,6 +487,9 @@ def nearest(
     if found:
         name = max(found, key=lambda each: (found[each].rate, len(found[each].profile.signals)))
         return name, found[name]
+    single = {name: model for name, model in models.items() if isinstance(model, Classifier)}
+    if single and logged not in (None, rate):
+        return nearest(single, logged, signals)
     if lacking and not rates:
         raise min(lacking, key=lambda error: len(error.lacking))
     raise RateError(rate, rates)
