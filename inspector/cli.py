@@ -271,23 +271,15 @@ app = typer.Typer(
 )
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"inspector {program_version()}")
-        raise typer.Exit
-
-
 @app.callback()
 def _inspector(
     ctx: typer.Context,
-    _version: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version."
-        ),
-    ] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     """Detect impacts, jumps and oscillations in robot joint data."""
+    if version:
+        typer.echo(f"inspector {program_version()}")
+        raise typer.Exit
     if ctx.invoked_subcommand is None:
         typer.echo(START)
 
