@@ -45,6 +45,7 @@ from noisemodel.files import replacing
 
 FOLDER, NAME = "reference", "reference.toml"
 FORMAT = "noise-reference/1"
+ARRAYS = ("level", "guide", "pace")  # of each repetition, with its number
 NEWEST = 10  # repetitions that are kept of a scenario
 MOST_SCENARIOS = 5000
 TOLERANCE = 0.2  # by how much earlier or later an accepted finding may come, in [s]
@@ -211,9 +212,9 @@ def of_runs(runs: Sequence[Levels]) -> tuple[Scenario, ...]:
 
 def calibrated(scenario: Scenario) -> Scenario:
     """Add the scores from which margins follow."""
-    scores = leave_one_out(scenario.repetitions)
-    elsewhere = leave_one_moment_out(scenario.repetitions[-CALIBRATED:])
-    scores_db, elsewhere_db = (tuple(round(db, 2) for db in each) for each in (scores, elsewhere))
+    runs = scenario.repetitions
+    both = leave_one_out(runs), leave_one_moment_out(runs[-CALIBRATED:])
+    scores_db, elsewhere_db = (tuple(round(db, 2) for db in each) for each in both)
     return replace(scenario, scores_db=scores_db, elsewhere_db=elsewhere_db)
 
 
@@ -228,13 +229,10 @@ def accept_into(
     reason: str,
     by: str,
 ) -> tuple[Reference, list[tuple[str, str]]]:
-    """Accept runs into a store: their scenarios are added or replaced, all others stay.
+    """Accept runs into a store, and tell what changed by the names of scenarios; all others stay.
 
     Runs of an accepted scenario that are as it is join its repetitions, of which the newest ten
     stay; runs that differ replace them.
-
-    Returns:
-        The store as it is now, and by the names of scenarios what changed.
     """
     home = folder.absolute().parent
     with _alone_in(folder):
@@ -285,10 +283,8 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
     fresh = [each for each in new.repetitions if each.sha256 not in known]
     if not fresh:
         return old, "unchanged, these runs are accepted already"
-    over = [compare(each, (old,)) for each in fresh]
-    same = all(
-        not each.exceedances and each.scenarios and each.quieter <= _margin(old) for each in over
-    )
+    over, margin = [compare(each, (old,)) for each in fresh], margin_of(old.scores_db).db
+    same = all(not each.exceedances and each.scenarios and each.quieter <= margin for each in over)
     repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
     own = {**facts, "wanted": old.wanted if same else facts["wanted"]}
     changed = calibrated(replace(old, repetitions=repetitions, **own))
@@ -298,10 +294,6 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
     if not any(set(each.joints) & set(old.repetitions[-1].joints) for each in fresh):
         told = ", of a robot with other joints"
     return changed, f"{words}{told}, {len(repetitions)} kept"
-
-
-def _margin(scenario: Scenario) -> float:
-    return margin_of(scenario.scores_db).db
 
 
 def wanted_in(
@@ -336,10 +328,9 @@ def who() -> str:
     """The name of the user; empty if the system has none."""
     import getpass
 
-    try:
+    with suppress(OSError, KeyError, ImportError):
         return getpass.getuser()
-    except (OSError, KeyError, ImportError):
-        return ""
+    return ""
 
 
 # --- writing
@@ -386,9 +377,8 @@ def _write_levels(path: Path, scenario: Scenario) -> str:
     """Write the levels of the repetitions, and give the SHA-256 of the file."""
     arrays: dict[str, Any] = {}
     for number, each in enumerate(scenario.repetitions):
-        arrays[f"level_{number}"] = encoded(each.level)
-        arrays[f"guide_{number}"] = each.guide
-        arrays[f"pace_{number}"] = each.pace
+        own = encoded(each.level), each.guide, each.pace
+        arrays |= {f"{name}_{number}": array for name, array in zip(ARRAYS, own, strict=True)}
     with replacing(path, overwrite=_holds_levels(path)) as temporary:
         with temporary.open("wb") as stream:
             np.savez_compressed(stream, **arrays)
@@ -409,7 +399,7 @@ def _lines(scenario: Scenario, file: str, sha256: str) -> list[str]:
         "by": scenario.by,
         "reason": scenario.reason,
         "duration_s": [round(each, 3) for each in scenario.duration],
-        "margin_db": round(_margin(scenario), 1),
+        "margin_db": round(margin_of(scenario.scores_db).db, 1),
         "scores_db": list(scenario.scores_db),
         "elsewhere_db": list(scenario.elsewhere_db),
         "joints": list(newest.joints),
@@ -515,8 +505,7 @@ def _checked(path: Path, where: str, row: Any, keys: Keys, needed: Sequence[str]
 def _scenario(path: Path, where: str, given: Any) -> Scenario:
     row = _checked(path, where, given, SCENARIO, ("name", "levels", "sha256", "joints"))
     known = {key: row[key] for key in FACTS if key in row}
-    for key in ("scores_db", "elsewhere_db"):
-        known[key] = tuple(map(float, row.get(key, ())))
+    known |= {key: tuple(map(float, row.get(key, ()))) for key in ("scores_db", "elsewhere_db")}
     for key, needed in (("wanted", ()), ("waive", ("until", "reason"))):
         entry = f"{where}, [[scenario.{key}]]"
         known[key] = tuple(_expected(path, entry, each, needed) for each in row.get(key, ()))
@@ -560,7 +549,7 @@ def _levels(path: Path, where: str, row: Mapping[str, Any]) -> tuple[Levels, ...
         if not 0 < rate < 1e7:
             raise StoreError(path, f"{where_of}: rate_hz = {rate:g}, expected a rate")
         bands = octaves(rate)
-        names = (f"{name}_{number}" for name in ("level", "guide", "pace"))
+        names = (f"{name}_{number}" for name in ARRAYS)
         level, guide, pace = (np.asarray(arrays.get(name, np.empty(0))) for name in names)
         shape = (pace.size, len(own), len(SIGNALS), len(bands))
         fit = (level.shape, guide.shape, pace.shape) == (shape, shape[:2], shape[:1])
