@@ -12,6 +12,7 @@ from generalmodel import fixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from inspector import report
 from inspector.analysis import (
     LOUDEST,
     SHOWN,
@@ -33,8 +34,7 @@ from inspector.audit import audit
 from inspector.errors import InspectorError, Status, Unknown
 from inspector.levels import STEP
 from inspector.library import Labelled, demo_run, load_library, model_files
-from inspector.report import findings, html
-from inspector.report.findings import WORDS
+from inspector.report import WORDS, html
 from inspector.report.formats import FORMATS
 from inspector.signals import without_placeholder
 from inspector.verdict import Verdict, classify_file, exit_status, work_of
@@ -91,7 +91,7 @@ def test_the_status_is_the_same_in_every_output(tmp_path):
         github = FORMATS["github"]([verdict])
         counted = github.startswith("::notice title=noise-inspector::1 run: 1 ok")
         assert (f"{status}: " in github) if outcome else counted
-        assert findings.report(found).startswith(f"### {status}")
+        assert report.report(found).startswith(f"### {status}")
         assert f"<title>run: {status}" in html.page(found)
         assert exit_status([verdict]) == {"ok": 0, "findings": 1, "cannot-tell": 4}[status]
 

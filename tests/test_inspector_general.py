@@ -14,7 +14,7 @@ from inspector.audit import Observability, audit
 from inspector.errors import Status
 from inspector.library import CannotTellError, label_run, signals_of
 from inspector.logs.clocks import without_hold
-from inspector.report.findings import report
+from inspector.report import report
 from inspector.training import classified
 
 

@@ -14,7 +14,7 @@ from inspector.live import LiveError
 from inspector.live.drawing import Sink
 from inspector.live.session import BATCH
 from inspector.recording import views
-from inspector.report.findings import spoken
+from inspector.report import spoken
 from noisemodel import UnknownJointError
 
 RATE = 1000.0

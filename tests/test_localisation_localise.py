@@ -6,7 +6,7 @@ import pytest
 from inspector.analysis import analyse_file
 from inspector.library import demo_run, load_library, model_files
 from inspector.localisation import Localisation, band, localise, quiet_stretches
-from inspector.report.findings import report, words
+from inspector.report import report, words
 from inspector.verdict import Finding, classify_file
 from noisemodel import Block, Run
 

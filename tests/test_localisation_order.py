@@ -11,7 +11,7 @@ from inspector.analysis import Analysis
 from inspector.audit import audit
 from inspector.errors import Status
 from inspector.order import Order, best_lines, order
-from inspector.report.findings import report, sentence
+from inspector.report import report, sentence
 from inspector.report.formats import FORMATS, as_json, text
 from inspector.report.picture import picture
 from inspector.verdict import Finding, Verdict

@@ -30,7 +30,7 @@ from inspector.logs.read import Opened, Reading
 from inspector.reference.judging import Comparison
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import References, seen
-from inspector.report import findings, html
+from inspector.report import excused, failing, html, sentence
 from inspector.report.picture import require
 from inspector.text import cell, progress
 from inspector.verdict import EXPECTED, Verdict
@@ -202,9 +202,9 @@ def _one(runs: list[Opened], target: Path, request: Request) -> None:
     write(found, target, overwrite=request.overwrite, beside=beside)
     typer.echo(f"{run.source.shown}: {found.headline}")
     if verdict is None:
-        lines = [findings.sentence(found, event) for event in found.findings]
+        lines = [sentence(found, event) for event in found.findings]
     else:
-        lines = [*findings.failing(verdict), *findings.excused(verdict)]
+        lines = [*failing(verdict), *excused(verdict)]
         lines += [f"beside {verdict.beside.path}: {verdict.beside.words}"] if verdict.beside else []
     for line in (*lines, *found.remarks):
         typer.echo(f"  {line}")

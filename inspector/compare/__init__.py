@@ -27,7 +27,7 @@ from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Plotted, found_s
 from inspector.recording.robot import Drawn
 from inspector.recording.run import log_report, writing
 from inspector.recording.views import Label, Panel, Part, Timed
-from inspector.report.findings import classes_of, spoken
+from inspector.report import classes_of, spoken
 from noiseclassifier import Event
 from noiseclassifier.matching import spans_of, union
 from noisemodel import Block, Run, decimated

@@ -19,7 +19,7 @@ from inspector.recording import panels, views
 from inspector.recording.panels import HIGH_DB, LOW_DB
 from inspector.recording.run import log_report, writing
 from inspector.recording.views import Label, Panel, Timed
-from inspector.report.findings import spoken
+from inspector.report import spoken
 from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array

@@ -34,7 +34,7 @@ from inspector.recording.views import (
     scalars,
     style_lines,
 )
-from inspector.report.findings import spoken
+from inspector.report import spoken
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
 from noisemodel.noise import decibel

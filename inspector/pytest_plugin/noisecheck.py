@@ -24,7 +24,7 @@ from inspector.reference.judging import Comparison, Expected
 from inspector.reference.levels import Levels, levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, classes_found, judge
-from inspector.report.findings import told
+from inspector.report import told
 from inspector.signals import without_placeholder
 from inspector.text import counted
 from inspector.verdict import EXPECTED, Finding, Verdict

@@ -21,7 +21,7 @@ from inspector.recording.robot import Drawn, log_colours
 from inspector.recording.views import Camera, Label, Panel, Part, Timed
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
-from inspector.report.findings import brief, classes_of, finding_of, spoken
+from inspector.report import brief, classes_of, finding_of, spoken
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Robot, Run
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating

@@ -15,7 +15,7 @@ from inspector.recording import panels, robot, views
 from inspector.recording.robot import Drawn
 from inspector.recording.views import Part
 from inspector.reference.judging import Comparison
-from inspector.report.findings import report, spoken
+from inspector.report import report, spoken
 from noisemodel.files import replacing
 
 APPLICATION = "inspector"

@@ -21,7 +21,7 @@ from inspector.analysis import NOTHING
 from inspector.errors import EXIT, IGNORED, Status, Unknown
 from inspector.reference import difference as diff
 from inspector.reference.difference import LOUDER, NEW, RESOLVED, Difference
-from inspector.report.findings import (
+from inspector.report import (
     COUNTED,
     WORDS,
     Group,

@@ -22,8 +22,17 @@ from inspector.analysis import Analysis
 from inspector.errors import InspectorError, Status
 from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
-from inspector.report import findings
-from inspector.report.findings import COUNTED, excused, failing, groups, spoken
+from inspector.report import (
+    COUNTED,
+    annotated,
+    excused,
+    facts,
+    failing,
+    groups,
+    note,
+    sentence,
+    spoken,
+)
 from inspector.report.formats import summary
 from inspector.report.picture import picture, require
 from inspector.sound import clip, common_gain, worst_time
@@ -70,13 +79,13 @@ def page(
     html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
     add_text(body, "p", spoken(analysis.headline), "verdict")
-    add_text(body, "p", findings.facts(analysis), "note")
+    add_text(body, "p", facts(analysis), "note")
     if verdict is not None and verdict.beside is not None:
         add_text(body, "p", f"Reference: {verdict.beside.path}, {verdict.beside.words}.", "note")
-    found = [findings.sentence(analysis, event) for event in analysis.findings]
+    found = [sentence(analysis, event) for event in analysis.findings]
     _add_list(body, "Findings", found)
-    _add_list(body, "Annotated", findings.annotated(analysis))
-    if remark := findings.note(analysis):
+    _add_list(body, "Annotated", annotated(analysis))
+    if remark := note(analysis):
         add_text(body, "p", remark, "note")
     if verdict is not None:
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
@@ -209,7 +218,7 @@ def index_page(verdicts: Sequence[Verdict]) -> str:
     ranked = sorted(verdicts, key=lambda each: each.severity)
     # What is so of all runs that a model could label, if they are several, is said once.
     first, *others = [_facts(each) for each in ranked if each.model] or [[]]
-    shared = [fact for fact in first if others and all(fact in facts for facts in others)]
+    shared = [fact for fact in first if others and all(fact in other for other in others)]
     for fact in shared:
         add_text(body, "p", fact, "note")
     frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
@@ -259,12 +268,12 @@ def _add_run(body: ET.Element, verdict: Verdict, number: int, shared: Sequence[s
     told = ET.SubElement(part, "div")
     add_text(told, "h2", str(verdict.path))
     _add_status(ET.SubElement(told, "p"), verdict)
-    for sentence in failing(verdict):
-        add_text(told, "p", sentence)
+    for line in failing(verdict):
+        add_text(told, "p", line)
     message = "" if verdict.model else verdict.message
-    facts = [fact for fact in _facts(verdict) if fact not in shared]
+    own = [fact for fact in _facts(verdict) if fact not in shared]
     length = f"{verdict.duration:.2f} s" if verdict.duration else ""
-    for remark in filter(None, [*excused(verdict), message, *facts, length]):
+    for remark in filter(None, [*excused(verdict), message, *own, length]):
         add_text(told, "p", remark, "note")
     if verdict.picture is not None:
         source = f"{PICTURES}/{verdict.picture.name}"

@@ -12,7 +12,7 @@ from inspector.analysis import SHOWN, Analysis, chosen, gaps, worst_joint, worst
 from inspector.errors import InspectorError
 from inspector.levels import Scale, Spectrogram, extremes, spectrogram
 from inspector.reference.judging import Comparison
-from inspector.report.findings import classes_of, spoken
+from inspector.report import classes_of, spoken
 from noisemodel.noise import decibel
 from noisemodel.types import Array
 
