@@ -111,9 +111,7 @@ class Labels:
     def _name(self, frames: Index) -> str:
         """The class of most frames; `unknown` only where all are."""
         names, first, count = np.unique(self.label[frames], return_index=True, return_counts=True)
-        known = names != UNKNOWN
-        best = max(range(len(names)), key=lambda place: (known[place], count[place], -first[place]))
-        return str(names[best])
+        return str(names[np.lexsort((-first, count, names != UNKNOWN))[-1]])
 
     @property
     def raw(self) -> Words:
