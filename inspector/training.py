@@ -38,7 +38,6 @@ from noiseclassifier.tuning import (
     Point,
     Trial,
     Validation,
-    Value,
     measure,
     rank,
     validate,
@@ -516,12 +515,8 @@ def _digests(found: Sequence[nc.Recording]) -> Mapping[str, Any]:
     }
 
 
-def _text(value: Value) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"
-
-
 def _cells(point: Point, measures: Measures) -> list[str]:
-    cells = [_text(value) for value in point.values()]
+    cells = [value if isinstance(value, str) else f"{value:.6g}" for value in point.values()]
     for name in HEADS:
         value = getattr(measures, name)
         cells.append("-" if isnan(value) else f"{value:.1%}")
