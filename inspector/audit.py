@@ -18,11 +18,10 @@ some are at the quantisation floor: then a failure must exceed that.
 """
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from enum import StrEnum
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +31,7 @@ from inspector.library import Library, signal_names
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.mapping import check_joints
 from inspector.logs.motion import limit_warnings
-from inspector.logs.read import Reading, left_out, open_source, sources
+from inspector.logs.read import Reading, Source, open_source
 from inspector.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.text import counted, plain
 from noiseclassifier import Profile
@@ -345,13 +344,9 @@ def shortcomings(audit: Audit) -> tuple[str, ...]:
     return summary(audit) if audit.warnings or limited else ()
 
 
-def as_json(
-    found: Mapping[str, Audit], failed: Mapping[str, str], assumed: Mapping[str, str]
-) -> str:
+def as_json(found: Mapping[str, tuple[Audit, str]], failed: Mapping[str, str]) -> str:
     """Write audits as ``noise-audit/2``."""
-    runs = [
-        {**_plain(name, audit), "assumed": assumed.get(name, "")} for name, audit in found.items()
-    ]
+    runs = [{**_plain(name, each), "assumed": told} for name, (each, told) in found.items()]
     runs += [{"run": name, "message": message} for name, message in failed.items()]
     return json.dumps({"format": "noise-audit/2", "runs": runs}, indent=2)
 
@@ -418,27 +413,22 @@ def _plain(name: str, audit: Audit) -> dict[str, Any]:
 # Of files
 
 
-class Audits(NamedTuple):
-    """Audits of many files, each by the name of its run."""
+def audit_all(
+    runs: Iterable[Source], library: Library, reading: Reading
+) -> tuple[dict[str, tuple[Audit, str]], dict[str, str]]:
+    """Audit all runs of many files; one bad file never stops the rest.
 
-    found: dict[str, Audit]  # of what could be read
-    failed: dict[str, str]  # why a file cannot be read
-    assumed: dict[str, str]  # what was assumed when a log was read, in a line; empty of a run file
-    others: str  # which files of folders were not taken for logs; empty if there are none
-
-
-def audit_all(paths: Sequence[Path], library: Library, reading: Reading | None = None) -> Audits:
-    """Audit all runs of many files; one bad file never stops the rest."""
-    runs, others = sources(paths, reading)
-    found: dict[str, Audit] = {}
+    Returns:
+        Audits by the name of the run, with what was assumed when its log was read, in a line; and
+        why other files cannot be read.
+    """
+    found: dict[str, tuple[Audit, str]] = {}
     failed: dict[str, str] = {}
-    assumed: dict[str, str] = {}
     for source in runs:
         name = str(source.shown)
         try:
             opened = open_source(source, reading)
-            found[name] = audit(opened.run, library)
-            assumed[name] = opened.assumed
+            found[name] = audit(opened.run, library), opened.assumed
         except (InspectorError, NoiseModelError) as error:
             failed[name] = without_path(error, source.path)
-    return Audits(found, failed, assumed, left_out(others))
+    return found, failed

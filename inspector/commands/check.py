@@ -312,18 +312,17 @@ def audit(
     """
     from inspector import audit as audits
 
-    found, failed, assumed, others = audits.audit_all(logs, load_library(model), ctx.obj)
-    if others:
-        typer.echo(f"inspector: {others}", err=True)
+    runs, others = sources(logs, ctx.obj)
+    found, failed = audits.audit_all(runs, load_library(model), ctx.obj)
+    if remark := left_out(others):
+        typer.echo(f"inspector: {remark}", err=True)
     if format == "json":
-        typer.echo(audits.as_json(found, failed, assumed))
+        typer.echo(audits.as_json(found, failed))
     elif found:
-        typer.echo(
-            "\n\n".join(audits.text(name, each, assumed[name]) for name, each in found.items())
-        )
+        typer.echo("\n\n".join(audits.text(name, *each) for name, each in found.items()))
     for name, message in failed.items():
         typer.echo(f"inspector: {name}: {message}", err=True)
-    observable = all(each.observable for each in found.values())
+    observable = all(each.observable for each, _ in found.values())
     raise typer.Exit(3 if failed else 0 if observable else 4)
 
 
