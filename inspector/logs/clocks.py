@@ -371,10 +371,15 @@ def _estimated(
 
     Clocks that do not overlap (``apart`` says so) have to be moved.
     """
-    pair = _common_tracks(
-        {track.signal: track for track in reversed(tracks) if not track.is_desired},
-        {track.quantity: track for track in reversed(tracks) if track.stamps in own},
+    measured = {track.signal: track for track in reversed(tracks) if not track.is_desired}
+    desired = {track.quantity: track for track in reversed(tracks) if track.stamps in own}
+    pairs = (
+        (measured[one], desired[other])
+        for one in ("velocity", "position")
+        for other in (one, "velocity", "position")
+        if one in measured and other in desired
     )
+    pair = next((pair for pair in pairs if _move(*pair)), None)
     unknown = "no joint moves in both"
     if pair is None and not apart:
         return 0.0, ""
@@ -393,6 +398,12 @@ def _estimated(
         raise LogError(path, f"{apart}{unknown}; {HOW}")
     assumed = "its clock is assumed to be the measured one's, since"
     return 0.0, f"{assumed} {unknown}; {HOW}"
+
+
+def _move(one: Track, other: Track) -> bool:
+    """Whether a joint moves in both tracks."""
+    shared = set(one.joints) & set(other.joints)
+    return any(np.ptp(one.of([j])) > 0 and np.ptp(other.of([j])) > 0 for j in shared)
 
 
 def no_overlap(desired: Stamps, measured: Stamps) -> str:
@@ -416,7 +427,20 @@ def _estimate(measured: Track, desired: Track) -> tuple[float, float, float, flo
             values = np.gradient(np.unwrap(values, axis=0), track.stamps.time, axis=0)
         speeds.append(replace(track, values=values))
     one, other = speeds
-    seconds, correlation, next_best = _search(one, other, min(rate, COARSE_RATE))
+    coarse = min(rate, COARSE_RATE)
+    times = one.stamps.time, other.stamps.time
+    slow = [
+        _at(each, np.arange(time[0], time[-1], 1 / coarse))
+        for each, time in zip(speeds, times, strict=True)
+    ]
+    least = int(SHARE * min(map(len, slow)))
+    correlations = _correlation(*_moving(*slow), least)
+    best = int(np.argmax(correlations))
+    distance, correlation = np.abs(np.arange(len(correlations)) - best), correlations[best]
+    # The peak reaches to where the correlation falls below half of it.
+    edge = distance[correlations < 0.5 * correlation].min(initial=len(correlations))
+    next_best = float(correlations[distance > edge].max(initial=-1.0))
+    seconds = (best - len(slow[1]) + 1) / coarse + float(times[0][0] - times[1][0])
     change = 0.0
     for _ in range(3):
         residual, weight = _residuals(one, other, seconds, rate).T
@@ -424,21 +448,7 @@ def _estimate(measured: Track, desired: Track) -> tuple[float, float, float, flo
             seconds += float(np.average(residual, weights=weight))
             early, late = np.array_split(residual, 2)
             change = float(np.mean(late) - np.mean(early)) if len(late) > 1 else 0.0
-    return seconds, change, correlation, next_best
-
-
-def _common_tracks(
-    measured: Mapping[str, Track], desired: Mapping[str, Track]
-) -> tuple[Track, Track] | None:
-    """A measured and a desired track with a joint that moves in both, preferably velocities."""
-    for one in ("velocity", "position"):
-        for other in (one, "velocity", "position"):
-            if one in measured and other in desired:
-                first, second = measured[one], desired[other]
-                for joint in set(first.joints) & set(second.joints):
-                    if all(np.ptp(track.of([joint])) > 0 for track in (first, second)):
-                        return first, second
-    return None
+    return seconds, change, float(correlation), next_best
 
 
 def _at(motion: Track, instants: Array) -> Array:
@@ -450,25 +460,6 @@ def _at(motion: Track, instants: Array) -> Array:
         for joint, values in enumerate(motion.values[stretch].T):
             found[part, joint] = np.interp(instants[part], known, values)
     return found
-
-
-def _search(measured: Track, desired: Track, rate: float) -> tuple[float, float, float]:
-    """Best offset in [s], its correlation, and the next best's correlation."""
-    times = measured.stamps.time, desired.stamps.time
-    one, other = _moving(
-        *(
-            _at(motion, np.arange(time[0], time[-1], 1 / rate))
-            for motion, time in zip((measured, desired), times, strict=True)
-        )
-    )
-    correlation = _correlation(one, other, int(SHARE * min(len(one), len(other))))
-    best = int(np.argmax(correlation))
-    distance = np.abs(np.arange(len(correlation)) - best)
-    # The peak reaches to where the correlation falls below half of it.
-    edge = distance[correlation < 0.5 * correlation[best]].min(initial=len(correlation))
-    next_best = float(correlation[distance > edge].max(initial=-1.0))
-    seconds = (best - len(other) + 1) / rate + float(times[0][0] - times[1][0])
-    return seconds, float(correlation[best]), next_best
 
 
 def _moving(one: Array, other: Array) -> tuple[Array, Array]:
@@ -513,26 +504,21 @@ def _residuals(measured: Track, desired: Track, seconds: float, rate: float) -> 
     for first, last in pairwise(np.linspace(start, stop, count + 1)):
         instants = np.arange(first, last, 1 / rate)
         longer = first + np.arange(-reach, len(instants) + reach) / rate
-        residual, correlation = _match(_at(measured, instants), _at(moved, longer), rate)
-        if correlation >= CORRELATION:
-            found.append((residual, correlation))
+        after, segment = _moving(_at(moved, longer), _at(measured, instants))
+        if not segment.size:
+            continue
+        near = _correlation(after, segment, len(segment))[len(segment) - 1 :]
+        peak = int(np.argmax(near))
+        if near[peak] < CORRELATION:
+            continue
+        piece = after[peak : peak + len(segment)]
+        gain = (segment * piece).sum(axis=0) / np.maximum((piece**2).sum(axis=0), 1e-300)
+        slope = np.gradient(piece * gain, 1 / rate, axis=0)
+        # segment(t) = piece(t - rest), to first order
+        rest = ((piece * gain - segment) * slope).sum() / (slope**2).sum()
+        lag = (len(after) - len(segment)) // 2 - peak
+        found.append((lag / rate + float(rest), float(near[peak])))
     return np.array(found).reshape(-1, 2)
-
-
-def _match(segment: Array, longer: Array, rate: float) -> tuple[float, float]:
-    """Offset in [s] of a segment within a longer one, and the correlation there."""
-    longer, segment = _moving(longer, segment)
-    if not segment.size:
-        return 0.0, 0.0
-    near = _correlation(longer, segment, len(segment))[len(segment) - 1 :]
-    peak = int(np.argmax(near))
-    found = longer[peak : peak + len(segment)]
-    gain = (segment * found).sum(axis=0) / np.maximum((found**2).sum(axis=0), 1e-300)
-    slope = np.gradient(found * gain, 1 / rate, axis=0)
-    # piece(t) = found(t - rest), to first order
-    rest = ((found * gain - segment) * slope).sum() / (slope**2).sum()
-    reach = (len(longer) - len(segment)) // 2
-    return (reach - peak) / rate + float(rest), float(near[peak])
 
 
 # A hold: slow signals that were sampled faster
