@@ -13,8 +13,8 @@ import bz2
 import sqlite3
 import struct
 from array import array
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
@@ -61,18 +61,6 @@ CONTROLLED = {
 }
 BASE_WIDTHS = {"pose": 7, "twist": 6}
 RECORDER = "the messages have no stamps, those of the recorder are used"
-
-
-@dataclass(frozen=True)
-class Topic:
-    """A topic of a bag; its type is written as in ROS 2: ``sensor_msgs/msg/JointState``."""
-
-    name: str
-    type: str
-    ros1: bool = False  # whether messages are serialised in the format of ROS 1
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.type})"
 
 
 # Messages of bytes
@@ -164,24 +152,27 @@ class Group:
     received: "array[int]" = field(default_factory=lambda: array("q"))  # by the recorder
 
 
-class MotionReader:
-    """Collects the messages of a topic with the motion of joints or of a base.
+@dataclass(eq=False)
+class Topic:
+    """A topic of a bag, and the motion of joints or of a base in its messages.
 
     Publishers that share a topic, such as an arm's and a gripper's, have a group each.
     """
 
-    def __init__(self, path: Path, topic: Topic) -> None:
-        self._path, self._topic = path, topic
-        self._versions = STATES if topic.type == STATE else ("",)
-        self._row, self._signals = MOTION[topic.type]
-        if topic.type == JOINT_STATE and any(word in topic.name.lower() for word in COMMANDED):
-            self._signals = {name: (f"{name}_desired", 1) for name in ("position", "velocity")}
-        self._groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
+    name: str
+    type: str  # written as in ROS 2: ``sensor_msgs/msg/JointState``
+    ros1: bool = False  # whether messages are serialised in the format of ROS 1
+    count: int = 0  # of its messages
+    versions: Sequence[str] = STATES  # definitions of a controller's state that may be its own
+    groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = field(default_factory=dict)
 
-    def add(self, received: int, data: bytes) -> None:
+    def __str__(self) -> str:
+        return f"{self.name} ({self.type})"
+
+    def add(self, path: Path, received: int, data: bytes) -> None:
         """Add a message that was received at a time in [ns]."""
-        message = self._decoded(data)
-        joints, found = self._row(message)
+        message = self._decoded(path, data)
+        joints, found = MOTION[self.type][0](message)
         # Arrays with another length than the joints are ignored.
         rows = {
             name: np.asarray(numbers, dtype=np.float64)
@@ -189,9 +180,9 @@ class MotionReader:
             if len(numbers) == BASE_WIDTHS.get(name, len(joints)) > 0
         }
         key = frozenset(joints), tuple(rows)
-        if key not in self._groups:
-            self._groups[key] = Group(joints, {name: array("d") for name in rows})
-        group, stamp = self._groups[key], message.header.stamp
+        if key not in self.groups:
+            self.groups[key] = Group(joints, {name: array("d") for name in rows})
+        group, stamp = self.groups[key], message.header.stamp
         group.logged.append(int(stamp.sec) * 10**9 + int(stamp.nanosec))
         group.received.append(received)
         for name, row in rows.items():
@@ -199,24 +190,27 @@ class MotionReader:
                 row = row[[joints.index(joint) for joint in group.joints]]
             group.arrays[name].frombytes(row.tobytes())
 
-    def _decoded(self, data: bytes) -> Any:
+    def _decoded(self, path: Path, data: bytes) -> Any:
         """A message, by the version of its type that fits, which all others then have."""
-        kind, ros1 = self._topic.type, self._topic.ros1
         problem = ""
-        for version in self._versions:
-            store = _store(kind, version, ros1)
+        for version in self.versions if self.type == STATE else ("",):
+            store = _store(self.type, version, self.ros1)
+            parse = store.deserialize_ros1 if self.ros1 else store.deserialize_cdr
             try:
-                message = (store.deserialize_ros1 if ros1 else store.deserialize_cdr)(data, kind)
+                message = parse(data, self.type)
             except DAMAGE as error:
                 problem = one_line(error)
                 continue
-            self._versions = (version,)
+            self.versions = (version,)
             return message
-        raise LogError(self._path, f"{self._topic.name}: a message is not a {kind} ({problem})")
+        raise LogError(path, f"{self.name}: a message is not a {self.type} ({problem})")
 
     def fields(self) -> Iterator[Field]:
         """Fields of the messages."""
-        for group in self._groups.values():
+        signals = MOTION[self.type][1]
+        if self.type == JOINT_STATE and any(word in self.name.lower() for word in COMMANDED):
+            signals = {name: (f"{name}_desired", 1) for name in ("position", "velocity")}
+        for group in self.groups.values():
             received = np.frombuffer(group.received, dtype=np.int64)
             order: Any = slice(None)  # no copy of what is in order
             if (np.diff(received) < 0).any():
@@ -230,14 +224,14 @@ class MotionReader:
                 remark="" if logged.any() else RECORDER,
             )
             for name, numbers in group.arrays.items():
-                signal, rank = self._signals.get(name, ("", 0))
+                signal, rank = signals.get(name, ("", 0))
                 yield Field(
-                    f"{self._topic.name}/{name}",
+                    f"{self.name}/{name}",
                     np.frombuffer(numbers).reshape(len(received), -1)[order],
                     stamps,
                     joints=group.joints,
                     signal=signal,
-                    source=self._topic.name,
+                    source=self.name,
                     rank=rank,
                 )
 
@@ -254,10 +248,8 @@ class Bag:
     """What a bag holds, once all of it is read."""
 
     topics: dict[str, Topic] = field(default_factory=dict)
-    counts: Counter[str] = field(default_factory=Counter)  # messages, by topic
     times: list[int] = field(default_factory=list)  # of the first and the last message, in [ns]
     lost: list[str] = field(default_factory=list)  # a sentence each
-    readers: dict[str, MotionReader] = field(default_factory=dict)  # of topics that are read
 
     def __str__(self) -> str:
         return f"the bag has {listed([*map(str, self.topics.values())]) or 'no topics'}"
@@ -272,10 +264,9 @@ def _listing(path: Path) -> tuple[str, ...]:
     """Topics with type, count and rate, and whether they are read, a line each."""
     bag, rows = _scanned(path, lambda name: False), []
     seconds = (bag.times[-1] - bag.times[0]) * 1e-9 if bag.times else 0.0
-    for topic in sorted(bag.topics.values(), key=lambda each: each.name):
-        count = bag.counts[topic.name]
-        rate = f"{count / seconds:.6g} Hz" if count > 1 and seconds else ""
-        words = (topic.name, topic.type, counted(count, "message"), rate)
+    for name, topic in sorted(bag.topics.items()):
+        rate = f"{topic.count / seconds:.6g} Hz" if topic.count > 1 and seconds else ""
+        words = (name, topic.type, counted(topic.count, "message"), rate)
         read = "read" if topic.type in MOTION else "not read"
         rows.append("  ".join(filter(None, (*words, read))))
     return (*rows, *bag.lost)
@@ -284,21 +275,22 @@ def _listing(path: Path) -> tuple[str, ...]:
 def _read(path: Path, options: ReadOptions) -> Log:
     chosen = options.topics
     bag = _scanned(path, lambda name: not chosen or name in chosen)
-    for name in options.topics:
+    for name in chosen:
         if name not in bag.topics or bag.topics[name].type not in MOTION:
             problem = f"there is no topic {name!r} of a type that is read ({', '.join(MOTION)})"
             raise LogError(path, f"{problem}; {bag}")
-    read = {name: reader for name, reader in bag.readers.items() if bag.counts[name]}
+    moving = [n for n, topic in bag.topics.items() if topic.type in MOTION and topic.count]
+    read = [name for name in moving if not chosen or name in chosen]
     if not read:
         raise LogError(path, f"no topic holds joints; {bag}")
-    fields = [each for reader in read.values() for each in reader.fields()]
+    fields = [each for name in read for each in bag.topics[name].fields()]
     if not any(each.signal.startswith(("position", "velocity")) for each in fields):
         raise LogError(path, f"no message holds joints; {bag}")
     return Log(
         path,
         tuple(each for each in fields if each.signal),
         not_read=tuple(
-            str(topic) if bag.counts[name] else f"{name} (no messages)"
+            str(topic) if topic.count else f"{name} (no messages)"
             for name, topic in bag.topics.items()
             if name not in read
         ),
@@ -314,21 +306,20 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
     with errors_of(path):
         for each in _records(path, bag.lost, unpack):
             if isinstance(each, Topic):
-                if each.name not in bag.topics:
-                    bag.topics[each.name] = each
-                    if wanted(each.name) and each.type in MOTION:
-                        bag.readers[each.name] = MotionReader(path, each)
+                bag.topics.setdefault(each.name, each)
                 continue
             name, received, data = each
-            bag.counts[name] += 1
+            if (topic := bag.topics.get(name)) is None:
+                continue  # the record that says its type is damaged
+            topic.count += 1
             if abs(received) < LATEST:
                 known = (received, *bag.times)
                 bag.times[:] = min(known), max(known)
-            if name in bag.readers:
-                if data.startswith(ZSTD) and not bag.topics[name].ros1:
+            if wanted(name) and topic.type in MOTION:
+                if data.startswith(ZSTD) and not topic.ros1:
                     data = unpack.message(data)
                 if data and abs(received) < LATEST:
-                    bag.readers[name].add(received, data)
+                    topic.add(path, received, data)
                     taken += 1
                 else:
                     odd += 1
