@@ -77,12 +77,9 @@ def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | No
     found = [unit for unit in possible if start[unit] > EPOCH[0]] or list(possible)
     if len(found) == 1:
         return found[0]
-    raise LogError(
-        path,
-        f"the unit of stamps with a median step of {step:g} is"
-        f" {' or '.join(found) or 'none that is known'}; with the log's rate it is recognised:"
-        f" --rate {next(iter(possible.values()), '100')}",
-    )
+    unit = " or ".join(found) or "none that is known"
+    how = f"with the log's rate it is recognised: --rate {next(iter(possible.values()), '100')}"
+    raise LogError(path, f"the unit of stamps with a median step of {step:g} is {unit}; {how}")
 
 
 def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -> Stamps:

@@ -108,9 +108,8 @@ class Stamps:
         steps = np.diff(self.time)
         step = float(np.median(steps))
         if not SHORTEST <= step <= LONGEST:
-            raise InspectorError(
-                f"the stamps' median step is {step:g} s, expected {SHORTEST:g} s to {LONGEST:g} s"
-            )
+            expected = f"{SHORTEST:g} s to {LONGEST:g} s"
+            raise InspectorError(f"the stamps' median step is {step:g} s, expected {expected}")
         nominal = float(f"{1 / step:.9g}")
         uniform = bool((np.abs(steps - step) <= UNIFORM * step).all())
         rate = self.rate or nominal
@@ -122,15 +121,10 @@ class Stamps:
         wide = np.flatnonzero(steps > GAP / rate)
         deviations = np.delete(steps, wide) - 1 / rate
         edges = [0, *(wide + 1), len(self.time)]
-        return Clock(
-            nominal=nominal,
-            rate=rate,
-            uniform=uniform,
-            jitter_rms=float(np.sqrt(np.mean(deviations**2))),
-            jitter_max=float(np.abs(deviations).max()),
-            gaps=tuple((float(self.time[at]), float(self.time[at + 1])) for at in wide),
-            stretches=tuple(slice(start, stop) for start, stop in pairwise(edges)),
-        )
+        jitter = float(np.sqrt(np.mean(deviations**2))), float(np.abs(deviations).max())
+        gaps = tuple((float(self.time[at]), float(self.time[at + 1])) for at in wide)
+        stretches = tuple(slice(start, stop) for start, stop in pairwise(edges))
+        return Clock(nominal, rate, uniform, *jitter, gaps, stretches)
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,9 +325,8 @@ class ReadOptions:
     def __post_init__(self) -> None:
         """Check the options."""
         if self.rate is not None and not RATES[0] <= self.rate <= RATES[1]:
-            raise OptionError(
-                f"the rate is {self.rate:g} Hz; expected {RATES[0]:g} to {RATES[1]:g} Hz"
-            )
+            expected = f"{RATES[0]:g} to {RATES[1]:g} Hz"
+            raise OptionError(f"the rate is {self.rate:g} Hz; expected {expected}")
         if self.offset is not None and not np.isfinite(self.offset):
             raise OptionError(f"the offset is {self.offset:g} s; expected a finite number")
         if self.units and self.units not in UNITS:
@@ -431,12 +424,12 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
     for text in entries:
         target, _, source = text.partition("=")
         signal, dot, joint = target.partition(".")
-        known = signal in (*JOINT_SIGNALS, *BASE_SIGNALS) or target == "time"
+        known = signal in SIGNALS or target == "time"
         if not source or not known or (dot and not joint):
             raise OptionError(
                 f"mapping {text!r}: expected SIGNAL.JOINT=COLUMN, such as velocity.elbow=dq2 or"
                 f" 'velocity.{JOINT}={JOINT}_actual', SIGNAL=ARRAY, such as position=qpos[7:], or"
-                f" time=COLUMN; signals are {', '.join((*JOINT_SIGNALS, *BASE_SIGNALS))}"
+                f" time=COLUMN; signals are {', '.join(SIGNALS)}"
             )
         if joint and joint not in CONVENTIONS.get(signal, (joint,)):
             raise OptionError(
@@ -780,11 +773,9 @@ def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
         stamps, values = choice.field.stamps, choice.values
         if choice.joint in ("world", "mujoco"):
             if pose is None or by_signal["base_pose"].field.stamps is not stamps:
-                raise LogError(
-                    log.path,
-                    f"{choice.label}: a velocity in world axes needs a base_pose of the same"
-                    " samples, and there is none (--map base_pose=ARRAY)",
-                )
+                problem = "a velocity in world axes needs a base_pose of the same samples"
+                how = "and there is none (--map base_pose=ARRAY)"
+                raise LogError(log.path, f"{choice.label}: {problem}, {how}")
             values = velocity_of(values, choice.joint, pose)
         yield Track("base_velocity", (), (choice.field.name,) * 6, stamps, np.asarray(values))
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs import clocks
-from inspector.logs.mapping import UNIFORM, Log, ReadOptions, Stamps, Track, known_limits, tracks_of
+from inspector.logs.mapping import UNIFORM, Log, ReadOptions, Track, known_limits, tracks_of
 from inspector.logs.names import listed
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
@@ -78,11 +78,9 @@ def _refuse_quaternion(path: Path, tracks: Sequence[Track], options: ReadOptions
         if track.signal == "position" and len(names) == 4 and all(names) and not given:
             norm = np.linalg.norm(np.asarray(track.values, dtype=np.float64), axis=1)
             if np.isfinite(norm).all() and (np.abs(norm - 1) < 1e-3).all():
-                raise LogError(
-                    path,
-                    f"{listed(track.labels)} hold a quaternion (their norm is 1), not joints; if"
-                    " they are joints, name them: --map position.JOINT=COLUMN",
-                )
+                how = "if they are joints, name them: --map position.JOINT=COLUMN"
+                problem = f"{listed(track.labels)} hold a quaternion (their norm is 1), not joints"
+                raise LogError(path, f"{problem}; {how}")
 
 
 # Values that are none
@@ -133,17 +131,13 @@ def _believable(path: Path, track: Track, remarks: list[str]) -> Track:
     if not far.any():
         return track
     sample, column = (int(each) for each in np.argwhere(far)[0])
-    what = (
-        f"column {track.labels[column]!r} holds {track.values[sample, column]:.3g}, no"
-        f" {track.quantity} in any unit"
-    )
+    held = f"column {track.labels[column]!r} holds {track.values[sample, column]:.3g}"
+    what = f"{held}, no {track.quantity} in any unit"
     if not track.is_desired and far.any(axis=1).mean() > FEW:
         raise track.fault(path, f"{what}; name the columns to read (--map)", sample)
     runaway = far.any(axis=0) & (values > LARGEST[track.quantity])
-    remarks.append(
-        f"{what}: {counted(int(runaway.any(axis=1).sum()), 'sample')} of"
-        f" {track.signal.replace('_', ' ')} left out"
-    )
+    samples = counted(int(runaway.any(axis=1).sum()), "sample")
+    remarks.append(f"{what}: {samples} of {track.signal.replace('_', ' ')} left out")
     return replace(track, values=np.where(runaway, np.nan, track.values))
 
 
@@ -372,7 +366,14 @@ def _joined(track: Track, values: Array, places: Indices) -> Track:
     places = places[places < len(values)]
     held = values[places.clip(min=0)]
     held = np.where(track.angles, np.unwrap(held, axis=0), held)
-    set_at = _evenly(places)
+    # At even distances if all are within a sample of theirs: a policy whose rate does not divide
+    # the log's sets targets between samples.
+    steps = np.diff(places)
+    ticks = np.concatenate(([0.0], np.cumsum(np.round(steps / np.mean(steps)))))
+    slope, first = np.polyfit(ticks, places, 1)
+    even = first + slope * ticks
+    set_at = even if np.abs(even - places).max() < 1 else places.astype(np.float64)
+    set_at[0] = min(set_at[0], 0.0)
     stamps = track.stamps
     before = np.minimum(set_at, 0) / stamps.clock.nominal
     known = np.interp(set_at, np.arange(len(values)), stamps.time) + before
@@ -381,19 +382,6 @@ def _joined(track: Track, values: Array, places: Indices) -> Track:
     joined = Akima1DInterpolator(known, held, axis=0)(time)
     missing = None if track.missing is None else track.missing[: len(time)]
     return replace(track, stamps=replace(stamps, time=time), values=joined, missing=missing)
-
-
-def _evenly(places: Indices) -> Array:
-    """Places at even distances, in samples, if all are within a sample of theirs.
-
-    A policy whose rate does not divide the log's sets targets between samples.
-    """
-    steps = np.diff(places)
-    ticks = np.concatenate(([0.0], np.cumsum(np.round(steps / np.mean(steps)))))
-    slope, first = np.polyfit(ticks, places, 1)
-    even = first + slope * ticks
-    chosen = even if np.abs(even - places).max() < 1 else places.astype(np.float64)
-    return np.concatenate(([min(chosen[0], 0.0)], chosen[1:]))
 
 
 # The run
@@ -460,10 +448,8 @@ def _check_mapping(logs: Sequence[Log], options: ReadOptions) -> None:
         if entry.signal == "time":
             known = any(entry.source == log.time for log in logs)
         if not known:
-            raise LogError(
-                logs[0].path,
-                f"there is no column {entry.source!r} to map; it has {listed(logs[0].names)}",
-            )
+            problem = f"there is no column {entry.source!r} to map"
+            raise LogError(logs[0].path, f"{problem}; it has {listed(logs[0].names)}")
 
 
 def _with_desired(measured: Log, desired: Log) -> list[Log]:
@@ -490,16 +476,12 @@ def _main(log: Log, options: ReadOptions) -> Track:
     track = max(moving, key=lambda track: len(track.joints))
     time, nominal, rate = track.stamps.time, track.stamps.clock.nominal, options.rate
     if rate is not None and not 1 / LARGEST_RATE_RATIO <= rate / nominal <= LARGEST_RATE_RATIO:
-        raise LogError(
-            log.path,
-            f"the rate of the stamps is {nominal:g} Hz; a run of {rate:g} Hz cannot be made of it",
-        )
+        problem = f"the rate of the stamps is {nominal:g} Hz; a run of {rate:g} Hz cannot be made"
+        raise LogError(log.path, f"{problem} of it")
     if time[-1] * nominal > MOST_SAMPLES_PER_STAMP * len(time):
-        steps = np.diff(time)
-        jump = int(np.argmax(steps))
-        raise track.fault(
-            log.path, f"time jumps by {steps[jump]:.6g} s; most of the log is gaps", jump + 1
-        )
+        jump = int(np.argmax(steps := np.diff(time)))
+        problem = f"time jumps by {steps[jump]:.6g} s; most of the log is gaps"
+        raise track.fault(log.path, problem, jump + 1)
     return track
 
 
@@ -513,27 +495,24 @@ def _remarks(logs: Sequence[Log], tracks: Sequence[Track]) -> Iterator[str]:
             first.setdefault(id(track.stamps), track)
         for track in first.values():
             whose = f"{name}, {track.signal}" if len(first) > 1 else name
-            yield from (f"{whose}: {remark}" for remark in _of_clock(track.stamps))
+            stamps, clock = track.stamps, track.stamps.clock
+            if stamps.unit != "seconds":
+                yield f"{whose}: stamps are in {stamps.unit}"
+            if stamps.remark:
+                yield f"{whose}: {stamps.remark}"
+            if not clock.uniform:
+                from_ = (
+                    f"stamps of {clock.nominal:g} Hz, jitter {clock.jitter_rms * 1e3:.3g} ms rms"
+                )
+                lost = _lost(clock.nominal, clock.rate)
+                yield f"{whose}: resampled to {clock.rate:g} Hz ({from_}){lost}"
+            if clock.gaps:
+                total = sum(stop - start for start, stop in clock.gaps)
+                what = f"{counted(len(clock.gaps), 'gap')}, {total:.3g} s in all, the first at"
+                yield f"{whose}: {what} {clock.gaps[0][0]:.6g} s, marked as not valid"
         yield from (f"{name}: {remark}" for remark in log.remarks)
         if log.not_read:
             yield f"{name}: {counted(len(log.not_read), 'column')} not read: {listed(log.not_read)}"
-
-
-def _of_clock(stamps: Stamps) -> Iterator[str]:
-    clock = stamps.clock
-    if stamps.unit != "seconds":
-        yield f"stamps are in {stamps.unit}"
-    if stamps.remark:
-        yield stamps.remark
-    if not clock.uniform:
-        yield (
-            f"resampled to {clock.rate:g} Hz (stamps of {clock.nominal:g} Hz, jitter"
-            f" {clock.jitter_rms * 1e3:.3g} ms rms){_lost(clock.nominal, clock.rate)}"
-        )
-    if clock.gaps:
-        total = sum(stop - start for start, stop in clock.gaps)
-        what = f"{counted(len(clock.gaps), 'gap')}, {total:.3g} s in all"
-        yield f"{what}, the first at {clock.gaps[0][0]:.6g} s, marked as not valid"
 
 
 def _lost(before: float, after: float) -> str:

@@ -64,10 +64,8 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
         if find_spec(library) is None:
             how = f"pip install 'noise-inspector[{extra}]'"
             raise LogError(path, f"{library} reads such logs and is not installed; {how}")
-    reader: Callable[[Path, ReadOptions], LogReader] = import_module(
-        f"inspector.logs.{module}"
-    ).open_log
-    return reader(path, options)
+    opened: LogReader = import_module(f"inspector.logs.{module}").open_log(path, options)
+    return opened
 
 
 def _module_of_folder(folder: Path) -> str:
@@ -90,11 +88,8 @@ def _module_of(path: Path) -> str:
     if _is_folder(path):
         if module := _module_of_folder(path):
             return module
-        raise LogError(
-            path,
-            "a folder that is neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
-            " (meta/info.json); name its files one by one",
-        )
+        problem = "neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set (meta/info.json)"
+        raise LogError(path, f"a folder that is {problem}; name its files one by one")
     with errors_of(path):
         runfile.check_regular(path)
         with path.open("rb") as stream:
@@ -152,11 +147,8 @@ def read_log(
     reading = Reading(read_options(mapping, **options), Path(desired) if desired else None, wanted)
     readers = readers_of(path, reading)
     if len(readers) > 1:
-        raise LogError(
-            path,
-            f"holds {len(readers)} episodes ({listed([*readers])}); choose one (episode), or read"
-            " all (read_logs)",
-        )
+        held = f"{len(readers)} episodes ({listed([*readers])})"
+        raise LogError(path, f"holds {held}; choose one (episode), or read all (read_logs)")
     return next(iter(readers.values()))()
 
 
@@ -318,9 +310,8 @@ def sources(
                     episodes = reading.episodes or ("",)
             found += (Source(log, each) for each in episodes)
     if reading.desired and len(found) > 1:
-        raise InspectorError(
-            f"{reading.desired}: belongs to one log, {len(found)} are given (--desired)"
-        )
+        problem = f"belongs to one log, {len(found)} are given (--desired)"
+        raise InspectorError(f"{reading.desired}: {problem}")
     return tuple(found), tuple(others)
 
 
@@ -479,10 +470,8 @@ def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path
     if len(names) == 1 and not several and not _is_folder(output):
         return (output,)
     if output.suffix == ".npz" or output.is_file():
-        raise InspectorError(
-            f"{output}: {len(names)} runs do not fit into one file; name a folder, or choose one"
-            " (--episode)"
-        )
+        problem = f"{len(names)} runs do not fit into one file"
+        raise InspectorError(f"{output}: {problem}; name a folder, or choose one (--episode)")
     targets = tuple(output / f"{name}.npz" for name in names)
     if twice := [path for path in targets if targets.count(path) > 1]:
         problem = "two logs would be written there; import them one by one"
