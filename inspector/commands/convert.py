@@ -1,5 +1,6 @@
 """Commands that import and export: `import` and `export`."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,12 +11,15 @@ from inspector import export as exports
 from inspector.analysis import analyse
 from inspector.commands import shared
 from inspector.commands.shared import argument, opened, option
-from inspector.errors import EXIT, OUTPUT_LOST, Status, worst
+from inspector.errors import EXIT, OUTPUT_LOST, InspectorError, Status, worst
 from inspector.export import read_labels, write_labels
 from inspector.library import load_library
-from inspector.logs.read import import_logs, listing
+from inspector.logs.mapping import errors_of
+from inspector.logs.motion import Imported, contradictions, limit_warnings
+from inspector.logs.read import Reading, listing, logs_in, readers_of, run_name
 from inspector.text import counted, printable, progress
-from noisemodel.files import refuse_existing
+from noisemodel import NoiseModelError, OutputError
+from noisemodel.files import also_reading, refuse_existing
 
 
 def import_(
@@ -44,24 +48,70 @@ def import_(
         return
     if output is None:
         raise typer.BadParameter("name the run file to write", param_hint="'--output' / '-o'")
-    statuses = [0]
-    for result in import_logs(
-        logs,
-        output,
-        reading,
-        overwrite=overwrite,
-        progress=lambda items, total: progress(items, "import", total=total),
-    ):
-        if result.problem:
-            statuses.append(OUTPUT_LOST if result.lost else EXIT[Status.BAD_INPUT])
-            typer.echo(f"inspector: {result.problem}", err=True)
-            continue
-        for remark in result.remarks:
-            typer.echo(f"  {remark}")
-        typer.echo(f"{result.path}: {result.duration:.2f} s at {result.rate:g} Hz")
+    status = _import(logs, output, reading, overwrite=overwrite)
     if save_mapping:
         reading.options.save(save_mapping, overwrite=overwrite)
-    raise typer.Exit(worst(statuses))
+    raise typer.Exit(status)
+
+
+def _import(paths: Sequence[Path], output: Path, reading: Reading, *, overwrite: bool) -> int:
+    """Write a run file for each run of some logs, and return the exit status."""
+    logs = [log for path in paths for log in logs_in(path)[0]]
+    also_reading(logs)
+    several, status = len(logs) > 1, 0
+    if reading.desired and several:
+        raise InspectorError(f"{reading.desired}: belongs to one log, {len(logs)} are given")
+    jobs: list[tuple[str, Callable[[], Imported]]] = []
+    for log in logs:
+        try:
+            found = readers_of(log, reading)
+        except (InspectorError, NoiseModelError) as error:
+            status = _refused(error, status, alone=not several)
+        else:
+            jobs += ((run_name(log, episode), read) for episode, read in found.items())
+    targets = _targets([name for name, _ in jobs], output, several=several)
+    for target in targets:
+        refuse_existing(target, overwrite=overwrite)
+    reads = zip([read for _, read in jobs], targets, strict=True)
+    for read, target in progress(reads, "import", total=len(jobs)):
+        try:
+            imported = read()
+            run = imported.run
+            run.save(target, overwrite=overwrite)
+            for remark in (*imported.remarks, *contradictions(run), *limit_warnings(run)):
+                typer.echo(f"  {remark}")
+            typer.echo(f"{target}: {run.duration:.2f} s at {run.rate:g} Hz")
+        except (InspectorError, NoiseModelError) as error:
+            status = _refused(error, status, alone=len(targets) == 1 and not several)
+    return status
+
+
+def _refused(error: Exception, status: int, *, alone: bool) -> int:
+    """Print why a log has no run file, and return the worse status; of one alone, raise it."""
+    if alone:
+        raise error
+    typer.echo(f"inspector: {error}", err=True)
+    lost = isinstance(error, OutputError) and isinstance(error.__cause__, OSError)
+    return worst([status, OUTPUT_LOST if lost else EXIT[Status.BAD_INPUT]])
+
+
+def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path, ...]:
+    """Paths of the run files, checked before the logs are read."""
+    with errors_of(output):
+        if len(names) == 1 and not several and not output.is_dir():
+            return (output,)
+    if output.suffix == ".npz" or output.is_file():
+        problem = f"{len(names)} runs do not fit into one file"
+        raise InspectorError(f"{output}: {problem}; name a folder, or choose one (--episode)")
+    targets = tuple(output / f"{name}.npz" for name in names)
+    if twice := [path for path in targets if targets.count(path) > 1]:
+        problem = "two logs would be written there; import them one by one"
+        raise InspectorError(f"{twice[0]}: {problem}")
+    try:
+        output.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InspectorError(f"{output}: cannot be created ({error.strerror})") from error
+    return targets
 
 
 def export(

@@ -1,7 +1,6 @@
 """A run file or any log, opened as a run in memory: what all commands read their inputs by.
 
-The format is found by a file's first bytes, or by the files in a folder. Logs are imported as run
-files one by one or a folder of them at a time.
+The format is found by a file's first bytes, or by the files in a folder.
 """
 
 import hashlib
@@ -24,11 +23,11 @@ from inspector.logs.mapping import (
     named,
     read_options,
 )
-from inspector.logs.motion import Imported, contradictions, limit_warnings, prepared, run_of
+from inspector.logs.motion import Imported, prepared, run_of
 from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
 from inspector.text import counted, printable
-from noisemodel import NoiseModelError, OutputError, Robot, Run, RunFileError, runfile
-from noisemodel.files import also_reading, refuse_existing
+from noisemodel import NoiseModelError, Robot, Run, RunFileError, runfile
+from noisemodel.files import also_reading
 from noisemodel.robot import joint_limits
 from noisemodel.run import NotUniformError
 
@@ -191,7 +190,8 @@ def listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
     return (f"{path}: {opened.kind}", *(f"  {line}" for line in opened.listing()))
 
 
-def _name(path: Path, episode: str) -> str:
+def run_name(path: Path, episode: str) -> str:
+    """Name of the run of an episode of a log."""
     return f"{path.stem}-{episode}" if episode else path.stem
 
 
@@ -204,7 +204,7 @@ def _read_episode(
     robot: Robot | None,
 ) -> Imported:
     """Run of an episode: its signals prepared, with the desired ones of another log."""
-    name = _name(path, episode)
+    name = run_name(path, episode)
     if opened.run and not desired:
         run = opened.run()
         run = replace(run, robot=options.robot or run.robot)
@@ -407,77 +407,3 @@ def _is_npz(path: Path) -> bool:
 
 def _is_archive(path: Path) -> bool:
     return path.is_file() and zipfile.is_zipfile(path)  # a device or a pipe may have no end
-
-
-# Import as run files
-
-
-@dataclass(frozen=True)
-class Written:
-    """Result of importing one log, or one of its episodes."""
-
-    path: Path  # the run file; if the log could not be read, the log
-    duration: float = 0.0
-    rate: float = 0.0
-    remarks: tuple[str, ...] = ()  # what was decided during the import, a sentence each
-    problem: str = ""  # why there is no run file; empty if there is one
-    lost: bool = False  # the log could be read, and the run file not be written
-
-
-def import_logs(
-    logs: Sequence[Path],
-    output: Path,
-    reading: Reading,
-    *,
-    overwrite: bool = False,
-    progress: Callable[[Iterable[Any], int], Iterable[Any]],
-) -> Iterator[Written]:
-    """Write a run file for each run of some logs; one that cannot be read alone raises."""
-    logs = [log for path in logs for log in logs_in(path)[0]]
-    also_reading(logs)
-    several = len(logs) > 1
-    if reading.desired and several:
-        raise InspectorError(f"{reading.desired}: belongs to one log, {len(logs)} are given")
-    jobs: list[tuple[str, Callable[[], Imported]]] = []
-    for log in logs:
-        try:
-            found = readers_of(log, reading)
-            jobs += ((_name(log, episode), read) for episode, read in found.items())
-        except (InspectorError, NoiseModelError) as error:
-            if not several:
-                raise
-            yield Written(log, problem=str(error))
-    targets = _targets([name for name, _ in jobs], output, several=several)
-    for target in targets:
-        refuse_existing(target, overwrite=overwrite)
-    reads = [read for _, read in jobs]
-    for read, target in progress(zip(reads, targets, strict=True), len(jobs)):
-        try:
-            imported = read()
-            run = imported.run
-            run.save(target, overwrite=overwrite)
-            remarks = (*imported.remarks, *contradictions(run), *limit_warnings(run))
-            yield Written(target, run.duration, run.rate, remarks)
-        except (InspectorError, NoiseModelError) as error:
-            if len(targets) == 1 and not several:
-                raise
-            lost = isinstance(error, OutputError) and isinstance(error.__cause__, OSError)
-            yield Written(target, problem=str(error), lost=lost)
-
-
-def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path, ...]:
-    """Paths of the run files, checked before the logs are read."""
-    if len(names) == 1 and not several and not _is_folder(output):
-        return (output,)
-    if output.suffix == ".npz" or output.is_file():
-        problem = f"{len(names)} runs do not fit into one file"
-        raise InspectorError(f"{output}: {problem}; name a folder, or choose one (--episode)")
-    targets = tuple(output / f"{name}.npz" for name in names)
-    if twice := [path for path in targets if targets.count(path) > 1]:
-        problem = "two logs would be written there; import them one by one"
-        raise InspectorError(f"{twice[0]}: {problem}")
-    try:
-        output.mkdir(exist_ok=True)
-    except OSError as error:
-        raise InspectorError(f"{output}: cannot be created ({error.strerror})") from error
-    return targets
