@@ -36,6 +36,7 @@ from inspector.logs.mapping import (
     no_motion,
 )
 from inspector.logs.names import (
+    JOINT_SIGNALS,
     SIGNALS,
     TIMES,
     Naming,
@@ -104,6 +105,12 @@ def meaning(name: str) -> str:
     lower = name.lower()
     found = next((what for pattern, what in TABLE if re.fullmatch(pattern, lower)), "")
     return found or array_signal(name) or ""
+
+
+def may_hold(name: str, naming: Naming) -> bool:
+    """Whether a column may hold motion, by its name: of a joint, of the only one, or of a state."""
+    alone = naming.alone and array_signal(name) in JOINT_SIGNALS
+    return alone or column_signal(name, naming) is not None or CELLS.fullmatch(name) is not None
 
 
 def log_of(

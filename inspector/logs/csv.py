@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.arrays import CELLS, log_of
+from inspector.logs.arrays import log_of, may_hold
 from inspector.logs.clocks import stamps_since
 from inspector.logs.mapping import Log, LogReader, ReadOptions, Stamps, no_motion
 from inspector.logs.names import (
@@ -249,13 +249,7 @@ def _wanted(
     wanted = [
         place
         for place, name in enumerate(header)
-        if place not in (time, rest)
-        and (
-            name in mapped
-            or column_signal(name, naming)
-            or (array_signal(name) in JOINT_SIGNALS and naming.alone)
-            or CELLS.fullmatch(name)
-        )
+        if place not in (time, rest) and (name in mapped or may_hold(name, naming))
     ]
     for place in [*wanted, *([] if time is None else [time])]:
         if header.count(header[place]) > 1:

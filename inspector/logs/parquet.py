@@ -23,10 +23,10 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.arrays import CELLS, floats, log_of
+from inspector.logs.arrays import floats, log_of, may_hold
 from inspector.logs.clocks import stamps_of
 from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, errors_of, no_motion
-from inspector.logs.names import Naming, array_signal, column_signal, listed, time_column
+from inspector.logs.names import Naming, array_signal, listed, time_column
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
 from noisemodel.files import beyond, limit
@@ -130,14 +130,7 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     names = [name for name in schema.names if name not in (time, EPISODE)]
     mapped = options.for_columns(path, names).mapped
     naming = Naming.of(names, options.known_joints)
-    wanted = [
-        name
-        for name in names
-        if name in mapped
-        or column_signal(name, naming)
-        or array_signal(name)
-        or CELLS.fullmatch(name)
-    ]
+    wanted = [n for n in names if n in mapped or may_hold(n, naming) or array_signal(n)]
     if not wanted:
         raise no_motion(path, schema.names)
     if time in schema.names:
@@ -274,7 +267,6 @@ def _data_set(path: Path, folder: Path, options: ReadOptions) -> LogReader:
                 has = listed(_schema(file).names)
                 raise LogError(file, f"there is no column {EPISODE!r}; it has {has}")
             places.setdefault(episode, []).append(file)
-    features = info["features"]
     return LogReader(
         f"LeRobot {info.get('codebase_version', '')}".strip(),
         tuple(sorted(places, key=int)),
@@ -282,9 +274,9 @@ def _data_set(path: Path, folder: Path, options: ReadOptions) -> LogReader:
         lambda: (
             f"{counted(len(places), 'episode')} at {info.get('fps', 'unknown')} Hz",
             *(
-                f"{name}  {about.get('dtype')} {about.get('shape')}"
-                f"  {listed(_names(features, name))}".rstrip()
-                for name, about in features.items()
+                f"{name}  {each.get('dtype')} {each.get('shape')}"
+                f"  {listed(_names(each.get('names')))}".rstrip()
+                for name, each in info["features"].items()
             ),
         ),
     )
@@ -302,17 +294,13 @@ def _info(path: Path) -> dict[str, Any]:
     return info
 
 
-def _names(features: dict[str, Any], name: str) -> list[str]:
+def _names(names: Any) -> list[str]:
     """Names of a feature's columns, flattened; empty if there are none."""
-
-    def flat(names: Any) -> Iterator[str]:
-        if isinstance(names, str):
-            yield names
-        elif isinstance(names, dict | list):
-            for each in names.values() if isinstance(names, dict) else names:
-                yield from flat(each)
-
-    return [*flat(features.get(name, {}).get("names"))]
+    if isinstance(names, str):
+        return [names]
+    if isinstance(names, dict):
+        names = [*names.values()]
+    return [n for each in names for n in _names(each)] if isinstance(names, list) else []
 
 
 def _episode(
@@ -323,34 +311,28 @@ def _episode(
     wanted = [name for name in present if name in {*FEATURES, *mapped, STAMP}]
     table = _table(files, wanted, episode)
     arrays = {n: v for n in wanted if n != STAMP and (v := _values(path, table, n)) is not None}
-    columns = {
-        name: names
-        if len(names := _names(features, name)) == each.shape[1]
-        else [""] * each.shape[1]
-        for name, each in arrays.items()
-    }
+    columns = {}
+    for name, each in arrays.items():
+        names = _names(features.get(name, {}).get("names"))
+        columns[name] = names if len(names) == each.shape[1] else [""] * each.shape[1]
     remarks = []
     state = [] if STATE in mapped else columns.get(STATE, [])
     if CARTESIAN & {name.lower() for name in state}:
-        raise LogError(
-            path,
-            f"{STATE} holds {listed(state)}: the pose of an end effector, not joints; name the"
-            " columns that are joints, such as --map position=observation.state[6:12]",
-        )
+        how = "name the columns that are joints, such as --map position=observation.state[6:12]"
+        problem = f"{STATE} holds {listed(state)}: the pose of an end effector, not joints"
+        raise LogError(path, f"{problem}; {how}")
     if state and not any(state):
         remarks.append(f"{STATE} has no names; it is read as joint positions")
     if ACTION in arrays and ACTION not in mapped and columns[ACTION] != state:
         del arrays[ACTION]
-        remarks.append(
-            f"{ACTION} not taken as desired positions: its columns are not those of {STATE};"
-            f" --map position_desired={ACTION}[0:6] takes some"
-        )
+        how = f"--map position_desired={ACTION}[0:6] takes some"
+        why = f"its columns are not those of {STATE}; {how}"
+        remarks.append(f"{ACTION} not taken as desired positions: {why}")
     stamps = _stamps(path, info, table, options)
-    fields = [
-        field
-        for name, each in arrays.items()
-        for field in _fields(path, name, each, columns[name], stamps, mapped)
-    ]
+    fields: list[Field] = []
+    for name, each in arrays.items():
+        held = "" if name in mapped else FEATURES[name]
+        fields += _fields(path.name, name, held, each, columns[name], stamps)
     meta = {"robot_type": info.get("robot_type"), "dataset": info.get("codebase_version")}
     ends = [column.rpartition(".")[1:] for name in arrays for column in columns[name]]
     return Log(
@@ -364,16 +346,10 @@ def _episode(
 
 
 def _fields(
-    path: Path,
-    name: str,
-    values: NDArray[Any],
-    columns: Sequence[str],
-    stamps: Stamps,
-    mapped: Collection[str],
+    source: str, name: str, held: str, values: NDArray[Any], columns: list[str], stamps: Stamps
 ) -> Iterator[Field]:
-    """Fields of a feature, one for each signal that its columns hold."""
+    """Fields of a feature, one for each signal that its columns hold; ``held`` is the usual one."""
     ends = [column.rpartition(".") for column in columns]
-    held = "" if name in mapped else FEATURES[name]
     kinds = [held and PARTS.get(end, held) for _, _, end in ends]
     for kind in dict.fromkeys(kinds):
         of_kind = [place for place, other in enumerate(kinds) if other == kind]
@@ -385,7 +361,7 @@ def _fields(
             stamps,
             joints=tuple(filter(None, (ends[n][0] or ends[n][2] for n in of_kind))),
             signal="" if signal == "effort_desired" else signal,
-            source=path.name,
+            source=source,
         )
 
 
