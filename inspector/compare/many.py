@@ -21,7 +21,7 @@ from inspector.recording.run import log_report, writing
 from inspector.recording.views import Label, Panel, Timed
 from inspector.report import spoken
 from noiseclassifier import Event
-from noisemodel import Block, Run
+from noisemodel import Block
 from noisemodel.types import Array
 
 
@@ -75,16 +75,13 @@ def lay(runs: Sequence[Opened], library: Library, *, from_start: bool = True) ->
     names = [path.stem if unique else str(path) for path in shown]
     sides = []
     for opened, name in zip(runs, names, strict=True):
-        run = _from_start(opened.run) if from_start else opened.run
+        run = opened.run
+        if from_start and (start := float(run.time[0])):
+            blocks = tuple(Block(b.start - start, b.stop - start, b.label) for b in run.blocks)
+            run = replace(run, time=run.time - start, blocks=blocks)
         found = analyse(run, library, name=name, sha256=opened.sha256)
         sides.append(replace(found, assumed=opened.assumed))
     return Several(tuple(names), tuple(sides))
-
-
-def _from_start(run: Run) -> Run:
-    start = float(run.time[0])
-    blocks = tuple(Block(b.start - start, b.stop - start, b.label) for b in run.blocks)
-    return replace(run, time=run.time - start, blocks=blocks)
 
 
 CURVES = 8  # runs whose level is drawn as a curve, the worst; more lines cannot be told apart
@@ -141,9 +138,8 @@ def report(several: Several) -> str:
     failing = sum(bool(side.findings) for side in several.sides)
     lines = [f"### {len(several.names)} runs, {failing} with findings"]
     if several.worst is not None and (event := several.longest) is not None:
-        when = f"{event.start:.2f} s to {event.stop:.2f} s"
-        name = several.names[several.worst]
-        lines += ["", f"Worst: **{name}**, {spoken(event.label)} from {when}"]
+        when = f"{spoken(event.label)} from {event.start:.2f} s to {event.stop:.2f} s"
+        lines += ["", f"Worst: **{several.names[several.worst]}**, {when}"]
     lines += ["", "| run | findings | peak [dB] |", "|---|---|---|"]
     for index, (name, side) in enumerate(zip(several.names, several.sides, strict=True)):
         shown = f"**{name}** (worst)" if index == several.worst else name
@@ -155,11 +151,10 @@ def report(several: Several) -> str:
     for name, side in zip(several.names, several.sides, strict=True):
         for remark in dict.fromkeys(map(spoken, side.remarks)):
             remarks.setdefault(remark, []).append(name)
-    told = [
-        f"- {remark} ({f'{len(who)} runs' if len(who) > 1 else who[0]})"
-        for remark, who in remarks.items()
-    ]
-    return "\n".join([*lines, *(["", "**Remarks**", "", *told] if told else [])]) + "\n"
+    lines += ["", "**Remarks**", ""] if remarks else []
+    for remark, who in remarks.items():
+        lines.append(f"- {remark} ({f'{len(who)} runs' if len(who) > 1 else who[0]})")
+    return "\n".join(lines) + "\n"
 
 
 def shortened(names: Sequence[str]) -> list[str]:
