@@ -100,9 +100,9 @@ class Missing:
         return "MISSING" if self.scenario else "CUT" if self.label == END else "FAIL"
 
     @property
-    def rule(self) -> str:
-        """Its kind, for programs that count them."""
-        return f"missing-{'log' if self.scenario else self.label.replace(' ', '-')}"
+    def kind(self) -> str:
+        """For programs that count them."""
+        return "log" if self.scenario else self.label.replace(" ", "-")
 
     @property
     def told(self) -> str:
@@ -354,11 +354,7 @@ def classify_file(
     draw: Drawing | None = None,
     reference: Referring | None = None,
 ) -> Verdict:
-    """Classify one file; errors become part of the verdict.
-
-    Args:
-        path: A run file, or any log that `inspector import` reads.
-    """
+    """Classify a run file, or any log; errors become part of the verdict."""
     source = path if isinstance(path, Source) else Source(path)
     begun = perf_counter()
     try:
@@ -377,13 +373,9 @@ def classify_file(
         message = without_path(error, source.path)
         verdict = Verdict(source.shown, Status.BAD_INPUT, message=message, unknown=unknown)
     except Exception as error:  # a bug that one run shows must not hide the findings of others
-        verdict = Verdict(
-            source.shown,
-            Status.INTERNAL_ERROR,
-            message=f"{type(error).__name__}: {error}",
-            unknown=unknown,
-            trace=traceback.format_exc(),
-        )
+        message, trace = f"{type(error).__name__}: {error}", traceback.format_exc()
+        bug = Status.INTERNAL_ERROR
+        verdict = Verdict(source.shown, bug, message=message, unknown=unknown, trace=trace)
     return replace(verdict, seconds=perf_counter() - begun)
 
 
@@ -414,10 +406,10 @@ def classify_files(
         draw=draw,
         reference=reference,
     )
-    end = partial(died, unknown=unknown)
-    each = DRAWING if draw is not None else 0.0
+    runs = [path if isinstance(path, Source) else Source(path) for path in paths]
+    end, each = partial(died, unknown=unknown), DRAWING if draw is not None else 0.0
     if resume is None:
-        yield from in_order(one, paths, jobs=jobs, died=end, work=work_of(paths, each))
+        yield from in_order(one, runs, jobs=jobs, died=end, work=work_of(runs, each))
         return
     reading = reading or Reading()
     files = [each for each in (reading.desired, Path(str(reading.options.robot))) if each]
@@ -432,17 +424,15 @@ def classify_files(
     content = cache(digest)
     with kept(resume, settings) as (verdicts, add):
         todo = []
-        for path in paths:
-            run = path if isinstance(path, Source) else Source(path)
+        for run in runs:
             known = verdicts.get((run.shown, content(run.path)))
             if known is None or (known.picture is not None and not known.picture.exists()):
                 todo.append(run)
             else:
                 yield known
-        work = partial(_with_digest, one=one)
-        for _, (verdict, sha256) in as_done(
-            work, todo, jobs=jobs, died=lambda run: (end(run), ""), work=work_of(todo, each)
-        ):
+        work, ends = partial(_with_digest, one=one), lambda run: (end(run), "")
+        done = as_done(work, todo, jobs=jobs, died=ends, work=work_of(todo, each))
+        for _, (verdict, sha256) in done:
             add(verdict, sha256)
             yield verdict
 
@@ -452,21 +442,17 @@ def _with_digest(run: Source, one: Callable[[Source], Verdict]) -> tuple[Verdict
     return one(run), sha256
 
 
-def died(path: Path | Source, unknown: Unknown) -> Verdict:
+def died(run: Source, unknown: Unknown) -> Verdict:
     """The verdict on a run with which a worker died."""
-    shown = path.shown if isinstance(path, Source) else path
     message = f"{DIED}; classify this run alone to see why"
-    return Verdict(shown, Status.INTERNAL_ERROR, message=message, unknown=unknown)
+    return Verdict(run.shown, Status.INTERNAL_ERROR, message=message, unknown=unknown)
 
 
-def work_of(paths: Sequence[Path | Source], each: float = 0.0) -> float:
-    """About how long runs take, in [s]: one core does 50 MB/s of samples that are not packed.
-
-    Args:
-        each: What comes to it for each run, in [s].
-    """
-    files = (each.path if isinstance(each, Source) else each for each in paths)
-    return sum(file.stat().st_size for file in files if file.is_file()) / 50e6 + each * len(paths)
+def work_of(runs: Sequence[Source], each: float = 0.0) -> float:
+    """About how long runs take, in [s], with what comes to it for each."""
+    # One core does 50 MB/s of samples that are not packed.
+    sizes = (run.path.stat().st_size for run in runs if run.path.is_file())
+    return sum(sizes) / 50e6 + each * len(runs)
 
 
 def exit_status(verdicts: Sequence[Verdict]) -> int:
@@ -520,11 +506,7 @@ def kept(
 ) -> Iterator[tuple[dict[tuple[Path, str], Verdict], Callable[[Verdict, str], None]]]:
     """Open a state file to resume, or create it.
 
-    Args:
-        settings: Models and settings, by name, as JSON can hold them.
-
-    Returns:
-        The verdicts so far, by run and SHA-256 of its content, and a function that adds one.
+    It gives the verdicts so far, by run and SHA-256 of its content, and a function that adds one.
     """
     header = {"format": FORMAT, **settings}
     refused = partial(StateError, path)
@@ -554,16 +536,10 @@ def resumed(
     what: str,
     afresh: bool = False,
 ) -> Iterator[tuple[list[bytes], Callable[[Mapping[str, Any]], None]]]:
-    """Open a file of JSON lines to resume, or create it.
+    """Open a file of JSON lines that begins with a header to resume, or create it.
 
-    Args:
-        header: Its first line, with its format.
-        refused: Makes an error of a problem of the file.
-        what: What it holds, in words.
-        afresh: Whether to discard what it holds.
-
-    Returns:
-        The lines after the header, and a function that appends one.
+    It gives the lines after the header, and a function that appends one; none of a file that is
+    begun afresh.
     """
     if path.exists() and not path.is_file():
         raise refused("is no regular file")

@@ -34,6 +34,7 @@ from inspector.audit import audit
 from inspector.errors import InspectorError, Status, Unknown
 from inspector.levels import STEP
 from inspector.library import Labelled, demo_run, load_library, model_files
+from inspector.logs.read import Source
 from inspector.report import WORDS, html
 from inspector.report.formats import FORMATS
 from inspector.signals import without_placeholder
@@ -404,7 +405,7 @@ def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
     (tmp_path / "a.npz").write_bytes(bytes(1_000_000))
     (tmp_path / "b.npz").write_bytes(bytes(500_000))
     found = [tmp_path / "a.npz", tmp_path / "b.npz", tmp_path / "gone.npz", tmp_path]
-    assert work_of(found) == pytest.approx(0.03, rel=1e-12)
+    assert work_of(list(map(Source, found))) == pytest.approx(0.03, rel=1e-12)
 
 
 def test_the_papers_sum_is_given_where_a_robot_and_its_positions_are_known():

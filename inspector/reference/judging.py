@@ -124,11 +124,6 @@ class Scenario:
         every = [each.duration for each in self.repetitions]
         return min(every), max(every)
 
-    @property
-    def robot(self) -> str:
-        """That the newest repetition names."""
-        return self.repetitions[-1].robot
-
 
 @dataclass(frozen=True)
 class Margin:

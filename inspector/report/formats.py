@@ -50,6 +50,7 @@ RULES = {
 }
 # Findings of a scenario that are listed, and of a difference those of each kind.
 MOST, MOST_OF_KIND = 20, 5
+QUIET = (Status.OK, diff.Outcome.SAME)  # what tables leave out
 REPEATED = r"\d+% by \d+ repetitions? of "  # what the line on the reference says for all runs
 # By what else remarks of runs differ that say the same.
 AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
@@ -82,7 +83,6 @@ class Case:
     notes: tuple[str, ...] = ()  # what does not fail it, a sentence each
     trace: str = ""
     seconds: float = 0.0  # that it took
-    quiet: bool = False  # whether tables leave it out
     picture: Path | None = None
     rules: tuple[tuple[str, dict[str, float]], ...] = ()  # of each sentence, and when, in [s]
 
@@ -267,7 +267,7 @@ def _described(rule: str) -> str:
 def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
     """Write a job for its summary or a comment: a table, the worst first, and a picture."""
     ranked = job.ranked
-    shown = [case for case in ranked if case.outcome or not case.quiet]
+    shown = [case for case in ranked if case.outcome or case.status not in QUIET]
     lines, tail = [marker, f"### {job.title}: {job.summary}", ""], [""]
     for remark in job.remarks:
         tail += [f"{_cell(remark[:1].upper() + remark[1:])}.", ""]
@@ -432,13 +432,12 @@ def _case(verdict: Verdict) -> Case:
         sentences=tuple(failing(verdict)),
         rules=(
             *((each.label, _rounded(each, "start", "stop")) for each in verdict.failing),
-            *((each.rule, {}) for each in verdict.missing),
+            *((f"missing-{each.kind}", {}) for each in verdict.missing),
         ),
         message=verdict.message,
         notes=tuple(excused(verdict)),
         trace=verdict.trace,
         seconds=verdict.seconds,
-        quiet=verdict.status is Status.OK,
         picture=verdict.picture,
     )
 
@@ -638,7 +637,6 @@ def _of_row(found: Difference, of: diff.Row, place: int) -> Case:
         sentences=tuple(lines) if fails else (),
         message="" if fails else of.reason,
         notes=(*others, *_folded(of, RESOLVED), *of.remarks),
-        quiet=of.outcome is diff.Outcome.SAME,
         picture=found.picture if not place else None,
     )
 
