@@ -74,18 +74,20 @@ def _chains(names: Sequence[str], robot: Robot) -> list[tuple[str, ...]]:
         while link and link not in names:
             link = above[link]
         carrier[name] = link
-    branches = Counter(carrier[name] for name in names)
-    limb = {"": ""}
-    waiting = list(names)
-    while waiting:
-        name = next(name for name in waiting if carrier[name] not in waiting)
-        before, alone = carrier[name], not branches[name]  # a finger, a wheel
-        goes_on = before and (alone or branches[before] == 1)
-        limb[name] = limb[before] if goes_on or (alone and not before) else name
-        waiting.remove(name)
+    branches = Counter(carrier.values())
+
+    def first(name: str) -> str:
+        """The joint that the limb of a joint begins with."""
+        while before := carrier[name]:
+            if branches[name] and branches[before] > 1:  # no finger
+                return name
+            name = before
+        return name if branches[name] else ""  # wheels belong together
+
+    firsts = {name: first(name) for name in names}
     return [
-        tuple(name for name in names if limb[name] == first)
-        for first in dict.fromkeys(limb[name] for name in names)
+        tuple(name for name in names if firsts[name] == limb)
+        for limb in dict.fromkeys(firsts.values())
     ]
 
 
