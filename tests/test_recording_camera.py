@@ -1,17 +1,12 @@
 """The robot is in view: laws of the camera, with the mesh and the kinematics of the noise model."""
 
-from pathlib import Path
-
 import numpy as np
 import pinocchio
 import pytest
-import rerun as rr
-from chains import BAR
 from recordings import layout, motion, read
 from test_noisemodel_mjcf import ARM, LEGS, written
 
 from inspector.analysis import analyse_file
-from inspector.recording import robot as scene
 from inspector.recording.robot import FIELD_OF_VIEW, fitted
 from inspector.recording.run import write
 from noisemodel import Robot, Run
@@ -150,22 +145,3 @@ def test_a_robot_of_twice_the_size_or_of_none_is_the_same_picture():
     assert np.isfinite(camera.eye).all()
     np.testing.assert_allclose(camera.target, [1.0, 2.0, 3.0], atol=0.01)
     assert camera.floor == 3.0
-
-
-def urdf(folder: Path, shape: str) -> Path:
-    path = folder / "bare.urdf"
-    path.write_text(
-        f"""<robot name="bare"><link name="a">{shape}</link><link name="b">{shape}</link>
-        <joint name="j" type="revolute"><parent link="a"/><child link="b"/>
-        <origin xyz="0 0.3 0.4"/><axis xyz="1 0 0"/>
-        <limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
-    )
-    return path
-
-
-def test_a_link_without_visual_shapes_is_drawn_as_it_collides(tmp_path):
-    path = urdf(tmp_path, BAR.replace("visual", "collision"))
-    drawn = scene.log_robot(rr.RecordingStream("test"), str(path), ["j"])
-    assert drawn.links == ["_fixed", "b"]
-    sizes = [np.ptp(points, axis=0) for points in drawn.outermost.values()]
-    np.testing.assert_allclose(sizes[0], sizes[1])

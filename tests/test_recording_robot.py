@@ -7,7 +7,7 @@ import pinocchio
 import pytest
 import rerun as rr
 from recordings import read
-from test_noisemodel_mjcf import ARM, LEGS, one_body, written
+from test_noisemodel_mjcf import ARM, LEGS, one_body, write_stl, written
 
 from inspector.errors import InspectorError
 from inspector.recording.robot import log_robot
@@ -64,40 +64,19 @@ def test_no_mesh_is_read_outside_of_the_robots_folders(tmp_path, address):
         drawn(robot(inner, address.format(outside=tmp_path)))
 
 
-COLLADA = """<COLLADA version="{version}"><asset><up_axis>{up}</up_axis></asset>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="a" count="12">0 0 0 1 0 0 1 1 0 0 1 0</float_array>
-<technique_common><accessor source="#a" count="4" stride="3"/></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-{faces}</mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node>
-</visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
-TRIANGLES = """<triangles count="2"><input semantic="VERTEX" source="#v" offset="0"/>
-<p>0 1 2 0 2 3</p></triangles>"""
-POLYGON = """<polylist count="1"><input semantic="VERTEX" source="#v" offset="0"/>
-<vcount>4</vcount><p>0 1 2 3</p></polylist>"""
-
-
-@pytest.mark.parametrize(
-    ("version", "up", "faces"),
-    [
-        ("1.4.1", "Z_UP", TRIANGLES),
-        ("1.4.1", "Z_UP", POLYGON),
-        ("1.4.1", "Y_UP", TRIANGLES),
-        ("1.4.0", "Z_UP", TRIANGLES),
-    ],
-)
-def test_collada_is_drawn_as_the_noise_model_reads_it(tmp_path, version, up, faces):
-    part, recording = tmp_path / "part.dae", rr.RecordingStream("test")
-    part.write_text(COLLADA.format(version=version, up=up, faces=faces))
+def test_a_link_is_drawn_by_the_triangles_of_its_mesh_with_their_normals(tmp_path):
+    write_stl(tmp_path / "part.stl")
+    recording = rr.RecordingStream("test")
     recording.save(tmp_path / "out.rrd")
-    log_robot(recording, str(robot(tmp_path, "part.dae")), ())
+    log_robot(recording, str(robot(tmp_path, "part.stl")), ())
     recording.disconnect()
     _, ((blob,),) = read(tmp_path / "out.rrd", "/robot/_fixed", "Asset3D:blob")
     facets = np.frombuffer(bytes(blob)[84:], FACET)
-    np.testing.assert_allclose(facets["corners"], meshes.read(part))
-    np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [0, 0, 1]])
+    corners = meshes.read(tmp_path / "part.stl")
+    np.testing.assert_allclose(facets["corners"], corners)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(across, axis=1)
+    np.testing.assert_allclose((facets["normal"] * across).sum(axis=1), length, rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["panda", "talos", "tiago", "hyq", "arm.xml", "legs.xml"])
