@@ -66,12 +66,14 @@ SCENARIO: Keys = {
     "margin_db": float,
 }
 FACTS = ("required", "at_least", "accepted", "by", "reason")  # that are kept as they are
+# Keys of a repetition with the fields of its levels, and their kinds.
+MEASURED = {"rate_hz": "rate", "start_s": "start", "duration_s": "duration"}
+REPEATED = {"run": "run", "sha256": "sha256", **MEASURED, "guided_by": "guided_by"}
 REPETITION_KEYS: Keys = {
-    **dict.fromkeys(("run", "sha256", "guided_by"), str),
-    **dict.fromkeys(("rate_hz", "start_s", "duration_s"), float),
+    **{key: float if key in MEASURED else str for key in REPEATED},
     "joints": TEXTS,
 }
-# What a scenario of the store may hold, its repetitions, and what it wants and waives.
+# What a scenario of the store wants and waives.
 EXPECTED: Keys = {
     "class": str,
     "time_s": NUMBERS,
@@ -393,11 +395,8 @@ def _lines(scenario: Scenario, file: str, sha256: str) -> list[str]:
     facts = {
         "name": scenario.name,
         "robot": newest.robot,
-        "required": scenario.required,
-        "at_least": scenario.at_least,
+        **{key: getattr(scenario, key) for key in FACTS},
         "accepted": scenario.accepted or date.today(),
-        "by": scenario.by,
-        "reason": scenario.reason,
         "duration_s": [round(each, 3) for each in scenario.duration],
         "margin_db": round(margin_of(scenario.scores_db).db, 1),
         "scores_db": list(scenario.scores_db),
@@ -409,16 +408,9 @@ def _lines(scenario: Scenario, file: str, sha256: str) -> list[str]:
     }
     lines = _table("scenario", facts)
     for each in scenario.repetitions:
-        facts = {
-            "run": each.run,
-            "sha256": each.sha256,
-            "rate_hz": each.rate,
-            "start_s": each.start,
-            "duration_s": each.duration,
-            "guided_by": each.guided_by,
-            "joints": list(each.joints) if each.joints != newest.joints else None,
-        }
-        lines += _table("scenario.repetition", facts)
+        joints = list(each.joints) if each.joints != newest.joints else None
+        facts = {key: getattr(each, name) for key, name in REPEATED.items()}
+        lines += _table("scenario.repetition", {**facts, "joints": joints})
     for name, entries in (("wanted", scenario.wanted), ("waive", scenario.waive)):
         for entry in entries:
             bounded = isfinite(entry.start) or isfinite(entry.stop)
@@ -482,23 +474,21 @@ def _read(folder: Path) -> Reference:
 
 def _checked(path: Path, where: str, row: Any, keys: Keys, needed: Sequence[str]) -> dict[str, Any]:
     """A table of the store, whose keys are known and whose values have their kinds."""
-    problem = "" if isinstance(row, dict) else "expected a table"
-    for key, value in row.items() if not problem else ():
+    if not isinstance(row, dict):
+        raise StoreError(path, f"{where}: expected a table")
+    for key, value in row.items():
         if key not in keys:
-            problem = f"no {key!r}; there are {', '.join(keys)}"
-            break
+            raise StoreError(path, f"{where}: no {key!r}; there are {', '.join(keys)}")
         kind = keys[key]
-        of = kind[0] if isinstance(kind, tuple) else kind
-        values = value if isinstance(kind, tuple) else [value]
-        known = isinstance(values, list) and all(
-            type(each) in ((int, float) if of is float else (of,)) for each in values
-        )
+        of, values = (kind[0], value) if isinstance(kind, tuple) else (kind, [value])
+        kinds = (int, float) if of is float else (of,)
+        known = isinstance(values, list) and all(type(each) in kinds for each in values)
         if not known or (kind is float and not isfinite(value)):
-            several = "a list, each of it " if isinstance(kind, tuple) else ""
-            problem = f"{key} = {toml_shown(value)}, expected {several}{KINDS[of]}"
-    missing = [key for key in needed if not problem and key not in row]
-    if problem or missing:
-        raise StoreError(path, f"{where}: {problem or f'{missing[0]} is missing'}")
+            expected = f"{'a list, each of it ' * isinstance(kind, tuple)}{KINDS[of]}"
+            problem = f"{key} = {toml_shown(value)}, expected {expected}"
+            raise StoreError(path, f"{where}: {problem}")
+    if missing := [key for key in needed if key not in row]:
+        raise StoreError(path, f"{where}: {missing[0]} is missing")
     return dict(row)
 
 
@@ -545,7 +535,7 @@ def _levels(path: Path, where: str, row: Mapping[str, Any]) -> tuple[Levels, ...
     for number, given in enumerate(rows):
         where_of = f"{where}, [[scenario.repetition]] {number + 1}"
         each = _checked(path, where_of, given, REPETITION_KEYS, ("rate_hz", "duration_s"))
-        own, rate = tuple(each.get("joints") or row["joints"]), float(each["rate_hz"])
+        own, rate = tuple(each.get("joints") or row["joints"]), each["rate_hz"]
         if not 0 < rate < 1e7:
             raise StoreError(path, f"{where_of}: rate_hz = {rate:g}, expected a rate")
         bands = octaves(rate)
@@ -557,20 +547,17 @@ def _levels(path: Path, where: str, row: Mapping[str, Any]) -> tuple[Levels, ...
         finite = fit and bool(np.isfinite(guide).all() and np.isfinite(pace).all())
         if not finite or len(set(own)) < len(own):
             raise StoreError(file, f"its arrays do not belong to {again}")
+        known = {name: each.get(key, "") for key, name in REPEATED.items()}
+        known |= {name: float(each.get(key, 0.0)) for key, name in MEASURED.items()}
         measured = Levels(
-            row["name"],
-            each.get("run", ""),
-            each.get("sha256", ""),
-            row.get("robot", ""),
-            own,
-            rate,
-            float(each.get("start_s", 0.0)),
-            float(each["duration_s"]),
-            bands,
-            decoded(level.astype(np.uint8)),
-            guide.astype(np.float32),
-            each.get("guided_by", ""),
-            pace.astype(np.float32),
+            **known,
+            name=row["name"],
+            robot=row.get("robot", ""),
+            joints=own,
+            octaves=bands,
+            level=decoded(level.astype(np.uint8)),
+            guide=guide.astype(np.float32),
+            pace=pace.astype(np.float32),
         )
         found.append(measured)
     return tuple(found)
