@@ -292,22 +292,24 @@ def _energies(
         size = -(-(around.shape[1] + settling) // 1024) * 1024  # a length of small factors
         spectrum = fft.rfft(around, size, axis=1)
         frequency = np.arange(spectrum.shape[1]) * (run.rate / size)
+        s = 1j * np.tan(np.pi * np.clip(frequency, 1e-9, run.rate * (0.5 - 1e-9)) / run.rate)
         bins = of_sample[rows]
         starts = np.flatnonzero(np.diff(bins, prepend=-1))
         for place, band in enumerate(bands):
-            passed = fft.irfft(spectrum * _response(frequency, band, run.rate), size, axis=1)
+            passed = fft.irfft(spectrum * _response(s, band, run.rate), size, axis=1)
             passed = passed[:, settling : around.shape[1]]
             energy[bins[starts], :, place] += np.add.reduceat(passed**2, starts, axis=1).T
     return energy.reshape(count, 2, joints, len(bands)).transpose(0, 2, 1, 3)
 
 
-def _response(frequency: Array, band: tuple[float, float], rate: float) -> NDArray[np.complex128]:
+def _response(
+    s: NDArray[np.complex128], band: tuple[float, float], rate: float
+) -> NDArray[np.complex128]:
     """Response of a digital Butterworth band-pass of second order, by the bilinear transform.
 
     It is the filter of ``scipy.signal.butter``, which takes half a second to import.
     """
     low, high = np.tan(np.pi * np.array(band) / rate)
-    s = 1j * np.tan(np.pi * np.clip(frequency, 1e-9, rate * (0.5 - 1e-9)) / rate)
     s = (s**2 + low * high) / ((high - low) * s)
     return np.asarray(1.0 / (s**2 + np.sqrt(2.0) * s + 1.0))
 
