@@ -387,16 +387,14 @@ def _shape(compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None) -> L
         case _:
             return None
     turn = _rotation(compiled.geom_quat[geom])
-    place, colour = turn @ shift + compiled.geom_pos[geom], _colour(compiled, geom)
-    return LinkShape(_body_name(compiled, body), turn @ matrix, place, drawn, colour)
+    place = turn @ shift + compiled.geom_pos[geom]
+    return LinkShape(_body_name(compiled, body), turn @ matrix, place, drawn)
 
 
-def _colour(compiled: Any, geom: int) -> tuple[float, ...]:
-    colour = tuple(compiled.geom_rgba[geom].tolist())
-    material = int(compiled.geom_matid[geom])
-    if material >= 0 and colour == UNCOLOURED:
-        return tuple(compiled.mat_rgba[material].tolist())
-    return colour
+def _opacity(compiled: Any, geom: int) -> float:
+    colour, material = tuple(compiled.geom_rgba[geom].tolist()), int(compiled.geom_matid[geom])
+    own = material < 0 or colour != UNCOLOURED
+    return float(colour[3] if own else compiled.mat_rgba[material][3])
 
 
 def _collides(compiled: Any, geom: int) -> bool:
@@ -412,7 +410,7 @@ def _visual(compiled: Any) -> set[int]:
     groups: dict[int, list[int]] = {}
     for geom in range(compiled.ngeom):
         group = int(compiled.geom_group[geom])
-        if group < DRAWN_GROUPS and compiled.geom_bodyid[geom] and _colour(compiled, geom)[3] > 0:
+        if group < DRAWN_GROUPS and compiled.geom_bodyid[geom] and _opacity(compiled, geom) > 0:
             groups.setdefault(group, []).append(geom)
     colliding = {g: [_collides(compiled, geom) for geom in geoms] for g, geoms in groups.items()}
     decorated = any(not any(each) for each in colliding.values())

@@ -45,7 +45,7 @@ def triangles(robot: Robot, geometry: str = "visual") -> tuple[Array, ...]:
         known = ", ".join(GEOMETRIES)
         raise GeometryError(f"geometry {geometry!r} is not known, expected one of {known}")
     parts = [[np.empty((0, 3, 3))] for _ in robot.joints]
-    for joint, _, surface in pieces(robot, geometry, world=False):
+    for joint, surface in pieces(robot, geometry, world=False):
         parts[joint - 1].append(surface)
     return tuple(map(np.concatenate, parts))
 
@@ -57,12 +57,12 @@ def link_names(robot: Robot) -> tuple[str, ...]:
 
 def pieces(
     robot: Robot, geometry: str = "auto", *, world: bool = True
-) -> Iterator[tuple[int, LinkShape, Array]]:
+) -> Iterator[tuple[int, Array]]:
     """Draw a robot piece by piece; ``world`` tells whether what is fixed to the world counts, too.
 
     Yields:
-        Index of the joint that moves a piece in Pinocchio, 0 if none does; the piece as the file
-        has it; and its triangles in the joint's axes, shape (triangles, 3 corners, 3), in [m].
+        Index of the joint that moves a piece in Pinocchio, 0 if none does; and its triangles in the
+        joint's axes, shape (triangles, 3 corners, 3), in [m].
     """
     places, names = _links(robot)
     mesh = cache(  # left and right often share one
@@ -85,7 +85,7 @@ def pieces(
             if count > limit("triangles"):
                 raise GeometryError(f"{robot.path}: too many triangles, {beyond('triangles')}")
             drawn.add(joint)
-            yield joint, shape, surface
+            yield joint, surface
         waiting -= drawn
 
 

@@ -44,7 +44,6 @@ class LinkShape:
     matrix: Array  # from its numbers to the link's axes: scale, then rotation, shape (3, 3)
     translation: Array  # its origin in the link's axes, shape (3,), in [m]
     body: str | Array  # address of a mesh, or triangles, (triangles, 3 corners, 3), in [m]
-    colour: tuple[float, ...] = ()  # red, green, blue and opacity, 0 to 1; empty unless it was read
 
 
 def checked(path: Path) -> ET.Element:

@@ -493,20 +493,23 @@ def test_a_file_that_is_missing_or_whose_path_is_not_utf_8_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("own", "shown"),
     [
-        ('material="m"', [(1, 0, 0, 1)]),
-        ('material="m" rgba="1 1 0 1"', [(1, 1, 0, 1)]),
-        ('rgba="0 0 0 1"', [(0, 0, 0, 1)]),
-        ('rgba="0 0 1 .5"', [(0, 0, 1, 0.5)]),
-        ('rgba="1 1 1 0"', []),
+        ('material="m"', 1),
+        ('material="m" rgba="1 1 0 1"', 1),
+        ('rgba="0 0 0 1"', 1),
+        ('rgba="0 0 1 .5"', 1),
+        ('rgba="1 1 1 0"', 0),
+        ('material="clear"', 0),
+        ('material="clear" rgba="1 1 0 1"', 1),
     ],
 )
 def test_geoms_that_can_be_seen_are_drawn_textures_and_skins_are_not_opened(tmp_path, own, shown):
     head = (
         '<asset><skin file="gone.skn"/><texture name="t" type="2d" file="gone.png"/>'
-        '<material name="m" texture="t" rgba="1 0 0 1"/></asset>'
+        '<material name="m" texture="t" rgba="1 0 0 1"/>'
+        '<material name="clear" rgba="1 0 0 0"/></asset>'
     )
     robot = Robot.load(written(tmp_path, one_body(f'<geom size="1" {own}/>', head=head)))
-    assert [shape.colour for shape in robot.mjcf.visual] == shown
+    assert len(robot.mjcf.visual) == shown
 
 
 def test_a_run_names_an_mjcf_relative_to_its_own_folder(tmp_path):

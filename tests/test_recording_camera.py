@@ -60,7 +60,7 @@ def in_picture(points, eye, target, aspect):
 def placed(robot, run, samples):
     """All corners of all triangles of a robot, sample by sample, by Pinocchio."""
     corners = {}
-    for joint, _, triangles in pieces(robot):
+    for joint, triangles in pieces(robot):
         corners.setdefault(joint, []).append(triangles.reshape(-1, 3))
     corners = {joint: np.concatenate(parts)[::7] for joint, parts in corners.items()}
     q, _ = robot.configuration(run)

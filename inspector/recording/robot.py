@@ -125,7 +125,7 @@ def log_robot(
     mimics = robot.mjcf.mimics if robot.mjcf else urdf.mimics(robot.path, urdf.checked(robot.path))
     parts: dict[int, list[Array]] = {index: [] for index in _carried(robot)}
     try:
-        for index, _, triangles in pieces(robot):
+        for index, triangles in pieces(robot):
             if index in parts:
                 parts[index].append(triangles)
     except GeometryError as error:
