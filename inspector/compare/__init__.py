@@ -91,19 +91,6 @@ def align(before: Run, after: Run, how: Align = Align.AUTO) -> Alignment:
     return Alignment(how, lag, lag / rate, correlation, rival)
 
 
-def envelope(run: Run) -> Array:
-    """Norm of the joint velocities, desired ones if there are any, shape (samples,).
-
-    The desired motion is the better guide: a defect changes what is measured.
-    """
-    velocity = run.velocity if run.velocity_desired is None else run.velocity_desired
-    power = np.empty(len(velocity))
-    for rows in pieces(velocity):
-        part = velocity[rows]
-        power[rows] = np.einsum("ij,ij->i", part, part, dtype=np.float64)
-    return np.sqrt(power)
-
-
 def _search(before: Run, after: Run) -> tuple[int, float, float]:
     """Find the lag of the highest correlation, that, and the next best."""
     from scipy.signal import correlate
@@ -138,8 +125,16 @@ def _search(before: Run, after: Run) -> tuple[int, float, float]:
 
 
 def _powers(run: Run) -> tuple[Array, Array, Array]:
-    """What is known of a run, its envelope less its mean, and the square of that."""
-    speed, mask = envelope(run), run.mask
+    """What is known of a run, its envelope less its mean, and the square of that.
+
+    The envelope is the norm of the joint velocities, desired ones if there are any: they are the
+    better guide, as a defect changes what is measured.
+    """
+    velocity = run.velocity if run.velocity_desired is None else run.velocity_desired
+    speed, mask = np.empty(len(velocity)), run.mask
+    for rows in pieces(velocity):
+        part = velocity[rows]
+        speed[rows] = np.sqrt(np.einsum("ij,ij->i", part, part, dtype=np.float64))
     size = float(np.sqrt(np.mean(speed[mask] ** 2))) if mask.any() else 0.0
     mean = float(speed[mask].mean()) if mask.any() else 0.0
     level = (speed - mean) * mask
@@ -378,13 +373,16 @@ class Change:
 
 
 def changes(pair: Pair) -> tuple[Change, ...]:
-    """Match the failures of two runs.
+    """Match the failures of two runs: their findings, or annotated blocks if one has no labels.
 
     Findings of one class that overlap or touch, whichever run they are of, are one failure. If both
     runs have a part in it, it is louder or quieter by 3 dB or more, or else unchanged; otherwise it
     is new or resolved.
     """
-    both = [failures(pair, side) for _, side in pair.sides]
+    both: list[list[Event | Block]] = [
+        [*side.findings] if labelled(pair) else [b for b in side.run.blocks if b.label != "ok"]
+        for _, side in pair.sides
+    ]
     found = []
     for label in sorted({each.label for side in both for each in side}):
         own = [spans_of(each for each in side if each.label == label) for side in both]
@@ -414,25 +412,9 @@ def largest_change(pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
     return place - STEP, place + STEP
 
 
-def failures(pair: Pair, side: Analysis) -> Sequence[Event | Block]:
-    """The failures of a run that are matched: its findings, or its annotated blocks."""
-    if labelled(pair):
-        return side.findings
-    return [block for block in side.run.blocks if block.label != "ok"]
-
-
 def labelled(pair: Pair) -> bool:
     """Whether both runs could be labelled, so that findings are what is matched."""
     return pair.before.labels is not None and pair.after.labels is not None
-
-
-def verdict(pair: Pair) -> tuple[str, str]:
-    """A key of ``colors.VERDICTS``, and whether the run after is worse, in a line."""
-    found = changes(pair)
-    kinds = {change.kind for change in found}
-    worse, better = kinds & {NEW, LOUDER}, kinds & {RESOLVED, QUIETER}
-    word = "WORSE" if worse else "BETTER" if better else "SAME"
-    return "findings" if worse else "ok", f"{word}   {_counts(found)}".strip()
 
 
 def summary(pair: Pair) -> str:
@@ -669,7 +651,10 @@ def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]
         "vibration_change_db": whole(pair).change,
     }
     log_report(recording, f"{pair.before.name} → {pair.after.name}", report(pair), properties)
-    views.log_verdict(recording, *verdict(pair))
+    kinds = {change.kind for change in found}
+    worse, better = kinds & {NEW, LOUDER}, kinds & {RESOLVED, QUIETER}
+    told = f"{'WORSE' if worse else 'BETTER' if better else 'SAME'}   {_counts(found)}".strip()
+    views.log_verdict(recording, "findings" if worse else "ok", told)
     text = views.text("Before \u2192 after", "/report")
     if found:
         text = views.tabs(text, views.events("Changes", "/events"))
