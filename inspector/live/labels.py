@@ -67,12 +67,10 @@ class Labeller:
         self._samples += len(motion)
         if self._stream is None:
             return None
-        followed, signals = (
-            {name: noise_signal(name, motion, self._base, self._joints) for name in names}
-            for names in (self._followed, self._names)
-        )
-        self._lasting.push(followed, valid)
-        self._bursts.push(followed, valid)
+        names = dict.fromkeys((*self._followed, *self._names))
+        signals = {n: noise_signal(n, motion, self._base, self._joints) for n in names}
+        self._lasting.push(signals, valid)
+        self._bursts.push(signals, valid)
         labels = self._stream.push(signals, valid)
         if not len(labels):
             return None

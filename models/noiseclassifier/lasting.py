@@ -86,7 +86,9 @@ class Windows(ABC):
         self.rate, self.start = rate, start
         self._length, self._hop = round(window * rate), max(1, round(hop * rate))
         self._first = 0  # number of the first sample that is held
-        self._samples = np.empty((0, 0, 0))  # of the stretch, from where the next window begins
+        # Samples of the stretch from where the next window begins, in pieces, and how many.
+        self._held: list[Array] = []
+        self._count = 0
 
     def push(self, signals: Mapping[str, Real], valid: Mask | None = None) -> None:
         """Take samples.
@@ -114,26 +116,33 @@ class Windows(ABC):
 
     def finish(self) -> None:
         """End a stretch: the signal ends, or a gap begins."""
-        self._end(self._samples)
-        self._first += self._samples.shape[2]
-        self._samples = self._samples[..., :0]
+        self._end(self._samples())
+        self._first += self._count
+        self._held, self._count = [], 0
 
     def _take(self, fresh: Array) -> None:
-        if len(self._samples) == len(fresh) and self._samples.shape[2]:
-            fresh = np.concatenate((self._samples, fresh), axis=2)
-        self._samples = fresh
-        windows = max(0, 1 + (self._samples.shape[2] - self._length) // self._hop)
+        self._held.append(fresh)
+        self._count += fresh.shape[2]
+        windows = max(0, 1 + (self._count - self._length) // self._hop)
         if not windows:
             return
+        samples = self._samples()
         # Of the differences: slow motion, which is far louder, would leak into all frequencies.
-        slopes = np.diff(self._samples[..., : (windows - 1) * self._hop + self._length], axis=2)
+        slopes = np.diff(samples[..., : (windows - 1) * self._hop + self._length], axis=2)
         cut = sliding_window_view(slopes, self._length - 1, axis=2)[:, :, :: self._hop]
         at_once = max(self.LEAST, AT_ONCE // (slopes.shape[1] * self._length))
         for first in range(0, windows, at_once):
             for found in self._found(cut[:, :, first : first + at_once]):
                 self._follow(found)
                 self._first += self._hop
-        self._samples = self._samples[..., windows * self._hop :]
+        rest = samples[..., windows * self._hop :].copy()
+        self._held, self._count = [rest], rest.shape[2]
+
+    def _samples(self) -> Array:
+        """All samples that are held; a single piece is not copied."""
+        if len(self._held) == 1:
+            return self._held[0]
+        return np.concatenate(self._held, axis=2) if self._held else np.empty((0, 0, 0))
 
     @abstractmethod
     def _found(self, slopes: Array) -> Iterable[Any]:
@@ -151,12 +160,13 @@ class Windows(ABC):
 class Lasting(Windows):
     """Finds lines that last in signals that come in chunks of any size."""
 
-    LEAST = 8  # of which halves are shared
+    LEAST = 8
 
     def __init__(self, rate: float, *, start: float = 0.0) -> None:
         super().__init__(rate, WINDOW, HOP, start)
         self._margin = round(MARGIN * rate)
         self._windows = 0  # of the stretch
+        self._halves = np.empty((0, 0))  # greatest mean square of a line of the last two halves
         self.examined = 0  # windows; none where each stretch is shorter than ``SHORTEST``
         self._lines: list[Line] = []  # of the latest window
         self._events: list[Event] = []
@@ -178,18 +188,26 @@ class Lasting(Windows):
     def _heard(self, slopes: Array) -> Mask:
         """Joints and windows that may have a strong line, (joints, windows): a half is loud.
 
-        Few are. Each window shares its second half with the third window from it.
+        Few are. A window ends with a half of its own; the two before are the last of the two
+        windows before it.
         """
-        joints, windows, samples = slopes.shape
-        length, hop = samples - 2 * self._hop, self._hop
-        halves = np.zeros((joints, windows + 2, length + 1))  # one more is transformed fast
-        halves[:, :-2, 1:] = slopes[..., :length]
-        halves[:, -2:, 1:] = sliding_window_view(slopes[:, -1, hop:], length, axis=1)[:, ::hop]
-        power, frequency = spectrum(halves, self.rate)
-        least = max(1, int(np.searchsorted(frequency, LOWEST)) - 1)
-        loudest = power[..., least:].max(axis=2, initial=0.0)
-        level = sliding_window_view(loudest, 3, axis=1).max(axis=2)
+        ends = slopes[..., 2 * self._hop :]
+        if not self._windows:
+            starts = [slopes[:, :1, first:][..., : ends.shape[2]] for first in (0, self._hop)]
+            self._halves = self._loudest(np.concatenate(starts, axis=1))
+        halves = np.concatenate((self._halves, self._loudest(ends)), axis=1)
+        self._halves = halves[:, -2:]
+        level = sliding_window_view(halves, 3, axis=1).max(axis=2)
         return np.asarray(level >= 10.0 ** ((STRONG + FLOOR - HALVES) / 10.0))
+
+    def _loudest(self, halves: Array) -> Array:
+        """Greatest mean square of a line of each half, shape (joints, halves)."""
+        longer = np.zeros((*halves.shape[:2], halves.shape[2] + 1))  # it is transformed fast
+        longer[..., 1:] = halves
+        power, frequency = spectrum(longer, self.rate)
+        least = max(1, int(np.searchsorted(frequency, LOWEST)) - 1)
+        found: Array = power[..., least:].max(axis=2, initial=0.0)
+        return found
 
     def _end(self, rest: Array) -> None:
         length = rest.shape[2]
