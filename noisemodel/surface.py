@@ -1,7 +1,7 @@
 """The surface of a robot: the triangles of every link that moves, and integrals over them."""
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from types import MappingProxyType
@@ -36,42 +36,23 @@ TINY = 1e-300  # keeps the direction of no rotation finite
 ALL: Indices = np.zeros(1, dtype=np.intp)  # where the only cell begins, if all points are in one
 
 
-def triangles(robot: Robot, geometry: str = "visual") -> tuple[Array, ...]:
+def triangles(robot: Robot, geometry: str = "visual", *, world: bool = False) -> tuple[Array, ...]:
     """Triangles of each joint's link in the joint's axes, (triangles, 3 corners, 3), in [m].
 
-    ``geometry`` is as in `Surface.of`. Which side of a triangle is outside is not known.
+    ``geometry`` is as in `Surface.of`. Which side of a triangle is outside is not known. With
+    ``world``, what is fixed to the world comes first.
     """
     if geometry not in GEOMETRIES:
         known = ", ".join(GEOMETRIES)
         raise GeometryError(f"geometry {geometry!r} is not known, expected one of {known}")
-    parts = [[np.empty((0, 3, 3))] for _ in robot.joints]
-    for joint, surface in pieces(robot, geometry, world=False):
-        parts[joint - 1].append(surface)
-    return tuple(map(np.concatenate, parts))
-
-
-def link_names(robot: Robot) -> tuple[str, ...]:
-    """The child link of each joint, in the joints' order."""
-    return _links(robot)[1]
-
-
-def pieces(
-    robot: Robot, geometry: str = "auto", *, world: bool = True
-) -> Iterator[tuple[int, Array]]:
-    """Draw a robot piece by piece; ``world`` tells whether what is fixed to the world counts, too.
-
-    Yields:
-        Index of the joint that moves a piece in Pinocchio, 0 if none does; and its triangles in the
-        joint's axes, shape (triangles, 3 corners, 3), in [m].
-    """
     places, names = _links(robot)
     mesh = cache(  # left and right often share one
         lambda address: meshes.read(find_mesh(address, robot.path, robot.package_roots))
     )
-    waiting = set(range(0 if world else 1, len(names) + 1))
+    parts = [[np.empty((0, 3, 3))] for _ in range(len(names) + 1)]
+    waiting = set(range(0 if world else 1, len(parts)))
     count = 0
     for use in GEOMETRIES[geometry]:
-        drawn = set()
         if robot.mjcf is not None:
             shapes = robot.mjcf.visual if use == "visual" else robot.mjcf.collision
         else:
@@ -80,13 +61,17 @@ def pieces(
             joint, rotation, translation = places[shape.link]
             if joint not in waiting:
                 continue
-            surface = _placed(shape, mesh, rotation, translation)
-            count += len(surface)  # a mesh counts as often as it is drawn
+            parts[joint].append(_placed(shape, mesh, rotation, translation))
+            count += len(parts[joint][-1])  # a mesh counts as often as it is drawn
             if count > limit("triangles"):
                 raise GeometryError(f"{robot.path}: too many triangles, {beyond('triangles')}")
-            drawn.add(joint)
-            yield joint, surface
-        waiting -= drawn
+        waiting = {joint for joint in waiting if len(parts[joint]) == 1}
+    return tuple(map(np.concatenate, parts if world else parts[1:]))
+
+
+def link_names(robot: Robot) -> tuple[str, ...]:
+    """The child link of each joint, in the joints' order."""
+    return _links(robot)[1]
 
 
 def _links(robot: Robot) -> tuple[dict[str, tuple[int, Array, Array]], tuple[str, ...]]:

@@ -10,7 +10,7 @@ from inspector.analysis import analyse_file
 from inspector.recording.robot import FIELD_OF_VIEW, fitted
 from inspector.recording.run import write
 from noisemodel import Robot, Run
-from noisemodel.surface import pieces
+from noisemodel.surface import triangles
 
 
 def run_of(robot, name, seconds=1.0):
@@ -59,10 +59,8 @@ def in_picture(points, eye, target, aspect):
 
 def placed(robot, run, samples):
     """All corners of all triangles of a robot, sample by sample, by Pinocchio."""
-    corners = {}
-    for joint, triangles in pieces(robot):
-        corners.setdefault(joint, []).append(triangles.reshape(-1, 3))
-    corners = {joint: np.concatenate(parts)[::7] for joint, parts in corners.items()}
+    surfaces = triangles(robot, "auto", world=True)
+    corners = {i: each.reshape(-1, 3)[::7] for i, each in enumerate(surfaces) if len(each)}
     q, _ = robot.configuration(run)
     data = robot.model.createData()
     for sample in samples:

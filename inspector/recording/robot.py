@@ -5,6 +5,7 @@ The camera is as near as it sees every point in the motion, and the floor below.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain, product
 from typing import Any
 
@@ -20,7 +21,7 @@ from noisemodel import GeometryError, urdf
 from noisemodel.meshes import FACET, HEADER
 from noisemodel.robot import Robot
 from noisemodel.run import Run
-from noisemodel.surface import link_names, pieces
+from noisemodel.surface import link_names, triangles
 from noisemodel.types import Array, UnknownJointError
 from noisemodel.urdf import Mimic
 
@@ -42,7 +43,7 @@ class Drawn:
     moves: bool  # whether its base does, which the camera follows on the floor
     mimics: Mapping[str, Mimic]
 
-    @property
+    @cached_property
     def links(self) -> list[str]:
         """What each joint moves, in the order of `outermost`."""
         names = (FIXED, *link_names(self.robot))
@@ -123,23 +124,19 @@ def log_robot(
         if joint not in known:
             raise UnknownJointError(joint, robot.name, known)
     mimics = robot.mjcf.mimics if robot.mjcf else urdf.mimics(robot.path, urdf.checked(robot.path))
-    parts: dict[int, list[Array]] = {index: [] for index in _carried(robot)}
     try:
-        for index, triangles in pieces(robot):
-            if index in parts:
-                parts[index].append(triangles)
+        surfaces = triangles(robot, "auto", world=True)
     except GeometryError as error:
         raise InspectorError(f"{error}; `--robot none` shows the run without the robot") from error
-    meshes = {index: np.concatenate(part) for index, part in parts.items() if part}
+    carried = _carried(robot)
+    meshes = {index: surfaces[index] for index in carried if len(surfaces[index])}
     outermost = {index: _outermost(mesh.reshape(-1, 3)) for index, mesh in meshes.items()}
-    outermost = outermost or dict.fromkeys(parts, np.zeros((1, 3)))
+    outermost = outermost or dict.fromkeys(carried, np.zeros((1, 3)))
     drawn = Drawn(robot, f"robot_{side}" if side else "robot", outermost, moves, mimics)
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for link, triangles in zip(drawn.links, meshes.values(), strict=False):
-        mesh = rr.Asset3D(
-            contents=_stl(triangles), media_type=rr.MediaType.STL, albedo_factor=color
-        )
-        recording.log(drawn.path(link), mesh, rr.CoordinateFrame(drawn.frame(link)), static=True)
+    for link, mesh in zip(drawn.links, meshes.values(), strict=False):
+        shape = rr.Asset3D(contents=_stl(mesh), media_type=rr.MediaType.STL, albedo_factor=color)
+        recording.log(drawn.path(link), shape, rr.CoordinateFrame(drawn.frame(link)), static=True)
     return drawn
 
 
