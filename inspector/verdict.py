@@ -316,7 +316,10 @@ class Verdict:
         return {"lost": [], "trace": "", **content, **named}
 
 
-hints_of = cache(get_type_hints)
+@cache
+def _parts_of(kind: Any) -> tuple[Any, tuple[Any, ...], Mapping[str, Any]]:
+    """Origin and arguments of a type, and the types of the fields of a dataclass."""
+    return get_origin(kind), get_args(kind), get_type_hints(kind) if is_dataclass(kind) else {}
 
 
 def read_as(kind: Any, value: Any) -> Any:
@@ -325,10 +328,14 @@ def read_as(kind: Any, value: Any) -> Any:
     Raises:
         TypeError, KeyError, ValueError, AttributeError: If it is of another type.
     """
-    of, inner = get_origin(kind), get_args(kind)
-    if isinstance(kind, type) and is_dataclass(kind):
+    if type(value) is kind:
+        return value
+    if kind is float and type(value) is int and abs(value) < 1e300:
+        return float(value)
+    of, inner, fields = _parts_of(kind)
+    if fields:
         named = getattr(kind, "fields_of", dict)(value)
-        return kind(**{name: read_as(each, named[name]) for name, each in hints_of(kind).items()})
+        return kind(**{name: read_as(each, named[name]) for name, each in fields.items()})
     if NoneType in inner:
         return None if value is None else read_as(inner[0], value)
     if of is tuple and isinstance(value, list):
@@ -336,13 +343,9 @@ def read_as(kind: Any, value: Any) -> Any:
         return tuple(read_as(*each) for each in zip(kinds, value, strict=True))
     if of is Mapping and isinstance(value, dict):
         return {name: read_as(inner[1], each) for name, each in value.items()}
-    if kind is float and type(value) is int and abs(value) < 1e300:
-        return float(value)
     if kind in (Path, Status, Unknown, Ruling) and isinstance(value, str):
         return kind(value)
-    if type(value) is not kind:
-        raise TypeError(f"{reprlib.repr(value)} is no {kind.__name__}")
-    return value
+    raise TypeError(f"{reprlib.repr(value)} is no {kind.__name__}")
 
 
 def classify_file(
