@@ -121,17 +121,12 @@ class Differentiator:
         return float(frequency[np.argmax(lost)] if lost.any() else rate / 2)
 
 
-def _savitzky_golay() -> tuple[float, ...]:
-    """Weights of the polynomial's slope in the middle, as `noisemodel.run` takes it."""
-    places = np.arange(WINDOW) - WINDOW // 2
-    fit = np.linalg.pinv(np.vander(places, ORDER + 1, increasing=True).astype(np.float64))
-    return tuple(fit[1].tolist())
-
-
 BACKWARD = Differentiator("difference to the sample before", (-1.0, 1.0))
 FORWARD = Differentiator("difference to the sample after", (-1.0, 1.0))
 CENTRAL = Differentiator("difference of the samples before and after", (-0.5, 0.0, 0.5))
-SMOOTH = Differentiator(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", _savitzky_golay())
+# The polynomial's slope in the middle of a window, as `noisemodel.run` takes it.
+_FIT = np.linalg.pinv(np.vander(np.arange(WINDOW) - WINDOW // 2, ORDER + 1, increasing=True) * 1.0)
+SMOOTH = Differentiator(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", tuple(_FIT[1].tolist()))
 
 
 def differentiator_of(run: Run) -> Differentiator | None:

@@ -293,7 +293,11 @@ def evaluate(
             yield recording
 
     def localise(recording: nc.Recording, labels: nc.Labels) -> Located:
-        run = source[recording.name] or _run_of(recording)
+        run = source[recording.name]
+        if run is None:  # NoisyTest's noise, as the motion of one joint
+            velocity = nc.signals.stacked(recording.signal, (nc.NOISE,))[:, None]
+            time, valid = recording.time, recording.valid
+            run = nm.Run(time=time, velocity=velocity, joint_names=("joint0",), valid=valid)
         return extents(run, labels, *lines(run))
 
     return nc.assess(
@@ -302,13 +306,6 @@ def evaluate(
         seen_too=seen_too,
         localise=localise,
     )
-
-
-def _run_of(recording: nc.Recording) -> nm.Run:
-    """A run of NoisyTest's noise, as the motion of one joint."""
-    velocity = nc.signals.stacked(recording.signal, (nc.NOISE,))[:, None]
-    time, valid = recording.time, recording.valid
-    return nm.Run(time=time, velocity=velocity, joint_names=("joint0",), valid=valid)
 
 
 # --- grid search
