@@ -223,11 +223,11 @@ def floats(values: NDArray[Any]) -> Real:
 def episodes_of(arrays: Arrays) -> dict[str, slice]:
     """Episodes of a file that has them one after the other, of two samples or more."""
     ends = [each.ravel() for name, each in arrays.items() if name.lower() in EPISODE_ENDS]
-    if len({len(each) for each in ends}) != 1:
-        return {"": slice(None)}
-    last = np.flatnonzero(np.logical_or.reduce(ends)) + 1
-    edges = [0, *(int(each) for each in last if each < len(ends[0])), len(ends[0])]
-    found = [slice(start, stop) for start, stop in pairwise(edges) if stop - start > 1]
+    found: list[slice] = []
+    if len({len(each) for each in ends}) == 1:
+        last = np.flatnonzero(np.logical_or.reduce(ends)) + 1
+        edges = [0, *(int(each) for each in last if each < len(ends[0])), len(ends[0])]
+        found = [slice(start, stop) for start, stop in pairwise(edges) if stop - start > 1]
     return {str(n): part for n, part in enumerate(found)} if len(found) > 1 else {"": slice(None)}
 
 
@@ -394,13 +394,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
         with suppress(RunError, TypeError):  # without uniform time it is resampled
             check_time(arrays["time"])
             run = partial(Run.load, path)
-    return LogReader(
-        "npz",
-        tuple(episodes_of(arrays)),
-        lambda episode: _read(path, options, episode),
-        listing,
-        run,
-    )
+    return LogReader("npz", (*episodes_of(arrays),), partial(_read, path, options), listing, run)
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -421,23 +415,16 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     arrays = _arrays(path)
+    texts = {name: each for name, each in arrays.items() if each.dtype.kind == "U"}
     measured, desired = (
-        tuple(map(str, arrays[key].ravel()))
-        if key in arrays and arrays[key].dtype.kind == "U"
-        else ()
-        for key in ("joint_names", "desired_joint_names")
+        tuple(map(str, texts[name].ravel())) if name in texts else ()
+        for name in ("joint_names", "desired_joint_names")
     )
-    numbers = {
-        name: each
-        for name, each in part_of(arrays, episode).items()
-        if each.ndim and each.dtype.kind in "iufM"
-    }
-    joints = {
-        name: (desired or measured) if meaning(name).endswith("_desired") else measured
-        for name in numbers
-    }
-    stated = stated_rate(arrays)
-    return log_of(path, numbers, options, stated=stated, joints=joints)
+    desired = desired or measured
+    part = part_of(arrays, episode)
+    numbers = {n: each for n, each in part.items() if each.ndim and each.dtype.kind in "iufM"}
+    joints = {n: desired if meaning(n).endswith("_desired") else measured for n in numbers}
+    return log_of(path, numbers, options, stated=stated_rate(arrays), joints=joints)
 
 
 # MATLAB's files of version 5
@@ -465,10 +452,9 @@ def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log
         field = next((f"/{field}" for field in DATA if name.endswith(f"/{field}")), "")
         last = name.rpartition("/")[2]
         plain = name.removesuffix(field) or name  # `q/Data` is `q`, its stamps are `Time`
+        plain = last if not field and last in STAMPS else plain
         if each.dtype.kind in "iuf":
-            named[last if not field and last in STAMPS else plain] = (
-                each.ravel() if 1 in each.shape else each
-            )
+            named[plain] = each.ravel() if 1 in each.shape else each
     time = options.time or time_column([name for name, each in named.items() if each.ndim == 1])
     longest = max((max(each.shape) for each in named.values() if each.ndim), default=0)
     samples = len(named[time]) if time in named else longest

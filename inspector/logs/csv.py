@@ -19,7 +19,7 @@ import numpy as np
 from inspector.errors import LogError
 from inspector.logs.arrays import log_of, may_hold
 from inspector.logs.clocks import stamps_since
-from inspector.logs.mapping import Log, LogReader, ReadOptions, Stamps, no_motion
+from inspector.logs.mapping import Log, LogReader, ReadOptions, Stamps, errors_of, no_motion
 from inspector.logs.names import (
     JOINT_SIGNALS,
     TIME_UNITS,
@@ -88,15 +88,12 @@ def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[TextIO]:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            yield stream
-    except OSError as error:
-        raise LogError(path, f"cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise LogError(path, "not a CSV log: not text in UTF-8") from error
-    except csv.Error as error:
-        raise LogError(path, f"not a CSV log ({error})") from error
+    with errors_of(path, (csv.Error,), "not a CSV log"):
+        try:
+            with path.open(newline="", encoding="utf-8-sig") as stream:
+                yield stream
+        except UnicodeDecodeError as error:
+            raise LogError(path, "not a CSV log: not text in UTF-8") from error
 
 
 def _read(path: Path, options: ReadOptions) -> Log:
@@ -117,7 +114,11 @@ def _read(path: Path, options: ReadOptions) -> Log:
         exact = _decimals(path, header[time], cells, rows)
         since = np.array([float(stamp - exact[0]) for stamp in exact])
         stamps = stamps_since(path, header[time], exact[0], since, options.rate, rows)
-    _check_sparse(path, [header[place] for place in wanted], values, rows)
+    for place, lacking in zip(wanted, np.isnan(values).T, strict=True):
+        if SPARSE <= (share := lacking.mean()) < 1:
+            how = "columns with another clock must be in a separate log (--desired)"
+            problem = f"column {header[place]!r} is empty in {share:.0%} of the rows; {how}"
+            raise LogError(path, problem, rows[int(np.argmax(lacking))])
     read = {time, rest, *wanted}
     return log_of(
         path,
@@ -380,15 +381,6 @@ def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -
         if not (_is_missing(cell) or _is_number(cell)):
             raise LogError(path, f"column {name!r} holds {cell[:40]!r}, which is not a number", row)
     return [np.nan if _is_missing(cell) else float(cell.replace(",", ".")) for cell in cells]
-
-
-def _check_sparse(path: Path, names: Sequence[str], table: Array, rows: Sequence[int]) -> None:
-    """Refuse columns that have numbers in some rows only, since they have another clock."""
-    for name, lacking in zip(names, np.isnan(table).T, strict=True):
-        if SPARSE <= (share := lacking.mean()) < 1:
-            how = "columns with another clock must be in a separate log (--desired)"
-            problem = f"column {name!r} is empty in {share:.0%} of the rows; {how}"
-            raise LogError(path, problem, rows[int(np.argmax(lacking))])
 
 
 def _is_missing(cell: str) -> bool:

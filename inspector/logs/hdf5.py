@@ -5,6 +5,7 @@ MATLAB's files of version 7.3 are HDF5 too: structs are groups, and arrays are t
 
 import re
 from collections.abc import Collection, Mapping
+from functools import partial
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -38,12 +39,9 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
         is_matlab = stream.read(len(MATLAB)) == MATLAB
     with errors_of(path, DAMAGE), h5py.File(path) as file:
         home, episodes = _episodes(path, file, is_matlab=is_matlab)
-    return LogReader(
-        "MATLAB 7.3" if is_matlab else "HDF5",
-        episodes,
-        lambda episode: _read(path, options, home, episode, is_matlab=is_matlab),
-        lambda: _listing(path, home, episodes),
-    )
+    read = partial(_read, path, options, home, is_matlab=is_matlab)
+    kind = "MATLAB 7.3" if is_matlab else "HDF5"
+    return LogReader(kind, episodes, read, partial(_listing, path, home, episodes))
 
 
 def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str, ...]]:
