@@ -108,7 +108,7 @@ def best_lines(
             measured, desired = in_both(run)
             wave[:, measured] -= _around(run, part, 4 * half, run.velocity_desired)[:, desired]
         waves.append(_fast(wave, half))
-    weight = _hann(len(waves[0]))
+    weight = np.hanning(len(waves[0]) + 2)[1:-1]
     joint = int(np.argmax(np.sum([weight @ np.square(wave) for wave in waves], axis=0)))
     motions = [_motion(run, part, joint, half) for part in parts]
     fastest = max(float(np.abs(speed).max()) for _, speed in motions)
@@ -197,7 +197,7 @@ def _pieces(wave: Array, angle: Array, speed: Array, slowest: float) -> Iterator
         if last - first >= 4:
             sign = direction[first]
             turned = sign * (angle[first:last] - angle[first])
-            weight = _hann(last - first)
+            weight = np.hanning(last - first + 2)[1:-1]
             yield Piece(wave[first:last], turned, sign * speed[first:last], weight)
 
 
@@ -248,7 +248,3 @@ def _explained(
 
 def _energy(pieces: list[Piece]) -> float:
     return sum(float(piece.weight @ np.square(piece.wave)) for piece in pieces)
-
-
-def _hann(samples: int) -> Array:
-    return np.hanning(samples + 2)[1:-1]

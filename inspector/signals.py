@@ -26,12 +26,6 @@ def ends(signal: Real) -> tuple[Real, Real]:
     return rows.min(axis=1), rows.max(axis=1)
 
 
-def reach(signal: Real) -> Real:
-    """Largest absolute value of each column."""
-    low, high = ends(signal)
-    return np.asarray(np.maximum(high, -low))
-
-
 # Spectrum
 
 # Shortest segment that is transformed: the paper's frame (Sec. III-A), in [s].
@@ -151,8 +145,8 @@ def differentiator_of(run: Run) -> Differentiator | None:
     )
     velocity = run.velocity[inner][:, moves].astype(np.float64)
     grain = max(np.finfo(run.position.dtype).eps, np.finfo(run.velocity.dtype).eps)
-    rounding = 4.0 * grain * max(reach(run.position).max() * run.rate, np.abs(velocity).max())
-    tolerance = rounding + EXACT * np.abs(velocity).max()
+    fastest, farthest = np.abs(velocity).max(), np.abs(ends(run.position)).max()
+    tolerance = 4.0 * grain * max(farthest * run.rate, fastest) + EXACT * fastest
     if tolerance > COARSE * np.sqrt(np.mean(np.square(velocity))):
         return None
     found = {
@@ -411,7 +405,7 @@ def unit_warnings(run: Run) -> Iterator[str]:
     low, high = ends(valid(run, run.velocity))
     speeds = np.maximum(high, -low)
     if run.position is not None:
-        farthest = reach(valid(run, run.position))
+        farthest = np.abs(ends(valid(run, run.position))).max(axis=0)
         moving = high > low
         far = (farthest > TURNS / 2) & moving
         enough = np.sum(far) > 1 or (farthest[far] > TURNS).any()
