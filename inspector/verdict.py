@@ -344,6 +344,7 @@ def read_as(kind: Any, value: Any) -> Any:
     if of is Mapping and isinstance(value, dict):
         return {name: read_as(inner[1], each) for name, each in value.items()}
     if kind in (Path, Status, Unknown, Ruling) and isinstance(value, str):
+        os.fsencode(value)  # what is no name of a file fails here
         return kind(value)
     raise TypeError(f"{reprlib.repr(value)} is no {kind.__name__}")
 
@@ -598,7 +599,7 @@ def digest(path: Path) -> str:
                 return hashlib.file_digest(file, "sha256").hexdigest()
         inside = sorted(each for each in path.rglob("*") if each.is_file())
         lines = [f"{each.relative_to(path)} {digest(each)}" for each in inside]
-        return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+        return hashlib.sha256(os.fsencode("\n".join(lines))).hexdigest()
     except OSError:
         return ""
 

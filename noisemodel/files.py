@@ -100,7 +100,8 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
 
 def write_whole(path: str | Path, content: str | bytes, *, overwrite: bool = False) -> None:
     """Write a file whole or not at all, text in UTF-8; see `replacing`."""
-    data = content.encode() if isinstance(content, str) else content
+    # Names of files may be no text in UTF-8: these bytes are written out.
+    data = content.encode(errors="backslashreplace") if isinstance(content, str) else content
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(data)
 

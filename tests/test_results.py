@@ -154,7 +154,7 @@ def test_whatever_stands_in_a_result_is_shown_or_refused_in_one_line(tmp_path):
 
     refused = []
     for *above, last in places(whole["runs"]):
-        for odd in (None, 0, -1.5, 10**19, True, "", "x", [], [1], {}, {"a": "b"}):
+        for odd in (None, 0, -1.5, 10**19, True, "", "x", "\ud800", [], [1], {}, {"a": "b"}):
             changed = json.loads(json.dumps(whole))
             parent = changed["runs"]
             for key in above:

@@ -34,6 +34,24 @@ def test_a_file_whose_name_has_control_characters_is_bad_input_and_named_without
         assert not any(line.startswith("::error::b") for line in text.splitlines())
 
 
+def test_a_file_whose_name_is_no_utf_8_is_named_by_its_bytes_in_all_outputs(tmp_path):
+    runs = tmp_path / "runs"
+    runs.mkdir()
+    shutil.copy(demo_run(), runs / "a\udcff.npz")
+    outputs = [tmp_path / form for form in ("text", "json", "github", "junit", "markdown", "sarif")]
+    page = tmp_path / "page"
+    writes = [f"--write={path.name}={path}" for path in outputs]
+    status, _, err = call("classify", runs, *writes, "--report", page)
+    assert (status, err) == (1, "")
+    assert all(r"a\udcff.npz" in path.read_text() for path in outputs[:3])
+    assert "a%FF.npz" in outputs[5].read_text()
+    assert len(list((page / "pictures").iterdir())) == 1
+    assert call("merge", outputs[1], "--report", page, "--overwrite")[0] == 1
+    status, _, err = call("accept", runs, "--reason", "good")
+    assert (status, len(err.splitlines())) == (3, 1)
+    assert err.endswith(".npz: its name is no text in UTF-8; rename it\n")
+
+
 def test_a_typed_name_with_control_characters_is_wrong_usage(tmp_path):
     for arguments in (["classify", tmp_path / HOSTILE], ["noise", demo_run(), "--csv", HOSTILE]):
         status, out, err = call(*arguments)

@@ -237,6 +237,9 @@ def accept_into(
     stay; runs that differ replace them.
     """
     home = folder.absolute().parent
+    for each in runs:
+        if f"{each.name}{each.run}" != f"{each.name}{each.run}".encode(errors="ignore").decode():
+            raise InspectorError(f"{each.run}: its name is no text in UTF-8; rename it")
     with _alone_in(folder):
         there = os.path.lexists(folder / NAME)
         kept = {each.name: each for each in (Reference.load(folder).scenarios if there else ())}

@@ -83,7 +83,7 @@ class References:
             for scenario in reference.scenarios
             for each in scenario.repetitions
         )
-        return hashlib.sha256(text.encode()).hexdigest()
+        return hashlib.sha256(text.encode(errors="replace")).hexdigest()
 
     def judge(self, verdict: Verdict, gate: "Gate | None", today: date) -> Verdict:
         """Decide what becomes of the findings of a run; see `judge`."""

@@ -6,6 +6,7 @@ cannot be read, of verdicts and of differences alike.
 
 import hashlib
 import json
+import os
 import re
 import shlex
 from collections import Counter
@@ -235,7 +236,9 @@ def _results(case: Case) -> Iterator[dict[str, Any]]:
     number = Counter[str]()
     for sentence, (rule, span) in zip(case.sentences, case.rules, strict=True):
         number[rule] += 1
-        same = hashlib.sha256(f"{known}:{rule}:{number[rule]}".encode()).hexdigest()[:16]
+        same = hashlib.sha256(
+            f"{known}:{rule}:{number[rule]}".encode(errors="replace")
+        ).hexdigest()[:16]
         yield {
             "ruleId": rule,
             "level": "error",
@@ -254,7 +257,8 @@ def _location(path: Path) -> dict[str, object]:
 def _uri(path: Path) -> str:
     """Address of a file, relative to the folder of the job if it lies there."""
     full, here = path.absolute(), Path.cwd()
-    return quote(full.relative_to(here).as_posix()) if full.is_relative_to(here) else full.as_uri()
+    inside = full.is_relative_to(here)
+    return quote(os.fsencode(full.relative_to(here))) if inside else full.as_uri()
 
 
 def _described(rule: str) -> str:

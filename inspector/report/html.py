@@ -5,6 +5,7 @@ shows how far each scenario is over its reference, and where that changed.
 """
 
 import hashlib
+import os
 import re
 from base64 import b64encode
 from collections import Counter, defaultdict
@@ -189,7 +190,7 @@ def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, fol
     # The hash keeps runs of one name in several folders apart, in any process.
     name = re.sub(r"[^\w.-]", "_", path.stem)[:80]
     (folder / PICTURES).mkdir(exist_ok=True)
-    target = folder / PICTURES / f"{name}-{hashlib.sha256(str(path).encode()).hexdigest()[:8]}.png"
+    target = folder / PICTURES / f"{name}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:8]}.png"
     write_whole(target, picture(analysis, beside), overwrite=True)
     return target
 
