@@ -16,6 +16,7 @@ import numpy as np
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.audit import Audit, audit, shortcomings, summary
+from inspector.audit.signals import without_placeholder
 from inspector.errors import IGNORED, InspectorError, Status, Unknown
 from inspector.levels import FLOOR_DB, STEP, velocity_levels
 from inspector.library import (
@@ -25,10 +26,9 @@ from inspector.library import (
     load_library,
 )
 from inspector.localisation import Localisation, extent, localise
+from inspector.localisation.order import Order, order
 from inspector.logs.clocks import without_hold
 from inspector.logs.read import Opened, open_run
-from inspector.order import Order, order
-from inspector.signals import without_placeholder
 from noiseclassifier import Event
 from noiseclassifier.lasting import joined
 from noisemodel import Block, Run

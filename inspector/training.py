@@ -19,11 +19,11 @@ from typing import Any, NoReturn
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis import extents
+from inspector.audit.signals import without_placeholder
 from inspector.errors import InspectorError, OptionError
 from inspector.library import lines, signals_of
 from inspector.logs.clocks import without_hold
 from inspector.logs.mapping import check_joints
-from inspector.signals import without_placeholder
 from inspector.text import progress
 from inspector.verdict import resumed
 from noiseclassifier import Assessment

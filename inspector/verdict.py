@@ -30,8 +30,8 @@ from inspector.analysis import Analysis, analyse
 from inspector.errors import EXIT, FileError, InspectorError, Status, Unknown, without_path, worst
 from inspector.library import Library
 from inspector.localisation import Localisation
+from inspector.localisation.order import Order
 from inspector.logs.read import Reading, Source, open_source
-from inspector.order import Order
 from inspector.text import program_version
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_json, text_of

@@ -31,13 +31,13 @@ from inspector.analysis import (
     write_csv,
 )
 from inspector.audit import audit
+from inspector.audit.signals import without_placeholder
 from inspector.errors import InspectorError, Status, Unknown
 from inspector.levels import STEP
 from inspector.library import Labelled, demo_run, load_library, model_files
 from inspector.logs.read import Source
 from inspector.report import WORDS, html
 from inspector.report.formats import FORMATS
-from inspector.signals import without_placeholder
 from inspector.verdict import Verdict, classify_file, exit_status, work_of
 from noiseclassifier import Event, Labels
 from noisemodel import Block, NoiseModelError, Robot, Run

@@ -88,7 +88,7 @@ def test_nothing_is_pickled():
         ("noiseclassifier.scenarios", [*SLOW, "inspector"]),
         ("inspector.cli", ["rerun", "sklearn", "mujoco", "pinocchio", "scipy", "numpy"]),
         ("inspector.verdict", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
-        ("inspector.sound", ["scipy.signal"]),
+        ("inspector.export.sound", ["scipy.signal"]),
         ("inspector.pytest_plugin", ["rerun", "numpy", "scipy", "typer", "noisemodel"]),
         ("inspector.reference.difference", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
     ],

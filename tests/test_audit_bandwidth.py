@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, savgol_filter, sosfilt
 
-from inspector.logs.clocks import hold_length
-from inspector.signals import (
+from inspector.audit.signals import (
     CENTRAL,
     ENCODER_NOISE,
     SMOOTH,
@@ -14,6 +13,7 @@ from inspector.signals import (
     spectrum,
     step_of,
 )
+from inspector.logs.clocks import hold_length
 from noisemodel import Run
 
 RATES = [200.0, 1000.0, 10_000.0]

@@ -3,7 +3,7 @@ import pytest
 from test_audit_bandwidth import motion, noise, run_of
 
 from inspector.audit import audit, excerpt
-from inspector.signals import copies, unit_warnings
+from inspector.audit.signals import copies, unit_warnings
 
 
 def warnings(velocity, position=None, rate=1000.0):

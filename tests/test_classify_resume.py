@@ -18,9 +18,9 @@ from inspector import verdict
 from inspector.errors import InspectorError, Status, Unknown
 from inspector.library import demo_run, load_library, model_files
 from inspector.localisation import Localisation
+from inspector.localisation.order import Order
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.read import Reading, Source, open_source
-from inspector.order import Order
 from inspector.verdict import Evidence, Finding, StateError, Verdict, classify_files, digest, kept
 from noisemodel import OutputError
 

@@ -10,7 +10,7 @@ import pytest
 from inspector.analysis import Analysis
 from inspector.audit import audit
 from inspector.errors import Status
-from inspector.order import Order, best_lines, order
+from inspector.localisation.order import Order, best_lines, order
 from inspector.report import report, sentence
 from inspector.report.formats import FORMATS, as_json, text
 from inspector.report.picture import picture

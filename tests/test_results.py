@@ -12,7 +12,7 @@ from commandline import call
 from inspector.errors import InspectorError, Status
 from inspector.library import demo_run
 from inspector.localisation import Localisation
-from inspector.order import Order
+from inspector.localisation.order import Order
 from inspector.report import html
 from inspector.report.formats import FORMATS, as_json
 from inspector.verdict import Beside, Evidence, Finding, Missing, Verdict, read_results

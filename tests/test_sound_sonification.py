@@ -7,7 +7,7 @@ from commandline import call as inspector
 
 import noisemodel as nm
 from inspector.errors import InspectorError
-from inspector.sound import clip, common_gain, remarks, sonify
+from inspector.export.sound import clip, common_gain, remarks, sonify
 from noisemodel import Run
 
 RATE = 10_000.0
@@ -169,7 +169,7 @@ def test_a_clip_has_the_whole_run_or_the_part_around_its_worst_moment(monkeypatc
     run = run_of(0.01 * tone(440), 0.01 * tone(300))
     whole = clip(run)
     assert (whole.start, whole.stop) == (0.0, 2.0)
-    monkeypatch.setattr("inspector.sound.MOST_VELOCITIES", 10_000)
+    monkeypatch.setattr("inspector.export.sound.MOST_VELOCITIES", 10_000)
     part = clip(run, around=1.5)
     assert (part.start, part.stop) == (1.25, 1.75)
     samples, rate = read(part.file(common_gain([part])))

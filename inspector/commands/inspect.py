@@ -12,7 +12,6 @@ from typing import Annotated, Literal
 import typer
 
 import noisemodel as nm
-from inspector import sound as sonification
 from inspector.analysis import (
     Analysis,
     analyse_file,
@@ -25,6 +24,7 @@ from inspector.audit import text
 from inspector.commands import shared
 from inspector.commands.shared import argument, opened, option
 from inspector.errors import EXIT, InspectorError, Status
+from inspector.export import sound as sonification
 from inspector.library import Library, demo_run, load_library
 from inspector.logs.read import Opened, Reading
 from inspector.reference.judging import Comparison

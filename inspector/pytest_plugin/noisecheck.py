@@ -17,6 +17,7 @@ from typing import TypeAlias
 import pytest
 
 from inspector.analysis import Analysis, analyse, with_links
+from inspector.audit.signals import without_placeholder
 from inspector.errors import Status
 from inspector.library import Library, load_library
 from inspector.reference import store
@@ -25,7 +26,6 @@ from inspector.reference.levels import Levels, levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, classes_found, judge
 from inspector.report import told
-from inspector.signals import without_placeholder
 from inspector.text import counted
 from inspector.verdict import EXPECTED, Finding, Verdict
 from noisemodel import Run

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from inspector.audit.signals import without_placeholder
 from inspector.errors import FileError, InspectorError
 from inspector.logs.read import Reading, open_source, sources
 from inspector.reference.judging import (
@@ -35,7 +36,6 @@ from inspector.reference.judging import (
     share_of_motion,
 )
 from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encoded, levels, octaves
-from inspector.signals import without_placeholder
 from inspector.text import counted, natural, toml_shown
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_toml, text_of

@@ -21,6 +21,7 @@ import numpy as np
 
 from inspector.analysis import Analysis
 from inspector.errors import InspectorError, Status
+from inspector.export.sound import clip, common_gain, worst_time
 from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
 from inspector.report import (
@@ -36,7 +37,6 @@ from inspector.report import (
 )
 from inspector.report.formats import summary
 from inspector.report.picture import picture, require
-from inspector.sound import clip, common_gain, worst_time
 from inspector.text import counted, natural
 from inspector.verdict import Verdict, read_results
 from noisemodel.files import write_whole

@@ -26,13 +26,13 @@ from typing import Any
 import numpy as np
 
 import noiseclassifier as nc
+from inspector.audit.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library, signal_names
 from inspector.logs.clocks import hold_length, without_hold
 from inspector.logs.mapping import check_joints
 from inspector.logs.motion import limit_warnings
 from inspector.logs.read import Reading, Source, open_source
-from inspector.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.text import counted, plain
 from noiseclassifier import Profile
 from noiseclassifier.profile import FEWEST, HIGHEST, LOWEST

@@ -249,7 +249,7 @@ def _velocities(run: nm.Run, joint: str) -> Iterator[Array]:
 
 def remarks(run: nm.Run, speed: float) -> Iterator[str]:
     """What of a run is inaudible and why, a sentence each."""
-    from inspector.signals import bandwidth
+    from inspector.audit.signals import bandwidth
 
     reach = bandwidth(run)
     span = f"{plain(LOWEST_AUDIBLE / speed)} Hz to {plain(reach.usable, 4)} Hz"
