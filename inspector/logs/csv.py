@@ -404,10 +404,10 @@ def _decimals(
     dated = _date(cells[0]) is not None
     found = []
     for row, cell in zip(rows, map(str.strip, cells), strict=True):
-        stamp = _date(cell) if dated else None
-        if not dated:
-            with suppress(InvalidOperation):
-                stamp = Decimal(cell.replace(",", "."))
+        try:
+            stamp = _date(cell) if dated else Decimal(cell.replace(",", "."))
+        except InvalidOperation:
+            stamp = None
         if stamp is None or not stamp.is_finite():
             what = f"holds {cell[:40]!r}, which is no time" if cell else "is empty"
             raise LogError(path, f"column {name!r} {what}", row)
