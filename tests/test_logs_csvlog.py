@@ -75,3 +75,13 @@ def test_a_file_that_is_no_log_is_named(tmp_path):
         read_log(tmp_path / "gone.csv")
     with pytest.raises(LogError, match="a folder that is neither a ROS 2 bag"):
         read_log(tmp_path)
+
+
+def test_comments_in_a_long_log_are_left_out_though_they_hold_numbers(tmp_path):
+    rows = [f"{n},{n / 1000},{np.sin(n / 500)},{2 * np.cos(n / 500)}" for n in range(40_000)]
+    for place in (1000, 39_000):
+        rows.insert(place, "#,9,9,9")
+    (tmp_path / "log.csv").write_text("\n".join(["n,time,q1,dq1", *rows, ""]))
+    imported = read_log(tmp_path / "log.csv")
+    assert len(imported.run.time) == 40_000
+    assert imported.remarks == ("log.csv: 1 column not read: n",)

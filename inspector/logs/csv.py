@@ -277,10 +277,11 @@ def _table(
     for _ in range(layout.skip):
         stream.readline(LONGEST_LINE)
     first, at, rest = layout.skip, *time
+    large = False  # once: a small file is read before pyarrow is imported
     while text := _piece(path, stream):
         lines = text.count("\n")
-        found = None
-        if len(text) >= PIECE and rest is None:
+        found, large = None, large or len(text) >= PIECE
+        if large and rest is None and not any(f"\n{mark}" in f"\n{text}" for mark in COMMENTS):
             found = numbers_in(text.encode(), len(layout.header), layout.delimiter, wanted, at)
         if found is not None:
             table.frombytes(found[0].tobytes())
