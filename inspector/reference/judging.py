@@ -328,8 +328,7 @@ def leave_one_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
     """Score of each repetition by the others, in [dB], if they cover it."""
     found = []
     for run in repetitions:
-        others = [each for each in repetitions if each is not run]
-        others = [each for each in others if set(run.joints) & set(each.joints)]
+        others = [e for e in repetitions if e is not run and set(run.joints) & set(e.joints)]
         cells = Cells.shared(run, others)
         aligned = _aligned(run, others, cells.joints)
         if aligned:
@@ -397,12 +396,10 @@ def _matching(
     shares = [own.share for _, own in _aligned(run, [e.repetitions[-1] for e in usable], joints)]
     least = max(SAME_MOTION, ALIKE * max(shares, default=0.0))
     found = [each for each, own in zip(usable, shares, strict=False) if own >= least]
-    told = []
-    if len(found) > 1:
-        names = ", ".join(each.name for each in found)
-        told.append(f"its motion is that of {names}, and its name is of none: all count")
+    names = ", ".join(each.name for each in found)
+    told = [f"its motion is that of {names}, and its name is of none: all count"]
     aligned = _aligned(run, _repetitions(found), joints)
-    return found if aligned else [], aligned, told
+    return found if aligned else [], aligned, told if len(found) > 1 else []
 
 
 def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
@@ -411,9 +408,8 @@ def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
 
 def share_of_motion(run: Levels, other: Levels) -> float:
     """Share of a run that lies on the motion of another."""
-    if not len(run.guide) or not len(other.guide) or not set(run.joints) & set(other.joints):
-        return 0.0
-    return _aligned(run, [other], run.joints)[0][1].share
+    aligned = _aligned(run, [other], run.joints) if len(run.guide) and len(other.guide) else []
+    return aligned[0][1].share if aligned else 0.0
 
 
 # --- exceedances

@@ -189,21 +189,23 @@ def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, fol
         analysis = seen(analysis, verdict)
     # The hash keeps runs of one name in several folders apart, in any process.
     name = re.sub(r"[^\w.-]", "_", path.stem)[:80]
-    (folder / PICTURES).mkdir(exist_ok=True)
-    target = folder / PICTURES / f"{name}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:8]}.png"
-    write_whole(target, picture(analysis, beside), overwrite=True)
-    return target
+    name = f"{name}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:8]}.png"
+    return _kept(folder, name, picture(analysis, beside))
 
 
 def with_picture(verdict: Verdict, folder: Path) -> Verdict:
     """A verdict of another job with its picture copied into the folder, without if it is gone."""
-    picture = verdict.picture
-    if picture is None or not picture.is_file():
-        return replace(verdict, picture=None)
+    drawn = verdict.picture
+    if drawn is not None:
+        drawn = _kept(folder, drawn.name, drawn.read_bytes()) if drawn.is_file() else None
+    return replace(verdict, picture=drawn)
+
+
+def _kept(folder: Path, name: str, png: bytes) -> Path:
+    """Write a picture where the page looks for it."""
     (folder / PICTURES).mkdir(exist_ok=True)
-    target = folder / PICTURES / picture.name
-    write_whole(target, picture.read_bytes(), overwrite=True)
-    return replace(verdict, picture=target)
+    write_whole(folder / PICTURES / name, png, overwrite=True)
+    return folder / PICTURES / name
 
 
 def write_index(verdicts: Sequence[Verdict], folder: Path) -> None:
