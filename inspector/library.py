@@ -1,6 +1,6 @@
 """The demo run and the models: those that ship, the one for a run, and what it labels."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from noiseclassifier.profile import NOMINAL
 from noisemodel.files import also_reading
 from noisemodel.noise import in_both
 from noisemodel.run import pieces_of
-from noisemodel.types import Mask, Real
+from noisemodel.types import Real
 
 Library = Mapping[str, nc.Model]  # models by name
 Events = tuple[nc.Event, ...]
@@ -96,8 +96,9 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
         run = nm.decimated(run, rate)
         left = f"nothing above {rate / 2:g} Hz is left"
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}: {left}."
-    pieces, lasting, bursts = _watched(run)
+    pieces = ((_signals(piece), piece.mask) for piece in pieces_of(run))
     labels = classifier.classify_pieces(pieces, run.rate, start=float(run.time[0]), whole=True)
+    lasting, bursts = lines(run)
     if not (lasting.examined or len(labels.events())) and nc.lasting.MEASURED in signal_names(run):
         raise CannotTellError(
             f"no stretch of {nc.lasting.SHORTEST:g} s without a gap, as it takes to tell what lasts"
@@ -115,32 +116,17 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
     return Labelled(labels, name, remark, alarm, lasting.events, bursts.events)
 
 
-def lines(run: nm.Run) -> tuple[Events, Events]:
+def lines(run: nm.Run) -> tuple[nc.Lasting, nc.Bursts]:
     """What lasts in a run, and its bursts."""
-    pieces, lasting, bursts = _watched(run)
-    for _ in pieces:
-        pass
-    return lasting.events, bursts.events
-
-
-def _watched(
-    run: nm.Run,
-) -> tuple[Iterator[tuple[dict[str, Real], Mask]], nc.Lasting, nc.Bursts]:
-    """Signals of a run piece by piece, and the lines that have been found in them at the end."""
     start = float(run.time[0])
     lasting = nc.Lasting(run.rate, start=start)
     bursts = nc.Bursts(run.rate, start=start, whole=True)
-
-    def pieces() -> Iterator[tuple[dict[str, Real], Mask]]:
-        for piece in pieces_of(run):
-            signals = _signals(piece)
-            lasting.push(signals, piece.mask)
-            bursts.push(signals, piece.mask)
-            yield signals, piece.mask
-        lasting.finish()
-        bursts.finish()
-
-    return pieces(), lasting, bursts
+    for piece in pieces_of(run):
+        signals = nm.by_joint(piece)
+        for each in (lasting, bursts):
+            each.push(signals, piece.mask)
+    lasting.finish()
+    return lasting, bursts
 
 
 def signals_of(run: nm.Run) -> dict[str, Real]:
