@@ -208,7 +208,8 @@ def analyse(
     run, left_out = without_placeholder(run)
     slower = without_hold(run)
     seen = audit(run, library, slower=slower)
-    about: dict[str, Any] = {"name": name or "run", "run": run, "audit": seen, "unknown": unknown}
+    named = (name or "run").encode(errors="backslashreplace").decode()  # a file's may be no UTF-8
+    about: dict[str, Any] = {"name": named, "run": run, "audit": seen, "unknown": unknown}
     about |= {"sha256": sha256, "assumed": assumed}
     try:
         labelled = label_run(run, library, slower=slower)

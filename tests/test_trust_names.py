@@ -52,6 +52,14 @@ def test_a_file_whose_name_is_no_utf_8_is_named_by_its_bytes_in_all_outputs(tmp_
     assert err.endswith(".npz: its name is no text in UTF-8; rename it\n")
 
 
+@pytest.mark.parametrize("suffix", ["rrd", "html"])
+def test_a_run_whose_name_is_no_utf_8_is_shown(tmp_path, suffix):
+    shutil.copy(demo_run(), tmp_path / "a\udcff.npz")
+    output = tmp_path / f"out.{suffix}"
+    assert call("view", tmp_path / "a\udcff.npz", "-o", output)[0] == 0
+    assert rb"a\udcff" in output.read_bytes()
+
+
 def test_a_typed_name_with_control_characters_is_wrong_usage(tmp_path):
     for arguments in (["classify", tmp_path / HOSTILE], ["noise", demo_run(), "--csv", HOSTILE]):
         status, out, err = call(*arguments)

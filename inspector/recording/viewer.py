@@ -94,7 +94,7 @@ def scratch_path(run: Path) -> Path:
     for path in newest[MAX_SCRATCH_FILES - 1 :]:  # there is one to come
         with suppress(OSError):
             path.unlink()
-    key = hashlib.sha256(str(run.resolve()).encode()).hexdigest()[:8]
+    key = hashlib.sha256(os.fsencode(run.resolve())).hexdigest()[:8]
     return folder / f"{run.stem}-{key}.rrd"
 
 
