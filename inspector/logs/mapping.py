@@ -71,8 +71,7 @@ PART = re.compile(r"(?P<name>.+)\[(?P<first>\d*)(?P<colon>:?)(?P<last>\d*)\]")
 JOINT = "{joint}"  # what stands for the name of a joint in a pattern of a mapping
 
 
-@dataclass(frozen=True)
-class Clock:
+class Clock(NamedTuple):
     """Rate, jitter and gaps of timestamps."""
 
     nominal: float  # inverse of the median step, in [Hz]
@@ -176,8 +175,7 @@ class Track:
         return LogError(path, f"{problem} (sample {sample + 1}, {at:.6g} s into the log)")
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """Mapping of one column or array to a signal, or of many columns by a pattern."""
 
     signal: str  # one of `inspector.logs.names.SIGNALS`, or "time"
@@ -222,8 +220,7 @@ class Log:
     in_degrees: tuple[str, ...] = ()  # "position" and "velocity" if found to be in degrees
 
 
-@dataclass(frozen=True)
-class LogReader:
+class LogReader(NamedTuple):
     """A log of a known format: its episodes, and functions that read it."""
 
     kind: str  # name of the format

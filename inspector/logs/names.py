@@ -6,10 +6,9 @@ which `re` compiles where they are first used: run files need none of them.
 """
 
 import re
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import pi
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 Meaning: TypeAlias = tuple[str, str | int]  # a signal, and the name or the number of its joint
 JOINT_SIGNALS = ("position", "velocity", "effort", "position_desired", "velocity_desired")
@@ -139,13 +138,12 @@ LONGEST = 300  # characters of a name from which on it names no signal: patterns
 SIDES = ("before", "within", "after", "last")  # parts of a name that tell whether it is desired
 
 
-@dataclass(frozen=True)
-class Naming:
+class Naming(NamedTuple):
     """How the columns of one log are named, where single names leave it open."""
 
     first: int = 0  # number of the first joint
     qd_is_desired: bool = False  # whether `qd` is the desired position, since `dq` is the velocity
-    bare: dict[str, Meaning] = field(default_factory=dict)  # of columns that name a joint alone
+    bare: Mapping[str, Meaning] = {}  # of columns that name a joint alone
     remark: str = ""  # what was decided about these, a sentence; empty if nothing
     alone: bool = True  # whether a column that names no joint is of the only one
 

@@ -12,7 +12,7 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from inspector.errors import InspectorError, LogError
 from inspector.logs.mapping import (
@@ -221,8 +221,7 @@ def _read_episode(
 # Run files and logs alike
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """A run that is not read yet: a file, the folder of a bag, or an episode of a data set."""
 
     path: Path
