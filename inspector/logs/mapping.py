@@ -33,7 +33,7 @@ from inspector.logs.names import (
 from inspector.text import toml_shown
 from noiseclassifier.jsontext import from_toml, text_of
 from noisemodel import Robot, RobotError, Run, UnknownJointError, UnknownRobotError
-from noisemodel.files import replacing
+from noisemodel.files import write_whole
 from noisemodel.robot import Limits, joint_limits
 from noisemodel.run import LONGEST, SHORTEST
 from noisemodel.runfile import ArchiveError, one_line
@@ -405,8 +405,7 @@ class ReadOptions:
         if self.entries:
             lines += ["", "[map]"]
             lines += [f"{toml(each.target)} = {toml(each.source)}" for each in self.entries]
-        with replacing(path, overwrite=overwrite) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        write_whole(path, "\n".join(lines) + "\n", overwrite=overwrite)
 
 
 def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
@@ -471,6 +470,9 @@ def _setting(name: str, value: Any) -> Any:
     if not correct or (lists and not all(isinstance(each, str) for each in value)):
         raise InspectorError(f"{name} = {toml_shown(value)} is of another type than expected")
     return tuple(value) if lists else value
+
+
+# Columns of signals
 
 
 class _Choice(NamedTuple):
