@@ -5,10 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inspector.errors import InspectorError
-from inspector.logs.mapping import UNITS, Entry, ReadOptions, parse_mapping
+from inspector.logs.mapping import JOINT, UNITS, Entry, ReadOptions, parse_mapping
 
 LETTERS = st.characters(codec="utf-8", exclude_categories=("Cs", "Cc"), exclude_characters="=")
 NAMES = st.text(LETTERS, min_size=1)
+PLAIN = NAMES.filter(lambda name: JOINT not in name)  # a pattern on one side cannot be typed
 FORMAT = 'format = "noise-mapping/1"\n'
 
 
@@ -19,7 +20,7 @@ FORMAT = 'format = "noise-mapping/1"\n'
     joints=st.lists(NAMES).map(tuple),
     topics=st.lists(NAMES).map(tuple),
     offset=st.none() | st.floats(-1e12, 1e12),
-    columns=st.lists(st.tuples(NAMES, NAMES), unique_by=(lambda p: p[0], lambda p: p[1])),
+    columns=st.lists(st.tuples(PLAIN, PLAIN), unique_by=(lambda p: p[0], lambda p: p[1])),
 )
 @settings(max_examples=30, deadline=None)
 def test_a_saved_mapping_is_loaded_unchanged(tmp_path_factory, columns, **settings):
