@@ -133,6 +133,17 @@ def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_fe
         assert part.hashes == {one.name: one.sha256}
 
 
+@pytest.mark.parametrize("label", ["ok", "impact", "oscillations"])
+def test_frames_are_evaluated_as_the_model_bound_to_their_log_decides_them(label):
+    one = recording(500.0, label, 0)
+    bound = trained().at(500.0, one.signal)
+    _, features = frame_features(one.signal, bound.profile)
+    predicted = bound.predict(features.astype(np.float32))
+    part = next(nc.frames_of([one], RECIPE))
+    expected = nc.Evaluation.of(part.labels, predicted, trained().classes)
+    assert trained().evaluate(part).as_dict() == expected.as_dict()
+
+
 def test_every_so_many_ok_frames_are_kept_and_all_others():
     ok, bad = recording(500.0, "ok", 0), recording(500.0, "impact", 0)
     for one, share in ((ok, 4), (bad, 1)):
