@@ -508,10 +508,11 @@ def test_a_recording_that_fails_halfway_leaves_nothing(tmp_path, monkeypatch):
     assert {path.name for path in tmp_path.iterdir()} == {"run.npz"}
 
 
-def test_the_text_is_as_high_as_its_lines_that_fit():
+def test_the_text_is_as_high_as_the_paragraphs_that_fit():
     title, short = "### ok\n\n", "x" * 70
     one, two = height(title + short), height(f"{title}{short}\n\n{short}")
-    assert two - one == 31.0  # an empty line and one more
+    assert two - one == recordings.PARAGRAPH
     assert height(f"{title}{short}\n{short}") - one == recordings.LINE
     assert height(title + 2 * short) - one == recordings.LINE
+    assert height(f"{title}{short}\n\n{short * 30}") == one  # whose end would be below the edge
     assert height(title + f"{short}\n\n" * 20) <= recordings.TALLEST

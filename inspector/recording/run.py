@@ -1,5 +1,6 @@
 """A run as a rerun recording: findings, robot and details at the left, time at the right."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from math import ceil
@@ -68,11 +69,11 @@ def log_report(
 
 
 ASPECT = 1.3  # least width of the robot's view by its height
-# Heights in a text, in points: from the top to the middle of its title, to the next line, and from
-# the last one to the end; most height of the text at the left, by which no line is cut through.
-HEAD, LINE, FOOT = 36.0, 15.5, 28.0
-TALLEST = HEAD + 13 * LINE + FOOT
+# Heights in a text, in points: from the top to the middle of its title, to the first line of the
+# next paragraph, to the next line, and from the last one to the end.
+HEAD, PARAGRAPH, LINE, FOOT = 36.0, 31.0, 15.5, 28.0
 COLUMNS = 72  # characters of a line at the left of a window of 1440 x 900, at least
+TALLEST = 264.0  # most height of the text at the left, in points
 # Heights of the whole window's parts, of the list of events without and for each, of the samples of
 # a moment, and of a row of tabs, in points.
 WHOLE, EVENTS, EVENT, DETAILS, TITLES = 836.0, 84.0, 23.0, 190.0, 28.0
@@ -173,10 +174,17 @@ def _log_strips(
 
 
 def height(markdown: str) -> float:
-    """Height of a text with its empty lines, in points, as far as there is room for it."""
-    rows = markdown.strip().replace("**", "").split("\n")
-    below = sum(max(1, ceil(len(row) / COLUMNS)) for row in rows[1:])
-    return min(HEAD + LINE * below + FOOT, TALLEST)
+    """Height of a text as far as its parts fit, in points: none is cut through by the edge."""
+    found = HEAD - PARAGRAPH
+    for part in re.split(r"\n\n(?!- )", markdown.strip()):
+        below = found
+        for paragraph in part.split("\n\n"):
+            rows = paragraph.replace("**", "").split("\n")
+            below += PARAGRAPH + LINE * (sum(ceil(len(row) / COLUMNS) for row in rows) - 1)
+        if below + FOOT > TALLEST:
+            break
+        found = below
+    return max(found, HEAD) + FOOT
 
 
 def _log_text(recording: rr.RecordingStream, analysis: Analysis) -> None:
