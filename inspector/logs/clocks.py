@@ -1,7 +1,7 @@
 """Clocks of logs: units and order of stamps, rates of logs without, and signals on one time base.
 
 Stamps of separate clocks are aligned by cross-correlation of the desired and the measured
-velocities of the same joints, which gives the offset; residual offsets of short segments refine it.
+velocities of the same joints, which gives the offset.
 An offset below ``LAG`` is attributed to the controller, not to the clocks.
 A zero-order hold is a slow signal that was sampled faster by holding its values.
 """
@@ -311,11 +311,7 @@ NEXT_BEST = 0.95  # largest correlation of the next best offset, as a share of t
 SHARE = 0.5  # least share of the shorter log that overlaps the longer one
 # Largest delay of measured behind desired motion that is attributed to a controller, in [s].
 LAG = 0.1
-HIGHEST_RATE = 1000.0  # highest rate at which motions are compared, in [Hz]
-COARSE_RATE = 50.0  # rate of the first search, in [Hz]
-# Largest number of segments that the offset is averaged over, and their least length, in [s].
-SEGMENTS, SHORTEST = 12, 2.0
-APART = 1e-3  # least change of the offset between the halves of a log that is said, in [s]
+HIGHEST_RATE = 250.0  # highest rate at which motions are compared, in [Hz]
 
 HOW = "specify --offset SECONDS, which is added to the desired stamps"
 
@@ -381,15 +377,12 @@ def _estimated(
     if pair is None and not apart:
         return 0.0, ""
     if pair is not None:
-        seconds, change, correlation, next_best = _estimate(*pair)
+        seconds, correlation, next_best = _estimate(*pair)
         said = f"offset {seconds:+.4f} s (correlation {correlation:.2f}, next best {next_best:.2f})"
         if correlation >= CORRELATION and next_best <= NEXT_BEST * correlation:
-            drifts = ""
-            if abs(change) >= APART:
-                drifts = f"; the clocks drift: it is {change:+.4f} s larger in the second half"
             if abs(seconds) <= LAG:
-                return 0.0, f"{said}: a controller's lag, the stamps are not changed{drifts}"
-            return seconds, f"{said}: its stamps are shifted by that{drifts}"
+                return 0.0, f"{said}: a controller's lag, the stamps are not changed"
+            return seconds, f"{said}: its stamps are shifted by that"
         unknown = f"the offset cannot be estimated ({said})"
     if apart:
         raise LogError(path, f"{apart}{unknown}; {HOW}")
@@ -413,39 +406,28 @@ def no_overlap(desired: Stamps, measured: Stamps) -> str:
     return f"{span(desired)} do not overlap with {span(measured)}"
 
 
-def _estimate(measured: Track, desired: Track) -> tuple[float, float, float, float]:
-    """Offset of the desired clock and its change from half to half, in [s]; two correlations."""
+def _estimate(measured: Track, desired: Track) -> tuple[float, float, float]:
+    """Offset of the desired clock, in [s], its correlation, and that of the next best offset."""
     rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in (measured, desired)))
     joints = [joint for joint in measured.joints if joint in desired.joints]
     speeds = []
     for track in (measured, desired):
-        values = np.asarray(track.of(joints), dtype=np.float64)
+        values, time = np.asarray(track.of(joints), dtype=np.float64), track.stamps.time
         if track.signal.startswith("position"):
-            values = np.gradient(np.unwrap(values, axis=0), track.stamps.time, axis=0)
-        speeds.append(replace(track, values=values))
-    one, other = speeds
-    coarse = min(rate, COARSE_RATE)
-    times = one.stamps.time, other.stamps.time
-    slow = [
-        _at(each, np.arange(time[0], time[-1], 1 / coarse))
-        for each, time in zip(speeds, times, strict=True)
-    ]
-    least = int(SHARE * min(map(len, slow)))
-    correlations = _correlation(*_moving(*slow), least)
+            values = np.gradient(np.unwrap(values, axis=0), time, axis=0)
+        instants = np.arange(time[0], time[-1], 1 / rate)
+        speeds.append(_at(replace(track, values=values), instants))
+    correlations = _correlation(*_moving(*speeds), int(SHARE * min(map(len, speeds))))
     best = int(np.argmax(correlations))
     distance, correlation = np.abs(np.arange(len(correlations)) - best), correlations[best]
     # The peak reaches to where the correlation falls below half of it.
     edge = distance[correlations < 0.5 * correlation].min(initial=len(correlations))
     next_best = float(correlations[distance > edge].max(initial=-1.0))
-    seconds = (best - len(slow[1]) + 1) / coarse + float(times[0][0] - times[1][0])
-    change = 0.0
-    for _ in range(3):
-        residual, weight = _residuals(one, other, seconds, rate).T
-        if len(residual):
-            seconds += float(np.average(residual, weights=weight))
-            early, late = np.array_split(residual, 2)
-            change = float(np.mean(late) - np.mean(early)) if len(late) > 1 else 0.0
-    return seconds, change, float(correlation), next_best
+    before, after = correlations[max(best - 1, 0)], correlations[min(best + 1, len(distance) - 1)]
+    bend = 2 * correlation - before - after
+    top = best + (after - before) / (2 * bend) if bend > 0 else best  # of a parabola
+    start = float(measured.stamps.time[0] - desired.stamps.time[0])
+    return start + (float(top) - len(speeds[1]) + 1) / rate, float(correlation), next_best
 
 
 def _at(motion: Track, instants: Array) -> Array:
@@ -485,37 +467,6 @@ def _correlation(one: Array, other: Array, least: int) -> Array:
     tiny = np.finfo(np.float64).tiny
     found = crossed / np.sqrt(np.maximum(energy, max(1e-9 * energy.max(), tiny)))
     return np.where(stop - start >= least, found, -1.0)
-
-
-def _residuals(measured: Track, desired: Track, seconds: float, rate: float) -> Array:
-    """Residual offset and weight of each segment, shape (segments, 2)."""
-    known, shifted = measured.stamps.time, desired.stamps.time + seconds
-    start = max(known[0], shifted[0]) + 2 * LAG
-    stop = min(known[-1], shifted[-1]) - 2 * LAG
-    count = min(SEGMENTS, int((stop - start) / SHORTEST))
-    if count < 1:
-        return np.empty((0, 2))
-    moved = replace(desired, stamps=replace(desired.stamps, time=shifted))
-    reach = int(np.ceil(2 * LAG * rate))
-    found = []
-    for first, last in pairwise(np.linspace(start, stop, count + 1)):
-        instants = np.arange(first, last, 1 / rate)
-        longer = first + np.arange(-reach, len(instants) + reach) / rate
-        after, segment = _moving(_at(moved, longer), _at(measured, instants))
-        if not segment.size:
-            continue
-        near = _correlation(after, segment, len(segment))[len(segment) - 1 :]
-        peak = int(np.argmax(near))
-        if near[peak] < CORRELATION:
-            continue
-        piece = after[peak : peak + len(segment)]
-        gain = (segment * piece).sum(axis=0) / np.maximum((piece**2).sum(axis=0), 1e-300)
-        slope = np.gradient(piece * gain, 1 / rate, axis=0)
-        # segment(t) = piece(t - rest), to first order
-        rest = ((piece * gain - segment) * slope).sum() / (slope**2).sum()
-        lag = (len(after) - len(segment)) // 2 - peak
-        found.append((lag / rate + float(rest), float(near[peak])))
-    return np.array(found).reshape(-1, 2)
 
 
 # A hold: slow signals that were sampled faster
