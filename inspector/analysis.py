@@ -377,7 +377,9 @@ def worst_joint(analysis: Analysis) -> int | None:
         return None
     moment = worst(analysis)[:1]
     for event, known in analysis.localisations.items() if analysis.findings and moment else ():
-        if known.joints and event.start <= moment[0].peak <= event.stop:
+        # The level has a value every `STEP`: that of the peak may be just before the onset.
+        near = event.start - STEP / 2 <= moment[0].peak <= event.stop + STEP / 2
+        if known.joints and near:
             return analysis.run.joint_names.index(known.joints[0][0])
     _, level = analysis.joint_levels
     power = np.nansum(10.0 ** (level / 10.0), axis=0)

@@ -28,6 +28,7 @@ from inspector.analysis import (
     noise_level,
     with_links,
     worst,
+    worst_joint,
     write_csv,
 )
 from inspector.audit import audit
@@ -35,6 +36,7 @@ from inspector.audit.signals import without_placeholder
 from inspector.errors import InspectorError, Status, Unknown
 from inspector.levels import STEP
 from inspector.library import Labelled, demo_run, load_library, model_files
+from inspector.localisation import Localisation
 from inspector.logs.read import Source
 from inspector.report import WORDS, html
 from inspector.report.formats import FORMATS
@@ -325,6 +327,8 @@ def test_what_a_run_lacks_and_what_was_computed_in_its_place_is_said():
         (moving(valid=np.arange(5000) >= 3), (none, gap)),
     ):
         assert with_links(analysed(".", run=each), "").missing == missing
+    desired = replace(run, base_pose=pose, velocity_desired=still + 1.0, position_desired=still)
+    assert (estimate(desired, "normal").pressure > 0).all()  # what is desired makes noise, too
     up = np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (3, 1))  # a base that floats makes noise
     assert (estimate(replace(run, base_pose=pose, base_velocity=up), "normal").pressure > 0).all()
 
@@ -448,9 +452,10 @@ def inspected(tmp_path, *, blocks=(), events=(), **changes):
     velocity = 0.2 * np.cos(time) + 1.0 * ((time >= 1.0) & (time < 1.003))
     velocity += 2.0 * np.sin(2 * np.pi * 80 * time) * ((time >= 2.0) & (time < 3.0))
     fields = {"time": time, "velocity": velocity[:, None], "joint_names": ("a",), "blocks": blocks}
+    fields |= changes
     path = tmp_path / "run.npz"
     tmp_path.mkdir(exist_ok=True)
-    Run(**(fields | changes)).save(path)
+    Run(**fields).save(path)
     return replace(analyse_file(path, {}), findings=tuple(events), spans=tuple(events))
 
 
@@ -474,6 +479,18 @@ def test_without_findings_annotations_count_and_else_the_loudest_moment(tmp_path
     assert only.label == LOUDEST
     assert 2.0 <= only.peak <= 3.0
     assert (only.start, only.stop) == (0.0, 3.999)
+
+
+def test_the_worst_joint_is_that_of_the_worst_finding_and_else_the_loudest(tmp_path):
+    time = np.arange(4000) / 1000
+    tone = 0.5 * np.sin(2 * np.pi * 80 * time) * ((time >= 1.0) & (time < 1.3))
+    velocity = np.stack((np.sin(2 * np.pi * 15 * time), tone), axis=1)
+    event = Event("oscillations", 1.0, 1.3, 1.0)
+    found = inspected(tmp_path, events=(event,), velocity=velocity, joint_names=("a", "b"))
+    vars(found)["localisations"] = {event: Localisation(joints=(("b", 0.9), ("a", 0.1)))}
+    assert worst(found)[0].peak == pytest.approx(1.0, abs=STEP)
+    assert worst_joint(found) == 1
+    assert worst_joint(replace(found, findings=(), spans=())) == 0
 
 
 def test_gaps_last_from_their_first_sample_to_the_next_valid_one():

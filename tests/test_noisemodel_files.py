@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from noisemodel import OutputError, files
-from noisemodel.files import cache_folder, cached, refuse_existing, replacing
+from noisemodel.files import cache_folder, cached, refuse_existing, replacing, write_whole
 
 
 def write(path, text, **options):
@@ -21,6 +21,15 @@ def test_a_file_appears_at_the_end_with_its_contents_and_nothing_else(tmp_path):
         assert not (tmp_path / "out.txt").exists()
     assert (tmp_path / "out.txt").read_text() == "whole"
     assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_what_is_written_whole_replaces_nothing_unless_asked(tmp_path):
+    path = tmp_path / "out.txt"
+    write_whole(path, "first")
+    with pytest.raises(OutputError, match="exists already"):
+        write_whole(path, "second")
+    write_whole(path, b"third", overwrite=True)
+    assert path.read_text() == "third"
 
 
 def test_the_file_has_the_permissions_of_any_new_file(tmp_path):
