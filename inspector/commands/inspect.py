@@ -30,7 +30,8 @@ from inspector.logs.read import Opened, Reading
 from inspector.reference.judging import Comparison
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import References, seen
-from inspector.report import excused, failing, html, sentence
+from inspector.report import html, sentence
+from inspector.report.formats import excused, failing
 from inspector.report.picture import require
 from inspector.text import cell, progress
 from inspector.verdict import EXPECTED, Verdict

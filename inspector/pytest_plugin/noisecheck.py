@@ -25,7 +25,7 @@ from inspector.reference.judging import Comparison, Expected
 from inspector.reference.levels import Levels, levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, classes_found, judge
-from inspector.report import told
+from inspector.report.formats import told
 from inspector.text import counted
 from inspector.verdict import EXPECTED, Finding, Verdict
 from noisemodel import Run

@@ -10,9 +10,9 @@ import os
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
+from itertools import accumulate, zip_longest
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -22,21 +22,11 @@ from inspector.analysis import NOTHING
 from inspector.errors import EXIT, IGNORED, Status, Unknown
 from inspector.reference import difference as diff
 from inspector.reference.difference import LOUDER, NEW, RESOLVED, Difference
-from inspector.report import (
-    COUNTED,
-    WORDS,
-    Group,
-    each_missing,
-    excused,
-    failing,
-    folded,
-    groups,
-    row,
-    table,
-    told,
-)
+from inspector.reference.store import REPETITION
+from inspector.report import words
 from inspector.text import counted, program_version
-from inspector.verdict import UNREAD, Verdict, counts, exit_status
+from inspector.verdict import UNREAD, Beside, Finding, Verdict, counts, exit_status
+from noiseclassifier.labels import interval
 
 ANNOTATIONS = 10  # GitHub silently drops what goes beyond ten of a kind per step
 COMMENT = 60_000  # most characters of the Markdown: GitHub refuses comments of more than 65,536
@@ -55,7 +45,17 @@ QUIET = (Status.OK, diff.Outcome.SAME)  # what tables leave out
 REPEATED = r"\d+% by \d+ repetitions? of "  # what the line on the reference says for all runs
 # By what else remarks of runs differ that say the same.
 AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
-
+# Onsets this close in repetitions are one row, in [s]: the hop of frames is 0.1 s or 0.2 s.
+TOGETHER = 0.25
+# How people read a status.
+WORDS = {
+    Status.INTERNAL_ERROR: "internal error",
+    Status.BAD_INPUT: "bad input",
+    Status.FINDINGS: "FAIL",
+    Status.CANNOT_TELL: "cannot tell",
+    Status.OK: "ok",
+}
+COUNTED = WORDS | {Status.FINDINGS: "with findings"}  # how people count them
 
 # What a case is as a test, by its element in JUnit XML.
 PASSED, FAILURE, ERROR, SKIPPED = "", "failure", "error", "skipped"
@@ -82,6 +82,7 @@ class Case:
     sentences: tuple[str, ...] = ()  # what fails it
     message: str = ""  # a line that says more
     notes: tuple[str, ...] = ()  # what does not fail it, a sentence each
+    cells: tuple[tuple[str, ...], ...] = ()  # all that as rows of a text
     trace: str = ""
     seconds: float = 0.0  # that it took
     picture: Path | None = None
@@ -98,6 +99,7 @@ class Job:
     """All cases of a job, in order of their files, with counts by kind and name."""
 
     title: str
+    marker: str
     summary: str
     counts: Mapping[str, Mapping[str, int]]
     cases: Sequence[Case]
@@ -268,11 +270,11 @@ def _described(rule: str) -> str:
     return RULES.get(rule) or (wanted if label != rule else other)
 
 
-def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
+def markdown(job: Job) -> str:
     """Write a job for its summary or a comment: a table, the worst first, and a picture."""
     ranked = job.ranked
     shown = [case for case in ranked if case.outcome or case.status not in QUIET]
-    lines, tail = [marker, f"### {job.title}: {job.summary}", ""], [""]
+    lines, tail = [job.marker, f"### {job.title}: {job.summary}", ""], [""]
     for remark in job.remarks:
         tail += [f"{_cell(remark[:1].upper() + remark[1:])}.", ""]
     worst = next((case for case in ranked if case.picture is not None), None)
@@ -281,10 +283,10 @@ def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
     rows = [f"| {_code(case.name)} | {case.words} | {_cell(case.told)} |" for case in shown]
     left = [f"- {_code(case.name)}: {_cell(note)}" for case in ranked for note in case.notes]
     if rows:
-        lines += _cut([head, "|---|---|---|"], rows, COMMENT * 2 // 3)
+        lines += _cut(["| scenario | status | findings |", "|---|---|---|"], rows, COMMENT * 2 // 3)
     lines += tail
     if left:
-        opened = ["", f"<details><summary>{notes}: {len(left)}</summary>", ""]
+        opened = ["", f"<details><summary>What does not count: {len(left)}</summary>", ""]
         lines += [*_cut(opened, left, COMMENT // 4), "", "</details>"]
     return "\n".join(lines).rstrip()
 
@@ -322,14 +324,124 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     runs += [f"{ignored} of the bad input ignored"] if ignored else []
     absent = sum(len(verdict.missing) for verdict in verdicts if not verdict.of_run)
     logs = f"; no log for {counted(absent, 'required finding')}" if absent else ""
-    findings = _listed(number["findings"])
+    findings = _numbers(number["findings"])
     total = counted(sum(verdict.of_run for verdict in verdicts), "run")
     found = f"; findings: {findings}" if findings else ""
     return f"{total}: {', '.join(runs) or 'none'}{logs}{found}"
 
 
-def _listed(numbers: Mapping[str, int]) -> str:
+def _numbers(numbers: Mapping[str, int]) -> str:
     return ", ".join(f"{n} {name.replace('-', ' ')}" for name, n in numbers.items() if n)
+
+
+def row(event: Finding, beside: Beside | None, runs: str = "") -> tuple[str, ...]:
+    """A finding as cells: time, class, joints, band, and the rest, with its number of runs."""
+    by = event.evidence
+    _, joints, band = words(event.localisation) if event.localisation else ("", "", "")
+    over = "by the general model" if beside is not None and not by.excused else ""
+    if by.over_db is not None and not by.excused:
+        several = beside is not None and beside.repetitions and by.kind == "repetitions"
+        of = counted(beside.repetitions, "repetition") if beside and several else by.kind
+        over = f"{by.over_db:+.0f} dB over {of}"
+        joints = joints or by.joint or ""
+        band = band or (f"{by.band_hz[0]:.0f}-{by.band_hz[1]:.0f} Hz" if by.band_hz else "")
+    order, ruled = str(event.order or ""), event.became and f"({event.became})"
+    rest = _listed(event.novelty.removeprefix(", "), order, over, runs, ruled)
+    return f"{event.start:6.2f} - {event.stop:6.2f} s", event.label, joints, band, rest
+
+
+def told(event: Finding, beside: Beside | None, runs: str = "", *, short: bool = False) -> str:
+    """The same as a sentence, or short, for lines that are cut."""
+    _, label, *rest = row(event, beside, runs)
+    when = f"from {interval(event.start, event.stop)}"
+    when = f"{event.start:.2f}-{event.stop:.2f} s" if short else when
+    return _listed(f"{label} {when}", *rest)
+
+
+def _listed(*parts: str) -> str:
+    """What there is of several parts; a ruling in brackets follows without a comma."""
+    return ", ".join(filter(None, parts)).replace(", (", " (")
+
+
+def failing(verdict: Verdict) -> list[str]:
+    """Sentences on what fails a run."""
+    findings = [told(event, verdict.beside) for event in verdict.failing]
+    return [*findings, *map(str, verdict.missing)]
+
+
+def excused(verdict: Verdict) -> list[str]:
+    """Sentences on findings that do not."""
+    return [told(event, verdict.beside) for event in verdict.excused]
+
+
+def folded(
+    found: Iterable[tuple[Path, Finding, Beside | None]], runs: int
+) -> list[tuple[Finding, Beside | None, str]]:
+    """Findings by run: of those that are one the loudest, and how many of so many runs have it."""
+    groups: list[list[tuple[Path, Finding, Beside | None]]] = []
+    for each in found:
+        run, event, _ = each
+        for group in groups:
+            path, other, _ = group[0]
+            joint = event.evidence.joint
+            same = event.label == other.label or joint == other.evidence.joint is not None
+            near = abs(event.start - other.start) <= TOGETHER
+            if same and near and run != path and event.became == other.became:
+                group.append(each)
+                break
+        else:
+            groups.append([each])
+    result = []
+    for group in groups:
+        (label, _), *_ = Counter(event.label for _, event, _ in group).most_common(1)
+        named = [each[1:] for each in group if each[1].label == label]
+        worst = max(named, key=lambda each: (each[0].evidence.over_db or 0.0, each[0].score))
+        number = len({run for run, *_ in group})
+        result.append((*worst, f"{number} of {counted(runs, 'run')}" if runs > 1 else ""))
+    return result
+
+
+def groups(verdicts: Iterable[Verdict], *, by_run: bool = False) -> list[tuple[str, list[Verdict]]]:
+    """Runs by scenario, the worst first, or in order and each alone; with their names.
+
+    A scenario is what runs of one folder name so, or have one name but for a number, and one that
+    has no log. What could not be read stays alone.
+    """
+    every: list[Verdict] = []
+    for verdict in verdicts:
+        absent = [replace(verdict, missing=(each,)) for each in verdict.missing]
+        every += [verdict] if verdict.of_run else absent
+    if not by_run:
+        every.sort(key=lambda each: (each.of_run, each.severity))
+    found: dict[tuple[Path, str], tuple[str, list[Verdict]]] = {}
+    for place, verdict in enumerate(every):
+        path, repeated = verdict.path, REPETITION.fullmatch(verdict.path.stem)
+        name, key = str(path), (path, f"{place}")
+        if not verdict.of_run:
+            name = verdict.missing[0].scenario
+        elif not by_run and verdict.status not in UNREAD:
+            name = verdict.scenario or str(path.with_name(repeated["name"]) if repeated else path)
+            key = path.parent, f"of {name}"
+        found.setdefault(key, (name, []))[1].append(verdict)
+    return [
+        (name if len(each) > 1 or not each[0].of_run else str(each[0].path), each)
+        for name, each in found.values()
+    ]
+
+
+def table(rows: Sequence[Sequence[str]], gap: str = "   ") -> list[str]:
+    """Lines of cells, each column as wide as its widest cell.
+
+    A row of fewer cells ends with a sentence, which may reach over the columns to its right.
+    """
+    most = max(map(len, rows), default=0)
+    kept = [cells if len(cells) == most else cells[:-1] for cells in rows]
+    widths = [max(map(len, column)) for column in zip_longest(*kept, fillvalue="")]
+    lines = []
+    for cells in rows:
+        pairs = zip(cells, widths, strict=False)
+        lines.append(gap.join(cell.ljust(width) for cell, width in pairs if width or cell).rstrip())
+    return lines
 
 
 def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
@@ -341,7 +453,7 @@ def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
     if len(verdicts) == 1 and read:
         lines = _one(read[0])
     else:
-        lines = table([cells for group in groups(read) for cells in _rows(group)])
+        lines = _rows(_case(*group) for group in groups(read))
     runs = [each for each in read if each.of_run]
     if verbose:
         lines += [f"run:     {each.path} [{each.model or 'no model'}]" for each in runs]
@@ -365,21 +477,17 @@ def _one(verdict: Verdict) -> list[str]:
     return [head, *(f"  {line}" for line in [*table(found), *map(str, verdict.missing)])]
 
 
-def _rows(group: Group) -> Iterator[tuple[str, ...]]:
-    """Rows of a scenario: its first finding beside its name, the others below."""
-    name, status, number = group.name, group.words, len(group.verdicts)
-    cells: list[tuple[str, ...]] = [
-        row(*each) for fails in (True, False) for each in group.found(fails=fails)
-    ]
-    others = group.missing or ([counted(number, "run")] if number > 1 and not cells else [])
-    if group.worst.status is Status.CANNOT_TELL:
-        others = [*others, group.worst.message]
-    cells += [(each,) for each in others]
-    left = len(cells) - MOST
-    more = [(f"and {left} more (--format json)",)] if left > 0 else []
-    for each in [*cells[:MOST], *more] or [("",)]:
-        yield (name, status, *each)
-        name = status = ""
+def _rows(cases: Iterable[Case]) -> list[str]:
+    """Lines of cases: the first row of each beside its name, the others below."""
+    rows = []
+    for case in cases:
+        left = len(case.cells) - MOST
+        more = [(f"and {left} more (--format json)",)] if left > 0 else []
+        head = case.name, case.words
+        for each in [*case.cells[:MOST], *more] or [("",)]:
+            rows.append((*head, *each))
+            head = "", ""
+    return table(rows)
 
 
 def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
@@ -419,30 +527,50 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
     return json.dumps(whole, indent=2)
 
 
-def _case(verdict: Verdict) -> Case:
-    """A run as a case, or a scenario that has no log."""
-    absent = None if verdict.of_run else verdict.missing[0]
-    kind = "missing" if verdict.missing else verdict.status.value
-    if verdict.failing:
-        kind = max(verdict.failing, key=lambda event: event.score).label
+def _case(name: str, verdicts: Sequence[Verdict]) -> Case:
+    """A run as a case, all runs of a scenario, the worst first, or a scenario that has no log."""
+    worst = verdicts[0]
+    failing, others = (
+        folded(
+            [
+                (one.path, each, one.beside)
+                for one in verdicts
+                for each in one.events
+                if each.fails is fails
+            ],
+            len(verdicts),
+        )
+        for fails in (True, False)
+    )
+    missing = list(dict.fromkeys(each for one in verdicts for each in one.missing))
+    cells = [*(row(*each) for each in (*failing, *others)), *((each.told,) for each in missing)]
+    if len(verdicts) > 1 and not cells:
+        cells = [(counted(len(verdicts), "run"),)]
+    if worst.status is Status.CANNOT_TELL:
+        cells.append((worst.message,))
+    kind = "missing" if worst.missing else worst.status.value
+    if worst.failing:
+        kind = max(worst.failing, key=lambda event: event.score).label
+    lacks = worst.missing and not worst.failing  # a scenario may be missing or cut
     return Case(
-        name=str(verdict.path) if absent is None else absent.scenario,
-        path=verdict.path,
-        status=verdict.status,
-        words=WORDS[verdict.status],
-        outcome=SKIPPED if verdict.ignored else OUTCOMES[verdict.status],
-        rank=verdict.severity,
+        name=name,
+        path=worst.path,
+        status=worst.status,
+        words=worst.missing[0].words if lacks else WORDS[worst.status],
+        outcome=SKIPPED if worst.ignored else OUTCOMES[worst.status],
+        rank=worst.severity,
         kind=kind,
-        sentences=tuple(failing(verdict)),
+        sentences=(*(told(*each) for each in failing), *map(str, missing)),
         rules=(
-            *((each.label, _rounded(each, "start", "stop")) for each in verdict.failing),
-            *((f"missing-{each.kind}", {}) for each in verdict.missing),
+            *((each.label, _rounded(each, "start", "stop")) for each, *_ in failing),
+            *((f"missing-{each.kind}", {}) for each in missing),
         ),
-        message=verdict.message,
-        notes=tuple(excused(verdict)),
-        trace=verdict.trace,
-        seconds=verdict.seconds,
-        picture=verdict.picture,
+        message=worst.message,
+        notes=tuple(told(*each) for each in others),
+        cells=tuple(cells),
+        trace=worst.trace,
+        seconds=worst.seconds,
+        picture=next((each.picture for each in verdicts if each.picture), None),
     )
 
 
@@ -450,24 +578,12 @@ def _rounded(of: object, *names: str, digits: int = 6) -> dict[str, float]:
     return {name: round(getattr(of, name), digits) for name in names}
 
 
-def _of_group(group: Group) -> Case:
-    """All runs of a scenario as one case."""
-    return replace(
-        _case(group.worst),
-        name=group.name,
-        words=group.words,
-        sentences=(*(told(*each) for each in group.found(fails=True)), *group.missing),
-        notes=tuple(told(*each) for each in group.found(fails=False)),
-        picture=next((each.picture for each in group.verdicts if each.picture), None),
-    )
-
-
 def _job(verdicts: Sequence[Verdict], *, by_run: bool) -> Job:
     """All runs as cases, or all scenarios."""
-    cases = map(_case, each_missing(verdicts)) if by_run else map(_of_group, groups(verdicts))
+    cases = [_case(*each) for each in groups(verdicts, by_run=by_run)]
     remarks = (IGNORED,) if any(each.unknown is Unknown.IGNORE for each in verdicts) else ()
     number, status = counts(verdicts), exit_status(verdicts)
-    return Job("Noise", summary(verdicts), number, tuple(cases), status, remarks)
+    return Job("Noise", MARKER, summary(verdicts), number, cases, status, remarks)
 
 
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
@@ -476,11 +592,7 @@ FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
     "junit": lambda verdicts: junit(_job(verdicts, by_run=True)),
     "github": lambda verdicts: github(_job(verdicts, by_run=False)),
     "sarif": lambda verdicts: sarif(_job(verdicts, by_run=True)),
-    "markdown": lambda verdicts: markdown(
-        _job(verdicts, by_run=False),
-        head="| scenario | status | findings |",
-        notes="Findings that do not count",
-    ),
+    "markdown": lambda verdicts: markdown(_job(verdicts, by_run=False)),
 }
 
 
@@ -489,16 +601,9 @@ FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
 
 def diff_text(found: Difference) -> str:
     """A row for each scenario, the worst first, with a line for each new finding; remarks last."""
-    rows = []
-    for each in found.rows:
-        fails = found.status(each) is Status.FINDINGS
-        name, word = each.name, each.outcome.upper() if fails else each.outcome.value
-        for line in [*_told(each), *_folded(each, RESOLVED)] or [""]:
-            rows.append((name, word, line))
-            name = word = ""
-    lines = [_diff_summary(found), "", *table(rows)]
+    cases = [_of_row(found, each) for each in found.rows]
     remarks = dict.fromkeys(remark for each in found.rows for remark in each.remarks)
-    lines += [f"note:    {remark}" for remark in remarks]
+    lines = [_diff_summary(found), "", *_rows(cases), *(f"note:    {each}" for each in remarks)]
     worse = [each for each in found.rows if each.outcome is diff.Outcome.WORSE]
     for before, worst in [(each.before[0], each.worst) for each in worse if each.worst][:1]:
         lines.append(f"next:    inspector view {before} {worst.run.run}")
@@ -516,11 +621,10 @@ def _told(of: diff.Row) -> list[str]:
 
 def _folded(of: diff.Row, kind: str) -> list[str]:
     """Findings of a kind, one line for what repetitions share."""
-    own = [(each.run, each.event) for each in of.findings if each.kind == kind]
-    groups = folded(own, len(of.before if kind == RESOLVED else of.after))
-    shown = groups[:MOST_OF_KIND]
-    lines = [f"{kind}: {told(event, None, number, short=True)}" for _, event, number in shown]
-    left = len(groups) - MOST_OF_KIND
+    own = [(each.run, each.event, None) for each in of.findings if each.kind == kind]
+    shared = folded(own, len(of.before if kind == RESOLVED else of.after))
+    lines = [f"{kind}: {told(*each, short=True)}" for each in shared[:MOST_OF_KIND]]
+    left = len(shared) - MOST_OF_KIND
     return lines + ([f"and {left} more {kind} (--format json)"] if left > 0 else [])
 
 
@@ -607,40 +711,46 @@ def _diff_counts(found: Difference) -> dict[str, dict[str, int]]:
 def _diff_summary(found: Difference) -> str:
     """The counts in a line, new findings first."""
     number = _diff_counts(found)
-    findings = _listed(number["findings"])
-    left = _listed({name: n for name, n in number["files"].items() if name != "compared"})
+    findings = _numbers(number["findings"])
+    left = _numbers({name: n for name, n in number["files"].items() if name != "compared"})
     total = counted(len(found.rows), "scenario")
-    parts = [f"{found.outcome}: {total} ({_listed(number['scenarios'])})" if found.rows else ""]
+    parts = [f"{found.outcome}: {total} ({_numbers(number['scenarios'])})" if found.rows else ""]
     parts += [f"findings: {findings}" if findings else "", f"files: {left}" if left else ""]
     return "; ".join(filter(None, parts)) or "nothing is compared"
 
 
 def _of_difference(found: Difference) -> Job:
     """All scenarios as cases, and the files that cannot be compared."""
-    cases = [_of_row(found, each, place) for place, each in enumerate(found.rows)]
     outcome = ERROR if found.gate.failed else SKIPPED
-    cases += [replace(_case(each), outcome=outcome, seconds=0.0) for each in found.failed]
-    number, status = _diff_counts(found), found.exit_status
-    return Job("Noise beside the runs before", _diff_summary(found), number, cases, status)
+    cases = [_of_row(found, each) for each in found.rows]
+    for name, each in groups(found.failed, by_run=True):
+        cases.append(replace(_case(name, each), outcome=outcome, seconds=0.0))
+    title, number = "Noise beside the runs before", _diff_counts(found)
+    return Job(title, DIFF_MARKER, _diff_summary(found), number, cases, found.exit_status)
 
 
-def _of_row(found: Difference, of: diff.Row, place: int) -> Case:
-    status, lines = found.status(of), _told(of)
+def _of_row(found: Difference, of: diff.Row) -> Case:
+    status, place, lines, resolved = (
+        found.status(of),
+        found.rows.index(of),
+        _told(of),
+        _folded(of, RESOLVED),
+    )
     fails = status is Status.FINDINGS
     worst = [path for path in of.after if of.worst and str(path) == of.worst.run.run]
-    others = [] if fails else [line for line in lines if line != of.reason]
     broken = of.outcome in (*diff.BROKEN, diff.Outcome.WORSE)
     return Case(
         name=of.name,
         path=(worst or of.after or of.before)[0],
         status=of.outcome,
-        words=of.outcome,
+        words=of.outcome.upper() if fails else of.outcome,
         outcome=OUTCOMES[status],
         rank=(list(EXIT).index(status), place),
         kind=of.outcome if broken else "new finding",
         sentences=tuple(lines) if fails else (),
         message="" if fails else of.reason,
-        notes=(*others, *_folded(of, RESOLVED), *of.remarks),
+        notes=(*(lines[1:] if not fails else ()), *resolved, *of.remarks),
+        cells=tuple((line,) for line in [*lines, *resolved]),
         picture=found.picture if not place else None,
     )
 
@@ -650,10 +760,5 @@ DIFF_FORMATS: dict[str, Callable[[Difference], str]] = {
     "json": diff_json,
     "junit": lambda found: junit(_of_difference(found)),
     "github": lambda found: github(_of_difference(found)),
-    "markdown": lambda found: markdown(
-        _of_difference(found),
-        head="| scenario | verdict | what changed |",
-        notes="Changes that do not count",
-        marker=DIFF_MARKER,
-    ),
+    "markdown": lambda found: markdown(_of_difference(found)),
 }

@@ -24,18 +24,8 @@ from inspector.errors import InspectorError, Status
 from inspector.export.sound import clip, common_gain, worst_time
 from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
-from inspector.report import (
-    COUNTED,
-    annotated,
-    excused,
-    facts,
-    failing,
-    groups,
-    note,
-    sentence,
-    spoken,
-)
-from inspector.report.formats import summary
+from inspector.report import annotated, facts, note, sentence, spoken
+from inspector.report.formats import COUNTED, excused, failing, groups, summary
 from inspector.report.picture import picture, require
 from inspector.text import counted, natural
 from inspector.verdict import Verdict, read_results
@@ -379,10 +369,10 @@ def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
     over: dict[tuple[str, str], Array] = defaultdict(nowhere)
     found: dict[tuple[str, str], Array] = defaultdict(none)
     for commit, verdicts in enumerate(results):
-        for group in groups(verdicts):
-            name = group.worst.scenario or str(Path(group.name).with_suffix(""))
-            runs[name][commit] = np.nansum((runs[name][commit], len(group.verdicts)))
-            for verdict in group.verdicts:
+        for called, of in groups(verdicts):
+            name = of[0].scenario or str(Path(called).with_suffix(""))
+            runs[name][commit] = np.nansum((runs[name][commit], len(of)))
+            for verdict in of:
                 known = verdict.beside
                 levels = {} if known is None or known.over_db is None else {"": known.over_db}
                 for joint, worst in (levels | dict(known.joints_db if known else {})).items():
