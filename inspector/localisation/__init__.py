@@ -34,65 +34,45 @@ LEAST = 1e-6
 def extent(
     run: Run, start: float, stop: float, *, frame: float = 0.4, hop: float = 0.1
 ) -> tuple[float, float]:
-    """Estimate when a finding sets in and when it ends: change points of its power.
+    """Estimate when a finding sets in and when it ends, in [s]: change points of its power.
 
-    A classifier labels frames (0.4 s, every 0.1 s). A finding begins with its first frame, most of
-    which the failure has not reached yet. The onset is the time t in the first frame that splits
-    the power into two levels best. For n samples of mean power p, of which n1 before t have p1 and
-    n2 after it p2, the log likelihood of two levels exceeds the one of a single level by
+    A finding begins with its first frame, most of which the failure has not reached yet. The onset
+    is the time t in it that splits n samples of mean power p into two levels best: n1 samples of p1
+    before t, and n2 of p2 after it. The gain in the log likelihood of independent normal samples is
 
         (n log p - n1 log p1 - n2 log p2) / 2
 
-    if samples are independent and normal. This is the criterion by which seismologists pick the
-    onset of waves (Maeda 1985), and of a change of variance in general (Inclan & Tiao 1994). Only a
-    rise counts. Samples of a vibration are not independent: a time of `INDEPENDENT` counts as one.
-    The mean of the log likelihoods of two powers is taken: of the tracking error (of the motion, if
-    no velocity is desired) above 10 Hz, and of the `sudden` changes of the motion. Both filters are
-    causal, so that nothing rises before it happens.
+    (Maeda 1985 for seismic waves; Inclan & Tiao 1994 for any change of variance). Only a rise
+    counts, and a time of `INDEPENDENT` as one sample. The gain is the mean of those of two powers:
+    of the tracking error (of the motion, if no velocity is desired) above 10 Hz, and of the
+    `sudden` changes of the motion. Both filters are causal: nothing rises before it happens.
 
     The frame before the first was not labelled, so that the failure sets in during the first
-    frame's last hop. This is the prior: a normal distribution with `ONSET` and `DEVIATION`. Its
-    mean is the result where nothing stands out. Where no frame fits in before the first one,
-    because the run begins or a gap ends there, the mean is the frame's start, and the deviation a
-    frame's. The end is the onset of the same stretch reversed in time, with the prior `END`.
-
-    Neither likelihood nor prior depends on scale. A scalar noise is a run of one joint.
-
-    Args:
-        run: The run, or a scalar noise as a run of one joint; desired velocities are optional.
-        start: Start of the finding's first frame, in [s].
-        stop: Stop of its last frame, in [s].
-        frame: Duration of a frame, in [s].
-        hop: Time from the start of a frame to the start of the next, in [s].
-
-    Returns:
-        Onset, from ``start`` to the stop of the first frame, and end, after the onset and up to
-        ``stop``, in [s].
+    frame's last hop. This is the prior: a normal distribution with `ONSET` and `DEVIATION`, or, if
+    the run begins or a gap ends there, with the frame's start and duration. The end is the onset of
+    the same stretch reversed in time, with the prior `END`.
     """
     begin, sample = float(run.time[0]), 1.0 / run.rate
     start = min(max(start, begin), begin + run.duration - sample)
     stop = max(min(stop, begin + run.duration), start + sample)
-    room = max(0.0, min(frame, stop - start - sample))  # not -1e-17 by rounding
-    prior = frame - ONSET * hop, DEVIATION * hop
-    onset = start + _rise(run, start, room, prior, frame=frame, hop=hop)
-    room = max(0.0, min(frame, stop - onset - sample))
-    prior = END * hop, DEVIATION * hop
-    return onset, stop - _rise(run, stop, room, prior, frame=frame, hop=hop, backwards=True)
+    onset = start + _rise(run, start, stop - start, frame - ONSET * hop, frame, hop)
+    return onset, stop - _rise(run, stop, stop - onset, END * hop, frame, hop, backwards=True)
 
 
 def _rise(
     run: Run,
     edge: float,
-    room: float,
-    prior: tuple[float, float],
-    *,
+    length: float,
+    mean: float,
     frame: float,
     hop: float,
+    *,
     backwards: bool = False,
 ) -> float:
-    """Time from an outer edge of a finding to the rise of its power, up to ``room``, in [s]."""
+    """Time from an outer edge of a finding of some length to the rise of its power, in [s]."""
     samples, size = len(run.time), max(1, round(FINE * run.rate))
-    step = size / run.rate
+    step, deviation = size / run.rate, DEVIATION * hop
+    room = max(0.0, min(frame, length - 1.0 / run.rate))  # not -1e-17 by rounding
     at = round((edge - float(run.time[0])) * run.rate)
     at = samples - at if backwards else at
     past = min(round(2.0 * PAST / step), at // size)
@@ -100,7 +80,8 @@ def _rise(
     power, known = _powers(run, at - past * size, past + ahead, size, backwards=backwards)
     mask = run.mask[::-1] if backwards else run.mask
     outside = at - round(hop * run.rate)
-    mean, deviation = prior if outside >= 0 and mask[outside:at].all() else (0.0, frame)
+    if outside < 0 or not mask[outside:at].all():
+        mean, deviation = 0.0, frame
     gain = _gain(power[past:], known[past:], max(1, round(SHORTEST_LEVEL / step)))
     if not gain.any():
         return max(0.0, min(mean, room))
@@ -112,18 +93,16 @@ def _rise(
 
 def _powers(run: Run, start: int, bins: int, size: int, *, backwards: bool) -> tuple[Array, Mask]:
     """Power of error and sudden changes, shape (bins, 2), and where they can be used."""
-    part = slice(start, start + bins * size)
+    part, step = slice(start, start + bins * size), 1
     if backwards:
-        part = slice(len(run.time) - part.stop, len(run.time) - start)
-    order = slice(None, None, -1) if backwards else slice(None)
-    velocity = motion = error = run.velocity[part][order]
+        part, step = slice(len(run.time) - part.stop, len(run.time) - start), -1
+    velocity = motion = error = run.velocity[part][::step]
     if run.base_velocity is not None:
-        motion = error = np.hstack((run.base_velocity[part][order], motion))
-    measured, desired = in_both(run) if run.velocity_desired is not None else ([], [])
-    if run.velocity_desired is not None and measured:
-        error = run.velocity_desired[part][order][:, desired] - velocity[:, measured]
+        motion = error = np.hstack((run.base_velocity[part][::step], motion))
+    if run.velocity_desired is not None and (both := in_both(run))[0]:
+        error = run.velocity_desired[part][::step][:, both[1]] - velocity[:, both[0]]
     motion, error = motion.reshape(bins, size, -1), error.reshape(bins, size, -1)
-    valid = np.asarray(run.mask[part][order].reshape(bins, size).all(axis=1), dtype=np.bool_)
+    valid = np.asarray(run.mask[part][::step].reshape(bins, size).all(axis=1), dtype=np.bool_)
     rate = run.rate / size
     last = np.arange(1, bins + 1)
     begin = np.maximum.accumulate(np.where(valid, 0, last))  # of the stretch without a gap
@@ -161,11 +140,7 @@ MOST = 16  # most stretches that are picked; a long run is not read whole
 def quiet_stretches(
     run: Run, failures: Sequence[Failure], *, length: float, most: int = MOST
 ) -> list[slice]:
-    """Pick stretches without failures or gaps, spread evenly over a run.
-
-    Args:
-        length: Length of a stretch, in [s].
-    """
+    """Pick stretches of a length, in [s], without failures or gaps, evenly spread over a run."""
     size = max(1, round(length * run.rate))
     free = run.mask.copy()
     for failure in failures:
@@ -173,6 +148,11 @@ def quiet_stretches(
         free[first:last] = False
     count = len(free) // size
     starts = size * np.flatnonzero(free[: count * size].reshape(count, size).all(axis=1))
+    return _spread(starts, size, most)
+
+
+def _spread(starts: Indices, size: int, most: int = MOST) -> list[slice]:
+    """Stretches of a size at some starts, evenly spread if there are more than ``most``."""
     if len(starts) > most:
         starts = starts[np.linspace(0, len(starts) - 1, most).astype(int)]
     return [slice(start, start + size) for start in starts.tolist()]
@@ -196,25 +176,17 @@ class Flow:
 
 def flow(run: Run, part: slice) -> Flow:
     """Gather the stages of a run, for the joints that all of them have."""
-    own = list(range(len(run.joint_names)))
-    stages = [(name, signal, own) for name, signal in run.stages.items()]
-    joints = own
+    names, joints = [*run.stages, MEASURED], list(range(len(run.joint_names)))
     if run.velocity_desired is not None:
-        places = {name: index for index, name in enumerate(run.desired_joint_names)}
-        joints = [index for index in own if run.joint_names[index] in places]
-        wanted = [places[run.joint_names[index]] for index in joints]
-        stages.append((DESIRED, run.velocity_desired, wanted))
-    stages.append((MEASURED, run.velocity, own))
+        joints, wanted = in_both(run)
+    signals = [each[part][:, joints] for each in (*run.stages.values(), run.velocity)]
+    if run.velocity_desired is not None:
+        names.insert(-1, DESIRED)
+        signals.insert(-1, run.velocity_desired[part][:, wanted])
     return Flow(
-        names=tuple(name for name, _, _ in stages),
+        names=tuple(names),
         joints=tuple(run.joint_names[index] for index in joints),
-        velocity=np.array(
-            [
-                signal[part][:, columns if name == DESIRED else joints]
-                for name, signal, columns in stages
-            ],
-            dtype=np.float64,
-        ),
+        velocity=np.array(signals, dtype=np.float64),
         time=run.time[part],
         valid=run.mask[part],
         rate=run.rate,
@@ -227,7 +199,6 @@ TRAIL = 0.02  # time of the mean that is subtracted from changes, in [s]
 LAGS = (0.0, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.006, 0.008, 0.012)
 LENGTH = 0.1  # length of a quiet stretch, in [s]
 WARM = TRAIL + LAGS[-1] + SPAN  # transient of filters and prediction, in [s]
-PARTS = 16  # most quiet stretches that the prediction is fitted to
 ROWS = 3000  # most samples of the least squares
 RIDGE = 1e-3  # regularisation of the least squares, as a share of the mean power
 
@@ -259,7 +230,7 @@ class QuietStatistics:
 
 def quiet_statistics(run: Run, failures: Sequence[Failure]) -> QuietStatistics:
     """Fit the prediction to the quiet stretches of a run, and measure its residual there."""
-    parts = quiet_stretches(run, failures, length=LENGTH + WARM, most=PARTS)
+    parts = quiet_stretches(run, failures, length=LENGTH + WARM)
     stretches = [flow(run, part) for part in parts]
     first = stretches[0] if stretches else flow(run, slice(0, 1))
     stages, _, joints = first.velocity.shape
@@ -306,13 +277,7 @@ def _innovation(change: Array, weights: Array, lags: Indices, valid: Mask) -> In
 def sudden(velocity: Array, valid: Mask, rate: float) -> Array:
     """Change over 1 ms, less the mean of such changes over the past 20 ms: both are causal.
 
-    Args:
-        velocity: Shape (..., samples, joints), in [rad/s].
-        valid: False in gaps, shape (samples,).
-        rate: Samples per second, in [Hz].
-
-    Returns:
-        Of the same shape, in [rad/s²]; 0 next to gaps.
+    Velocities have the shape (..., samples, joints); changes are in [rad/s²], and 0 next to gaps.
     """
     step = max(1, round(SPAN * rate))
     trail = max(1, round(TRAIL * rate), 2 * step)
@@ -374,37 +339,19 @@ class Localisation:
 def first_stage(
     run: Run, quiet: QuietStatistics, failure: Failure, *, reach: float
 ) -> Localisation:
-    """Find the stage in which a failure shows first.
+    """Find the stage in which a failure shows first; empty if none shows it, without its band.
 
-    There is no run without the failure to compare with; the innovation of each stage shows where it
-    enters. Two kinds of failures are distinguished:
+    There is no run without the failure to compare with: the *innovation* of each stage shows where
+    it enters, its `sudden` changes less their linear prediction from the stage before.
 
-    - A *blow or jump* passes one stage after the other, so these are ordered by onset. It is looked
-      for where the innovation of a stage, relative to its peak in quiet stretches, first rises
-      steeply. The onset in a stage is the first time at which the innovation exceeds a fifth of its
-      peak and twice its level in the 50 ms before. A stage has no onset if that peak is less than
-      four times the level before, or less than a fifth of all changes there: it passes on what the
-      stage before it did. The first stage has no prediction, hence its peak also has to exceed 1.5
-      times that in quiet stretches, or the next stage has to follow within 3 ms. The earliest onset
-      wins; of simultaneous ones, the stage that a motion passes first.
+    - A *blow or jump* passes one stage after the other: the earliest onset wins (`_earliest`).
     - A *lasting vibration* has gone round the control loop many times, and its onset, such as the
-      touch that starts a limit cycle, is not its source. It lies in the first stage that adds to
-      it: whose innovation has at least a quarter of the largest excess power of any stage, and more
-      than twice the power in quiet stretches.
-
-    A failure lasts if its vibration is within 6 dB of its loudest 50 ms for 0.3 s in all, of the
-    first second. A failure without an onset is treated as if it lasted.
-
-    The *innovation* of a stage is its `sudden` changes less their linear prediction, by least
-    squares over quiet stretches of the same run, from the changes of the joint at the stage before,
-    now and up to 12 ms ago. The first stage has no prediction.
+      touch that starts a limit cycle, is not its source: the first stage that adds to it wins
+      (`_adding`). A failure lasts if its vibration is within 6 dB of its loudest 50 ms for 0.3 s in
+      all, of the first second; one without an onset is treated as if it lasted.
 
     Args:
         reach: How long after its start it may have set in, in [s].
-
-    Returns:
-        The stage, its lag to the next and its joints, without the band; empty if no stage shows
-        the failure.
     """
     stop = min(failure.stop, failure.start + LONGEST)
     edges = (failure.start - BEFORE, max(stop, failure.start + reach) + AFTER)
@@ -429,7 +376,12 @@ def first_stage(
 def _earliest(
     stages: Flow, innovation: Innovation, quiet: QuietStatistics, first: int, last: int
 ) -> Localisation | None:
-    """Order the stages by the onset of a blow or jump."""
+    """Order the stages by the onset of a blow or jump, around the steepest rise of any of them.
+
+    A stage whose peak is less than a fifth of all changes there passes on what the stage before it
+    did. The first stage has no prediction: its peak has to exceed that in quiet stretches, or the
+    next stage to follow within 3 ms. Of simultaneous ones, the one that a motion passes first wins.
+    """
     rate, samples = stages.rate, len(stages.time)
     # A stage without innovation in quiet stretches would exceed its peak at once.
     scale = quiet.peak + PASSED_ON * (float(quiet.peak.max()) or 1.0)
@@ -466,7 +418,7 @@ def _earliest(
 def _adding(
     stages: Flow, innovation: Innovation, quiet: QuietStatistics, during: slice
 ) -> Localisation | None:
-    """Find the first stage that adds to a vibration."""
+    """Find the first stage whose innovation has a quarter of the largest excess power of any."""
     power = np.square(innovation.level[:, during]).mean(axis=1)
     total = np.square(innovation.total[:, during]).mean(axis=1)
     least = np.maximum(MORE * quiet.power, PASSED_ON**2 * total)
@@ -495,11 +447,7 @@ def _joints(stages: Flow, residual: Array) -> tuple[tuple[str, float], ...]:
 
 
 def rise(level: Array, first: int, last: int, *, rate: float) -> int:
-    """Find where a level first rises: 10 ms against the 50 ms before, both as mean squares.
-
-    Args:
-        rate: Samples per second, in [Hz].
-    """
+    """Find where a level first rises: 10 ms against the 50 ms before, both as mean squares."""
     ahead, back = (max(1, round(time * rate)) for time in (AHEAD, BACK))
     energy = np.concatenate(([0.0], np.cumsum(np.square(level))))
     first = min(max(first, 1), len(level) - 1)
@@ -518,15 +466,9 @@ def rise(level: Array, first: int, last: int, *, rate: float) -> int:
 def onset(
     level: Array, moment: int, around: slice, *, rate: float, least: float = 0.0
 ) -> int | None:
-    """Find the onset of a blow or jump.
+    """Find the first sample, around the steepest rise, of a fifth of the peak; None without one.
 
-    Args:
-        moment: Sample of the steepest rise, and the samples around it in which the onset lies.
-        rate: Samples per second, in [Hz].
-        least: Peak that has to be exceeded in any case, in the same unit.
-
-    Returns:
-        The sample; None if the level hardly exceeds that before.
+    It also has twice the level before, and the peak four times that, and more than ``least``.
     """
     back, ahead = (round(time * rate) for time in (BACK, AHEAD))
     before = level[max(0, moment - back - ahead) : max(1, moment - ahead)]
@@ -551,15 +493,9 @@ def band(run: Run, failure: Failure, failures: Sequence[Failure]) -> tuple[float
     """Frequency band in which the joints vibrate more than in quiet stretches.
 
     The excess is the power spectrum of the measured velocities above 10 Hz, mean over the failure,
-    less the 90th percentile of the quiet stretches' spectra. The band is the narrowest that holds
-    70 % of it.
-
-    Args:
-        failures: All failures of the run, found and annotated.
-
-    Returns:
-        Lowest and highest frequency, in [Hz]; None without excess. The resolution is the inverse
-        of the failure's duration, and 2.5 Hz at best.
+    less the 90th percentile of the spectra of quiet stretches, without any of ``failures``. The
+    band is the narrowest that holds 70 % of it, in [Hz]; None without excess. The resolution is the
+    inverse of the failure's duration, and 2.5 Hz at best.
     """
     length = min(max(failure.stop - failure.start, BRIEFEST), WIDEST, run.duration)
     size = max(2, round(length * run.rate))
@@ -567,15 +503,11 @@ def band(run: Run, failure: Failure, failures: Sequence[Failure]) -> tuple[float
     # The window of a shorter failure extends beyond it.
     first = max(0, min(int(first), len(run.time) - size))
     starts = np.arange(first, max(first + 1, int(last) - size + 1), max(1, size // 2))
-    if len(starts) > MOST:
-        starts = starts[np.linspace(0, len(starts) - 1, MOST).astype(int)]
-    during = [slice(start, start + size) for start in starts.tolist()]
-    during = [part for part in during if run.mask[part].all()]
+    during = [part for part in _spread(starts, size) if run.mask[part].all()]
     if not during:
         return None
-    reference = [
-        _spectrum(run.velocity[part]) for part in quiet_stretches(run, failures, length=length)
-    ]
+    quiet = quiet_stretches(run, failures, length=length)
+    reference = [_spectrum(run.velocity[part]) for part in quiet]
     excess = np.mean([_spectrum(run.velocity[part]) for part in during], axis=0)
     if reference:
         excess = excess - np.percentile(reference, PERCENTILE, axis=0)
@@ -615,16 +547,11 @@ def fault_links(
 ) -> tuple[tuple[str, float], ...]:
     """Name the links at which a failure is localised.
 
-    A link's excess is its power above 10 Hz, less its median outside of all failures. A blow or
-    jump spreads over the whole robot within a step, so that only its beginning counts. Even then
-    a light foot is louder than the limb that was hit, hence a second criterion: the joints of the
-    largest innovation. Named is the link of the largest excess; of each such joint that moves none
-    of the named ones, the link of the largest excess that it moves; and then the links of the
-    largest excess.
-
-    Args:
-        others: All failures of the run, found and annotated.
-        known: Its localisation, if there is one: onset and joints are used.
+    A link's excess is its power above 10 Hz, less its median outside of all failures, ``others``. A
+    blow or jump spreads over the whole robot within a step, so that only its beginning counts. Even
+    then a light foot is louder than the limb that was hit. So the link of the largest excess is
+    named, the loudest one of each joint of the largest innovation that moves none of the named
+    ones, and then the links of the largest excess.
     """
     time, vibration = links.time, links.vibration
     start, stop = failure.start, failure.stop
@@ -656,12 +583,7 @@ ANNOTATED = 0.1  # how long after the start of an annotation its failure may set
 def localise(
     run: Run, found: Sequence[Event], *, frame: float = 0.0
 ) -> dict[Failure, Localisation]:
-    """Localise each failure of a run.
-
-    Args:
-        frame: Duration of the frames that they consist of, in [s]: a finding may set in at any
-            time of its first.
-    """
+    """Localise each failure of a run; a finding may set in at any time of its first frame."""
     annotated = [block for block in run.blocks if block.label != "ok"]
     failures: list[Failure] = [*found, *annotated]
     if not failures:

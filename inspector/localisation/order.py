@@ -1,10 +1,9 @@
 """Order of a finding: the periods per turn of a joint of a vibration that goes with its speed.
 
 Teeth, balls or poles that pass n times per turn of a joint shake it at n |w| / 2 pi: a frequency
-that goes with the joint's speed w, but one line at order n in the spectrum over the joint's angle.
-That is order tracking with angular resampling (Fyfe & Munck 1997, Analysis of computed order
-tracking, Mechanical Systems and Signal Processing 11(2)). A vibration of fixed frequency is a line
-over time, and smears over angle.
+that goes with the joint's speed w, but one line at order n in the spectrum over the joint's angle
+(computed order tracking, Fyfe & Munck 1997, Mechanical Systems and Signal Processing 11(2)). A
+vibration of fixed frequency is a line over time, and smears over angle.
 
 Both are measured by the share of the energy that one line explains. The vibration e is cut into
 pieces of at most `LONGEST`, and where the joint stops or turns back. In each piece, with Hann
@@ -15,9 +14,8 @@ amplitude and one that grows with the speed, and conserves energy from time to a
 sqrt|w| exp(-i n theta) over time is the integral of h e / sqrt|w| exp(-i n theta) over angle, thus
 a Fourier transform of samples at equal steps of it.
 
-An order is stated if its line explains `LEAST` of the energy, and `MARGIN` of it more than the best
-line of fixed frequency: while the speed hardly varies both explain the same. The limits were chosen
-on simulated findings.
+While the speed hardly varies, the best lines at an order and at a frequency explain the same. The
+limits `LEAST` and `MARGIN` were chosen on simulated findings.
 """
 
 import math
@@ -72,12 +70,7 @@ class Piece(NamedTuple):
 
 
 def order(run: Run, failure: Event | Block) -> Order | None:
-    """Order of the vibration of the joint that vibrates most in a failure.
-
-    Returns:
-        The order; None if a line at an order does not explain the vibration, or hardly better than
-        one at a frequency does.
-    """
+    """Order of the vibration of the joint that vibrates most; None if none explains it best."""
     best, over_angle, over_time = best_lines(run, failure, least=LEAST)
     return best if over_angle >= max(LEAST, over_time + MARGIN) else None
 
@@ -85,17 +78,11 @@ def order(run: Run, failure: Event | Block) -> Order | None:
 def best_lines(
     run: Run, failure: Event | Block, *, least: float = 0.0
 ) -> tuple[Order | None, float, float]:
-    """The best order of the joint that vibrates most, and what it explains.
+    """The best order of the joint that vibrates most, and what it and a frequency explain.
 
-    The vibration is the measured velocity less the desired one, or the measured one of a joint
-    without, above 10 Hz.
-
-    Args:
-        least: Share that an order has to explain, else no line of a fixed frequency is sought.
-
-    Returns:
-        The order, its share of the joint's vibration, and the share of the best line of a fixed
-        frequency, between 0 and 1; None, 0 and 0 without vibration or without motion.
+    Both are shares of the joint's vibration above 10 Hz: of the velocity, less the desired one if
+    there is one. No frequency is sought if an order explains less than ``least``; without vibration
+    or motion there is none.
     """
     parts = _parts(run, failure)
     if not parts:
@@ -177,16 +164,14 @@ def _fast(signal: Array, half: int) -> Array:
 
 def _motion(run: Run, part: slice, joint: int, half: int) -> tuple[Array, Array]:
     """Angle, in [rad], and speed, in [rad/s], of a joint without its vibration."""
-    inner = slice(4 * half, -4 * half)
-    if run.position is None:
-        velocity = _around(run, part, 4 * half, run.velocity, joint)
-        speed = velocity[inner] - _fast(velocity, half)
-        steps = (speed[1:] + speed[:-1]) / 2.0 / run.rate
-        return np.concatenate(([0.0], np.cumsum(steps))), speed
-    wrapped = _around(run, part, 4 * half, run.position, joint)
-    angle = np.unwrap(wrapped)
-    angle = angle[inner] - _fast(angle, half)
-    return angle, np.gradient(angle) * run.rate
+    signal = run.velocity if run.position is None else run.position
+    whole = _around(run, part, 4 * half, signal, joint)
+    whole = whole if run.position is None else np.unwrap(whole)
+    slow = whole[4 * half : -4 * half] - _fast(whole, half)
+    if run.position is not None:
+        return slow, np.gradient(slow) * run.rate
+    steps = (slow[1:] + slow[:-1]) / 2.0 / run.rate
+    return np.concatenate(([0.0], np.cumsum(steps))), slow
 
 
 def _pieces(wave: Array, angle: Array, speed: Array, slowest: float) -> Iterator[Piece]:
@@ -204,10 +189,7 @@ def _pieces(wave: Array, angle: Array, speed: Array, slowest: float) -> Iterator
 def _explained(
     pieces: list[Piece], fastest: float, rate: float, *, fewest: float = 0.0, periods: float = 0.0
 ) -> tuple[float, float]:
-    """The order that explains most, in periods per turn, and the share that it explains.
-
-    It is 0 if none has periods enough.
-    """
+    """The order that explains most, in periods per turn, 0 without periods enough; its share."""
     step = fastest / rate / FINER
     longest = max(piece.angle[-1] for piece in pieces)
     size = 1 << math.ceil(math.log2(PADDED * longest / step + 1.0))
