@@ -351,6 +351,8 @@ def test_the_level_of_a_run_is_that_of_its_samples_with_parts_of_a_thousandth_an
     assert level() == f"simplified: rms {rms:.4g} rad/s, peak 10 rad/s at 2.007 s{shares}"
     gap = level(valid=np.arange(10) != 7)
     assert gap == f"simplified: rms 5 rad/s, peak 5 rad/s at 2.000 s{shares}"
+    faint = level(velocity=np.full((10, 2), 1e-3), valid=np.arange(10) != 7)
+    assert "peak 0.001414 rad/s at 2.000 s" in faint  # no gap is louder
     rest = level(velocity=np.zeros((10, 2)))
     assert rest == "simplified: rms 0 rad/s, peak 0 rad/s at 2.000 s"
     power = np.tile([0.998, 0.001, 0.0009], (10, 1))

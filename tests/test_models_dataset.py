@@ -121,6 +121,8 @@ def test_recordings_that_make_no_data_set_are_refused(recordings, error, reason)
             [(0.0, 2.0, "ok"), (0.1, 0.2, "ok"), (1.9, 2.5, "impact")],
             "block 'ok' from 0 s to 2 s and block 'impact' from 1.9 s to 2.5 s overlap",
         ),
+        ([(0.0, 2.0, "oscillations"), (1.9, 2.5, "impact")], "overlap and contradict"),
+        ([(0.0, 2.0, "impact"), (1.9, 2.5, "oscillations")], "overlap and contradict"),
     ],
 )
 def test_blocks_that_cannot_be_are_refused(blocks, reason):

@@ -120,6 +120,13 @@ def test_an_event_states_whether_it_is_out_of_distribution():
     assert str(plain) == "impact from 1.00 s to 1.50 s (score 0.90)"
 
 
+def test_the_score_of_an_event_is_that_of_its_class_and_of_an_unknown_one_of_any_failure():
+    scores = np.tile([0.1, 0.6, 0.3], (3, 1))
+    for letter, score in (("I", 0.6), ("O", 0.3), ("U", 0.6)):
+        found = replace(labels(3 * letter), scores=scores, above_threshold=None)
+        assert [event.score for event in found.events()] == [score]
+
+
 LETTERS = st.text(alphabet=".iIoOu", max_size=30)
 
 

@@ -10,7 +10,16 @@ from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, p
 
 from noiseclassifier import match, measures
 from noiseclassifier.labels import Event, Labels
-from noiseclassifier.matching import SHIFTS, Outcome, confirmed_at, meet, pairs, run_score, truth_of
+from noiseclassifier.matching import (
+    SHIFTS,
+    Outcome,
+    confirmed_at,
+    meet,
+    pairs,
+    run_score,
+    truth_of,
+    union,
+)
 from noiseclassifier.measures import MOST, Protocol, Resampling, auc
 from noiseclassifier.recording import Fault
 
@@ -103,6 +112,11 @@ def test_of_several_failures_in_a_frame_it_is_that_which_fills_most():
     # 0.8 s long: by half, 0.2 s, from frame 17 (1.7 to 2.1 s) to 25 (2.5 to 2.9 s).
     assert np.flatnonzero(found == "impact")[3:].tolist() == list(range(17, 26))
     assert found[16] == found[26] == ""
+
+
+def test_spans_that_touch_are_one():
+    spans = np.array([[3.0, 4.0], [0.0, 1.0], [1.0, 2.0], [0.2, 0.5]])
+    assert union(spans).tolist() == [[0.0, 2.0], [3.0, 4.0]]
 
 
 def test_ok_blocks_that_overlap_or_hold_each_other_are_one_stretch():

@@ -364,6 +364,12 @@ def test_the_motion_is_the_excitation_of_seed_0_unless_another_is_named(urdfs):
     assert found.rate == 4000.0
 
 
+def test_the_parts_of_the_spectrum_join_where_their_names_say():
+    edges = list(comparing.BANDS.values())
+    assert [high for _, high in edges[:-1]] == [low for low, _ in edges[1:]] == [20, 100, 500]
+    assert (edges[0][0], edges[-1][1]) == (0.0, np.inf)
+
+
 KINDS = ("paper", "normal", "C")
 LABELS = ("jerk", "oscillations", "fall")
 
