@@ -141,10 +141,3 @@ def test_arrays_that_do_not_fit_are_errors_of_one_line(tmp_path, arrays, mapping
     with pytest.raises(LogError, match=message) as caught:
         read_log(path, mapping=mapping)
     assert "\n" not in str(caught.value)
-
-
-def test_the_noise_of_a_simulated_run_is_no_log(tmp_path):
-    path = tmp_path / "sample.npz"
-    np.savez(path, format="noise-sample/3", measured=np.zeros(9))
-    with pytest.raises(LogError, match="holds the noise of a simulated run, not its motion"):
-        read_log(path)

@@ -93,7 +93,7 @@ def test_isaac_labs_episodes_are_runs_with_their_targets(tmp_path):
     ]
 
 
-def robomimic(path, arms=("robot0",)):
+def robomimic(path):
     """What robomimic writes of robosuite: observations, the same one step later, and actions."""
     _, position, velocity = moved(20)
     arrays = {
@@ -102,13 +102,12 @@ def robomimic(path, arms=("robot0",)):
         "rewards": np.zeros(STEPS),
         "states": np.zeros((STEPS, 32)),
     }
-    for arm in arms:
-        for name in ("obs", "next_obs"):
-            arrays[f"{name}/{arm}_joint_pos"] = position
-            arrays[f"{name}/{arm}_joint_vel"] = velocity
-            arrays[f"{name}/{arm}_joint_pos_cos"] = np.cos(position)
-            arrays[f"{name}/{arm}_eef_pos"] = position[:, :3]
-            arrays[f"{name}/{arm}_gripper_qpos"] = position[:, :2]
+    for name in ("obs", "next_obs"):
+        arrays[f"{name}/robot0_joint_pos"] = position
+        arrays[f"{name}/robot0_joint_vel"] = velocity
+        arrays[f"{name}/robot0_joint_pos_cos"] = np.cos(position)
+        arrays[f"{name}/robot0_eef_pos"] = position[:, :3]
+        arrays[f"{name}/robot0_gripper_qpos"] = position[:, :2]
     arrays = {f"data/demo_0/{name}": each for name, each in arrays.items()}
     return hdf5(path, arrays, data={"total": STEPS}), position
 
@@ -126,13 +125,6 @@ def test_robomimics_actions_are_not_taken_for_joint_targets(tmp_path):
         " --map position_desired=actions takes it",
     ]
     assert read_log(path, mapping=["position_desired=actions"]).run.position_desired.shape[1] == 7
-
-
-def test_the_arms_of_two_robots_are_told_apart(tmp_path):
-    path, _ = robomimic(tmp_path / "handover.hdf5", arms=("robot0", "robot1"))
-    run = read_log(path).run
-    assert run.joint_names[:2] == ("robot0_joint_0", "robot0_joint_1")
-    assert run.joint_names[7] == "robot1_joint_0"
 
 
 SCENE = """<mujoco><option timestep="0.002" integrator="implicitfast"/>

@@ -7,7 +7,7 @@ https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf
 
 import re
 import zlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -84,8 +84,6 @@ TABLE: tuple[tuple[str, str], ...] = (
 )
 # Isaac Lab's scene: several things may have joints.
 STATES = re.compile(r"states/articulation/(?P<robot>[^/]+)/(?P<what>.+)")
-# robosuite's robots, of which there may be two.
-ARMS = re.compile(r"(?:.*/)?(?P<arm>robot\d+)_joint_(?:pos|vel)")
 # Flags of D4RL and Gymnasium: the last step of an episode has one.
 EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
 # Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``.
@@ -152,13 +150,12 @@ def log_of(
         if time:
             stamps = stamps_of(path, time, arrays[time], options.rate)
     time, samples = stamps.name, len(stamps.time)
-    named = {**(joints or {}), **_arms(arrays, roles)}
     fields = [
         Field(
             name,
             floats(arrays[name].reshape(samples, -1)),
             stamps,
-            joints=named.get(name, ()),
+            joints=(joints or {}).get(name, ()),
             signal=what if what in (*SIGNALS, COMMAND) and name not in columns else "",
             source=path.name,
             # The second of two sides is a command beside the desired motion: ``cmd.q_d[0]``.
@@ -177,16 +174,6 @@ def log_of(
         time=time,
     )
     return gathered(log, options)
-
-
-def _arms(arrays: Arrays, roles: Collection[str]) -> dict[str, tuple[str, ...]]:
-    """Names of the joints of robosuite's arrays, if there are several arms."""
-    arms = {name: match["arm"] for name in roles if (match := ARMS.fullmatch(name))}
-    return {
-        name: tuple(f"{arm}_joint_{number}" for number in range(arrays[name][0].size))
-        for name, arm in arms.items()
-        if len({*arms.values()}) > 1
-    }
 
 
 def gathered(log: Log, options: ReadOptions) -> Log:
@@ -348,11 +335,6 @@ OBJECTS = (
     "Python objects, such as None, or PyBullet's joint states as they are; save numbers:"
     " np.savez(path, time=times, position=positions, velocity=velocities)"
 )
-SAMPLE = "noise-sample/"
-SAMPLE_PROBLEM = (
-    "holds the noise of a simulated run, not its motion: the folder of the data set is for"
-    " `inspector train`, `tune` and `evaluate`; `inspector simulate run` writes runs"
-)
 ALONE = "array"  # name of the array in a .npy file, for a mapping
 
 
@@ -370,8 +352,6 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
         return LogReader(
             "MATLAB 5", ("",), lambda _: log_of_variables(path, held(path), options), listing
         )
-    if str(arrays.get("format", "")).startswith(SAMPLE):
-        raise LogError(path, SAMPLE_PROBLEM)
     known = all(name in runfile.ARRAYS or name.startswith(runfile.STAGE) for name in arrays)
     if known and "time" in arrays and not (options.entries or options.units or options.joints):
         with suppress(RunError, TypeError):  # without uniform time it is resampled
