@@ -206,9 +206,7 @@ TURN = 2 * np.pi  # positions beyond, of half of the joints that move, are in de
 FARTHEST = 720.0  # largest position of an arm's joint, in [deg]; wheels turn farther
 NORMALISED = 100.0  # largest position that may be a share of a joint's range as well
 STRAIGHT = 0.9  # share of its way that a joint is away from its start: wheels go on and on
-# What is in degrees, by the ratio of logged velocities to the slope of positions.
-MATCHES = {1.0: ("position", "velocity"), np.pi / 180: ("position",), 180 / np.pi: ("velocity",)}
-CLOSE = 0.1  # largest relative deviation from such a ratio
+CLOSE = 0.1  # largest relative deviation of velocities from the slope of positions in degrees
 STRETCHES = 50  # of a log, whose ways are compared
 TURNING = ("revolute", "continuous")
 
@@ -220,15 +218,14 @@ HINT = (
 
 def _in_si(
     log: Log, tracks: Sequence[Track], units: str, robot: Robot | None, remarks: list[str]
-) -> tuple[list[Track], tuple[str, ...]]:
-    """Tracks in radians that know which columns are angles, and what was found to be in degrees."""
+) -> tuple[list[Track], bool]:
+    """Tracks in radians that know which columns are angles, and if they look like degrees."""
     kinds = {joint.name: joint.kind for joint in robot.joints} if robot else {}
-    in_degrees = () if units else _in_degrees(tracks, kinds)
+    in_degrees = not units and _in_degrees(tracks, kinds)
     if in_degrees:
-        plural = {"position": "positions", "velocity": "velocities"}
         remarks.append(
-            f"{' and '.join(plural[each] for each in in_degrees)} look like degrees: converted to"
-            " radians (if they are not, --units radians)"
+            "positions and velocities look like degrees: converted to radians (if they are not,"
+            " --units radians)"
         )
     found: list[Track] = []
     for track in tracks:
@@ -243,7 +240,7 @@ def _in_si(
                 continue
             track = _columns(track, angles)
         angular = _angular(track, kinds)
-        if angular.any() and (units == "degrees" or track.quantity in in_degrees):
+        if angular.any() and (units == "degrees" or in_degrees):
             values = np.where(angular, np.deg2rad(track.values), track.values)
             track = replace(track, values=values)
         if not units:
@@ -260,25 +257,20 @@ def _angular(track: Track, kinds: Mapping[str, str]) -> Mask:
     return np.array(turning, dtype=bool)
 
 
-def _in_degrees(tracks: Sequence[Track], kinds: Mapping[str, str]) -> tuple[str, ...]:
-    """What is in degrees, as positions and velocities tell.
+def _in_degrees(tracks: Sequence[Track], kinds: Mapping[str, str]) -> bool:
+    """Whether positions of half of the joints that move reach beyond a turn, to and fro.
 
-    Positions are if half of the joints that move reach beyond a turn, to and fro; velocities if
-    they match them. Without velocities, positions have to reach beyond ``NORMALISED``.
+    Velocities have to match them; without velocities, they have to reach beyond ``NORMALISED``.
     """
     by_signal = {track.signal: track for track in reversed(tracks)}
     suffix = "" if "position" in by_signal else "_desired"
     position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
     if position is None:
-        return ()
+        return False
     reach = _reach_to_and_fro(position, kinds)
     if velocity is None:
-        return ("position", "velocity") if reach > NORMALISED else ()
-    ratio = _ratio(position, velocity)
-    for known, quantities in MATCHES.items():
-        if abs(ratio / known - 1) <= CLOSE and (reach or "position" not in quantities):
-            return quantities
-    return ()
+        return reach > NORMALISED
+    return reach > 0 and abs(_ratio(position, velocity) - 1) <= CLOSE
 
 
 def _reach_to_and_fro(track: Track, kinds: Mapping[str, str]) -> float:

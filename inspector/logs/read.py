@@ -178,10 +178,22 @@ def readers_of(path: Path, reading: Reading) -> dict[str, Callable[[], Imported]
         if episode not in opened.episodes:
             known = listed(opened.episodes) or "no episodes"
             raise LogError(path, f"there is no episode {episode!r}; it has {known}")
-    return {
-        episode: partial(_read_episode, path, opened, other, episode, options, robot)
-        for episode in reading.episodes or opened.episodes
-    }
+
+    def read(episode: str) -> Imported:
+        name = run_name(path, episode)
+        if opened.run and not other:
+            run = opened.run()
+            run = replace(run, robot=options.robot or run.robot)
+            return Imported(run, ("a run file, unchanged",), name)
+        logs, how = [prepared(opened.read(episode), options, robot)], options
+        if other:
+            same = episode if episode in other.episodes else other.episodes[0]
+            if logs[0].in_degrees:  # of one robot, in one unit
+                how = replace(options, units="degrees")
+            logs.append(prepared(other.read(same), how, robot))
+        return run_of(logs, how, name)
+
+    return {each: partial(read, each) for each in reading.episodes or opened.episodes}
 
 
 def listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
@@ -193,29 +205,6 @@ def listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
 def run_name(path: Path, episode: str) -> str:
     """Name of the run of an episode of a log."""
     return f"{path.stem}-{episode}" if episode else path.stem
-
-
-def _read_episode(
-    path: Path,
-    opened: LogReader,
-    desired: LogReader | None,
-    episode: str,
-    options: ReadOptions,
-    robot: Robot | None,
-) -> Imported:
-    """Run of an episode: its signals prepared, with the desired ones of another log."""
-    name = run_name(path, episode)
-    if opened.run and not desired:
-        run = opened.run()
-        run = replace(run, robot=options.robot or run.robot)
-        return Imported(run, ("a run file, unchanged",), name)
-    logs = [prepared(opened.read(episode), options, robot)]
-    if desired:
-        same_episode = episode if episode in desired.episodes else desired.episodes[0]
-        if len(logs[0].in_degrees) == 2:  # of one robot, in one unit
-            options = replace(options, units="degrees")
-        logs.append(prepared(desired.read(same_episode), options, robot))
-    return run_of(logs, options, name)
 
 
 # Run files and logs alike
