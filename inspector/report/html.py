@@ -33,23 +33,41 @@ from noisemodel.files import write_whole
 from noisemodel.types import Array
 
 AUDIBLE = "Audible are the joints' velocities above 20 Hz; their powers are added."
-# Policy for browsers: nothing is fetched, whatever a run's names are.
+# Policies for browsers: nothing is fetched, whatever a run's names are; of many runs, the pictures
+# beside the page, also from a disk.
 POLICY = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'"
+INDEX_POLICY = "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'"
 STYLE = """
-:root { color-scheme: light; }
-body { font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; max-width: 62rem;
-  margin: 2rem auto; padding: 0 1rem; }
-h1 { margin-bottom: 0; overflow-wrap: anywhere; }
+:root { color-scheme: light dark; --ink: #1b1f24; --dim: #57606a; --line: #d0d7de; --back: #fff;
+  --bad: #cf222e; --warn: #9a6700; --good: #1a7f37; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6edf3; --dim: #9da7b3; --line: #30363d;
+  --back: #0d1117; --bad: #ff7b72; --warn: #e3b341; --good: #56d364; } }
+body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--back);
+  max-width: 72rem; margin: 2rem auto; padding: 0 1rem; overflow-wrap: anywhere; }
+h1 { margin-bottom: 0; }
 h2 { margin: 2.2rem 0 .6rem; font-size: 1.15rem; }
 .verdict { font-size: 1.25rem; font-weight: 600; margin: .2rem 0 1.2rem; }
-.note { color: #57606a; font-size: .9rem; margin: .3rem 0; }
+.note { color: var(--dim); font-size: .9rem; margin: .3rem 0; }
 .wide { overflow-x: auto; }
-img { width: 100%; height: auto; }
-audio { width: 100%; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid #d0d7de; }
-th { font-weight: 600; }
+img, svg, audio { width: 100%; height: auto; }
+img { background: #fff; }
 li { margin: .2rem 0; }
+table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid var(--line);
+  vertical-align: top; }
+a { color: inherit; text-underline-offset: .15em; }
+.status { display: inline-block; border: 2px solid; border-radius: .4rem; padding: 0 .5rem;
+  font-weight: 600; white-space: nowrap; }
+.internal-error, .bad-input { color: var(--bad); border-style: dashed; }
+.findings { color: var(--bad); } .cannot-tell { color: var(--warn); border-style: dotted; }
+.ok { color: var(--good); }
+section { display: grid; grid-template-columns: minmax(0, 2fr) minmax(0, 3fr); gap: 0 1.5rem;
+  border-top: 1px solid var(--line); padding: 1rem 0; break-inside: avoid; }
+section h2 { margin: 0 0 .4rem; }
+section p { margin: .2rem 0; }
+@media (max-width: 60rem) { section { display: block; } }
+svg { border: 1px solid var(--line); } circle { fill: #0072b2; } .step { color: #d55e00; }
+line { stroke: #d55e00; stroke-width: 2; stroke-dasharray: 6 4; }
 """
 
 
@@ -67,59 +85,59 @@ def page(
     beside: Comparison | None = None,
 ) -> str:
     """Write the page of an inspected run, beside a reference too; it says what a recording says."""
-    html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
-    add_text(body, "h1", analysis.name)
-    add_text(body, "p", spoken(analysis.headline), "verdict")
-    add_text(body, "p", facts(analysis), "note")
+    html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", POLICY)
+    add(body, "h1", analysis.name)
+    add(body, "p", spoken(analysis.headline), "verdict")
+    add(body, "p", facts(analysis), "note")
     if verdict is not None and verdict.beside is not None:
-        add_text(body, "p", f"Reference: {verdict.beside.path}, {verdict.beside.words}.", "note")
+        add(body, "p", f"Reference: {verdict.beside.path}, {verdict.beside.words}.", "note")
     found = [sentence(analysis, event) for event in analysis.findings]
     _add_list(body, "Findings", found)
     _add_list(body, "Annotated", annotated(analysis))
     if remark := note(analysis):
-        add_text(body, "p", remark, "note")
+        add(body, "p", remark, "note")
     if verdict is not None:
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
         _add_list(body, "Does not count", excused(verdict))
-    add_text(body, "h2", "Over time")
+    add(body, "h2", "Over time")
     image = f"data:image/png;base64,{b64encode(picture(analysis, beside)).decode()}"
     described = f"Noise, classes and spectrograms over {analysis.run.duration:.2f} s"
-    ET.SubElement(body, "img", src=image, alt=f"{described}; the lists have the findings")
-    add_text(body, "h2", "Sound")
+    add(body, "img", src=image, alt=f"{described}; the lists have the findings")
+    add(body, "h2", "Sound")
     if (sound := clip(analysis.run, around=worst_time(analysis))) is None:
-        add_text(body, "p", "The log's rate is too low for audible frequencies.", "note")
+        add(body, "p", "The log's rate is too low for audible frequencies.", "note")
     else:
         gain = common_gain([sound])
         source = f"data:audio/wav;base64,{b64encode(sound.file(gain)).decode()}"
-        ET.SubElement(body, "audio", controls="controls", src=source)
+        add(body, "audio", controls="controls", src=source)
         span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.what}"
-        add_text(body, "p", f"{span}, {sound.description(gain)}. {AUDIBLE}", "note")
+        add(body, "p", f"{span}, {sound.description(gain)}. {AUDIBLE}", "note")
     _add_list(body, "What the log can show", audit.splitlines())
     _add_list(body, "Remarks", [spoken(remark) for remark in analysis.remarks])
     made = (
         f"Made by noise-inspector of an input with SHA-256 {analysis.sha256}. The noise is an"
         " estimate from the velocities of rigid links: compare it, do not quote it."
     )
-    add_text(body, "p", made, "note")
+    add(body, "p", made, "note")
     return written(html)
 
 
 # --- elements of pages
 
 
-def document(title: str, style: str, policy: str) -> tuple[ET.Element, ET.Element]:
+def document(title: str, policy: str) -> tuple[ET.Element, ET.Element]:
     """An HTML page without content, and its body."""
     html = ET.Element("html", lang="en")
     head = ET.SubElement(html, "head")
     ET.SubElement(head, "meta", charset="utf-8")
     ET.SubElement(head, "meta", {"http-equiv": "Content-Security-Policy", "content": policy})
     ET.SubElement(head, "meta", name="viewport", content="width=device-width")
-    add_text(head, "title", title)
-    add_text(head, "style", style)
+    add(head, "title", title)
+    add(head, "style", STYLE)
     return html, ET.SubElement(html, "body")
 
 
-def add_text(parent: ET.Element, tag: str, text: str, kind: str = "", **more: str) -> ET.Element:
+def add(parent: ET.Element, tag: str, text: str = "", kind: str = "", **more: str) -> ET.Element:
     """Add an element with a text, of a class in the style, to another one."""
     element = ET.SubElement(parent, tag, {"class": kind} if kind else {}, **more)
     # HTML has no way to write these characters.
@@ -134,42 +152,16 @@ def written(html: ET.Element) -> str:
 
 def _add_list(body: ET.Element, title: str, lines: Sequence[str]) -> None:
     if lines:
-        add_text(body, "h2", title)
-        items = ET.SubElement(body, "ul")
+        add(body, "h2", title)
+        items = add(body, "ul")
         for line in lines:
-            add_text(items, "li", line.strip())
+            add(items, "li", line.strip())
 
 
 # --- the page of many runs
 
 PAGE = "index.html"
 PICTURES = "pictures"
-# Policy for browsers: nothing but the pictures is fetched, also from a page on a disk.
-INDEX_POLICY = "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'"
-ROWS = """
-:root { color-scheme: light dark; --ink: #1b1f24; --dim: #57606a; --line: #d0d7de; --back: #fff;
-  --bad: #cf222e; --warn: #9a6700; --good: #1a7f37; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e6edf3; --dim: #9da7b3; --line: #30363d;
-  --back: #0d1117; --bad: #ff7b72; --warn: #e3b341; --good: #56d364; } }
-body { max-width: 82rem; color: var(--ink); background: var(--back); }
-.note { color: var(--dim); }
-th, td { border-color: var(--line); vertical-align: top; }
-td:last-child, th:last-child { padding-right: 0; }
-a { color: inherit; text-underline-offset: .15em; }
-.status { display: inline-block; border: 2px solid; border-radius: .4rem; padding: 0 .5rem;
-  font-weight: 600; white-space: nowrap; }
-.internal-error, .bad-input { color: var(--bad); border-style: dashed; }
-.findings { color: var(--bad); } .cannot-tell { color: var(--warn); border-style: dotted; }
-.ok { color: var(--good); }
-table { width: 100%; }
-td.run, td.told { overflow-wrap: anywhere; }
-section { display: grid; grid-template-columns: minmax(0, 2fr) minmax(0, 3fr); gap: 0 1.5rem;
-  border-top: 1px solid var(--line); padding: 1rem 0; break-inside: avoid; }
-section h2 { margin: 0 0 .4rem; overflow-wrap: anywhere; }
-section p { margin: .2rem 0; overflow-wrap: anywhere; }
-section img { background: #fff; border-radius: .2rem; }
-@media (max-width: 60rem) { section { display: block; } }
-"""
 
 
 def draw(analysis: Analysis, verdict: Verdict, beside: Comparison | None, *, folder: Path) -> Path:
@@ -205,80 +197,70 @@ def write_index(verdicts: Sequence[Verdict], folder: Path) -> None:
 
 def index_page(verdicts: Sequence[Verdict]) -> str:
     """The page as text; pictures lie in its folder."""
-    html, body = document(f"Noise: {summary(verdicts)}", STYLE + ROWS, INDEX_POLICY)
-    add_text(body, "h1", "Noise of the joints")
-    add_text(body, "p", summary(verdicts), "verdict")
+    html, body = document(f"Noise: {summary(verdicts)}", INDEX_POLICY)
+    add(body, "h1", "Noise of the joints")
+    add(body, "p", summary(verdicts), "verdict")
     ranked = sorted(verdicts, key=lambda each: each.severity)
     # What is so of all runs that a model could label, if they are several, is said once.
     first, *others = [_facts(each) for each in ranked if each.model] or [[]]
     shared = [fact for fact in first if others and all(fact in other for other in others)]
     for fact in shared:
-        add_text(body, "p", fact, "note")
-    frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
-    head = ET.SubElement(ET.SubElement(frame, "thead"), "tr")
+        add(body, "p", fact, "note")
+    frame = add(add(body, "div", kind="wide"), "table")
+    head, rows = add(add(frame, "thead"), "tr"), add(frame, "tbody")
     for cell in ("status", "run", "findings"):
-        add_text(head, "th", cell)
-    rows = ET.SubElement(frame, "tbody")
+        add(head, "th", cell)
+    add(body, "h2", "Pictures")
     for number, verdict in enumerate(ranked, 1):
-        _add_row(rows, verdict, number)
-    add_text(body, "h2", "Pictures")
-    for number, verdict in enumerate(ranked, 1):
-        _add_run(body, verdict, number, shared)
+        row = add(rows, "tr")
+        _add_status(add(row, "td"), verdict)
+        add(add(row, "td"), "a", str(verdict.path), href=f"#run-{number}")
+        add(row, "td", _in_short(verdict))
+        _add_run(add(body, "section", id=f"run-{number}"), verdict, shared)
     return written(html)
 
 
 def _facts(verdict: Verdict) -> list[str]:
     """By which model and reference a run was judged, and what limits that."""
-    model, message = (f"model {verdict.model}", verdict.message) if verdict.model else ("", "")
-    return list(filter(None, [model, _judged_by(verdict), message, verdict.assumed]))
-
-
-def _judged_by(verdict: Verdict) -> str:
-    """By which reference a run was judged, in a line; empty without one."""
     by = verdict.expectations
     if verdict.beside is not None:
         by = f"{verdict.beside.path}, {verdict.beside.words}"
-    return by and f"reference: {by}"
+    model, message = (f"model {verdict.model}", verdict.message) if verdict.model else ("", "")
+    return list(filter(None, [model, by and f"reference: {by}", message, verdict.assumed]))
 
 
-def _add_row(rows: ET.Element, verdict: Verdict, number: int) -> None:
-    row = ET.SubElement(rows, "tr")
-    _add_status(ET.SubElement(row, "td"), verdict)
-    name = ET.SubElement(row, "td", {"class": "run"})
-    add_text(name, "a", str(verdict.path), href=f"#run-{number}")
+def _in_short(verdict: Verdict) -> str:
+    """The classes that were found, or why nothing could be."""
+    if verdict.status not in (Status.OK, Status.FINDINGS):
+        return verdict.message
     counts = Counter(event.label for event in verdict.failing)
     told = [f"{label} ({n})" if n > 1 else label for label, n in counts.items()]
     told += [f"missing: {each.label}" for each in verdict.missing]
     told += [f"{len(verdict.excused)} that do not count"] if verdict.excused else []
-    failed = verdict.status not in (Status.OK, Status.FINDINGS)
-    cell = add_text(row, "td", verdict.message if failed else ", ".join(told), "told")
-    if verdict.beside is not None:
-        add_text(cell, "p", _judged_by(verdict), "note")
+    return ", ".join(told)
 
 
-def _add_run(body: ET.Element, verdict: Verdict, number: int, shared: Sequence[str]) -> None:
-    part = ET.SubElement(body, "section", id=f"run-{number}")
-    told = ET.SubElement(part, "div")
-    add_text(told, "h2", str(verdict.path))
-    _add_status(ET.SubElement(told, "p"), verdict)
+def _add_run(part: ET.Element, verdict: Verdict, shared: Sequence[str]) -> None:
+    told = add(part, "div")
+    add(told, "h2", str(verdict.path))
+    _add_status(add(told, "p"), verdict)
     for line in failing(verdict):
-        add_text(told, "p", line)
+        add(told, "p", line)
     message = "" if verdict.model else verdict.message
     own = [fact for fact in _facts(verdict) if fact not in shared]
     length = f"{verdict.duration:.2f} s" if verdict.duration else ""
     for remark in filter(None, [*excused(verdict), message, *own, length]):
-        add_text(told, "p", remark, "note")
+        add(told, "p", remark, "note")
     if verdict.picture is not None:
         source = f"{PICTURES}/{verdict.picture.name}"
-        link = ET.SubElement(ET.SubElement(part, "div"), "a", href=source)
-        described = f"{verdict.path} over time"
-        ET.SubElement(link, "img", src=source, alt=described, loading="lazy")
+        link = add(add(part, "div"), "a", href=source)
+        add(link, "img", src=source, alt=f"{verdict.path} over time", loading="lazy")
 
 
 def _add_status(parent: ET.Element, verdict: Verdict) -> None:
     words = f"{COUNTED[verdict.status]}{' (ignored)' if verdict.ignored else ''}"
     kind = Status.CANNOT_TELL if verdict.ignored else verdict.status
-    add_text(parent, "span", words, f"status {kind}")
+    add(parent, "span", words, f"status {kind}")
 
 
 # --- the page of many commits
@@ -287,11 +269,6 @@ SHORTEST = 4  # commits from which a stretch has a level of its own
 # Smallest change that the page names: of a level in [dB], and of findings per run.
 LEAST_DB, LEAST_FINDINGS = 2.0, 0.5
 WIDTH, HEIGHT = 900, 120
-HISTORY_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
-LOOK = """
-svg { width: 100%; height: auto; border: 1px solid #d0d7de; } circle { fill: #0072b2; }
-line { stroke: #d55e00; stroke-width: 2; stroke-dasharray: 6 4; } .step { color: #d55e00; }
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -425,18 +402,18 @@ def _error(value: Array) -> float:
 
 def history_page(history: History) -> str:
     """Write series as one HTML page, those with most change first; no joints without a change."""
-    html, body = document("Noise over commits", STYLE + LOOK, HISTORY_POLICY)
-    add_text(body, "h1", "Noise over commits")
-    add_text(body, "p", next(history.lines()), "verdict")
+    html, body = document("Noise over commits", POLICY)
+    add(body, "h1", "Noise over commits")
+    add(body, "p", next(history.lines()), "verdict")
     for problem in (*history.problems, *history.notes):
-        add_text(body, "p", problem, "note")
+        add(body, "p", problem, "note")
     for series in history.series:
         found = history.told(series)
         if series.joint and not found:
             continue
-        add_text(body, "h2", series.name)
+        add(body, "h2", series.name)
         for step in found:
-            add_text(body, "p", step, "step")
+            add(body, "p", step, "step")
         _draw(body, history, series)
     return written(html)
 
@@ -447,12 +424,12 @@ def _draw(body: ET.Element, history: History, series: Series) -> None:
     low, high = min(0.0, float(np.nanmin(value))), max(float(np.nanmax(value)), 1.0)
     x = (np.arange(len(value)) + 0.5) * WIDTH / len(value)
     y = HEIGHT - 10 - (value - low) / (high - low) * (HEIGHT - 20)
-    drawn = ET.SubElement(body, "svg", viewBox=f"0 0 {WIDTH} {HEIGHT}", role="img")
+    drawn = add(body, "svg", viewBox=f"0 0 {WIDTH} {HEIGHT}", role="img")
     for commit, _ in changes(series):
         at = f"{x[commit] - WIDTH / len(value) / 2:.1f}"
-        ET.SubElement(drawn, "line", x1=at, x2=at, y1="0", y2=str(HEIGHT))
+        add(drawn, "line", x1=at, x2=at, y1="0", y2=str(HEIGHT))
     for place in np.flatnonzero(~np.isnan(value)):
-        point = ET.SubElement(drawn, "circle", cx=f"{x[place]:.1f}", cy=f"{y[place]:.1f}", r="3")
-        add_text(point, "title", f"{history.commits[place]}: {value[place]:.1f} {series.unit}")
+        point = add(drawn, "circle", cx=f"{x[place]:.1f}", cy=f"{y[place]:.1f}", r="3")
+        add(point, "title", f"{history.commits[place]}: {value[place]:.1f} {series.unit}")
     unit = "dB over the reference" if series.unit == "dB" else "findings per run"
-    add_text(body, "p", f"{unit}, {low:.1f} to {high:.1f}", "note")
+    add(body, "p", f"{unit}, {low:.1f} to {high:.1f}", "note")
