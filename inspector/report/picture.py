@@ -1,16 +1,17 @@
 """A run over time as a picture on paper, as a recording shows it."""
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, chosen, gaps, worst_joint, worst_signal
 from inspector.errors import InspectorError
-from inspector.levels import Scale, Spectrogram, extremes, spectrogram
+from inspector.levels import Scale, extremes, spectrogram
 from inspector.reference.judging import Comparison
 from inspector.report import classes_of, spoken
 from noisemodel.noise import decibel
@@ -19,18 +20,19 @@ from noisemodel.types import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
-    from matplotlib.figure import Figure
 
 WIDTH, DPI = 9.6, 120
 INK, LINE = "#24292f", "#0072b2"
 POINTS = 4000
 ORDERS = 3  # most orders that are written
 ROW = 0.24  # height of a class, a joint or a link, in [inch]
-# Between panels, above one with a title, below and at the right of all, in [inch].
-GAP, TITLE, BELOW, RIGHT = 0.14, 0.22, 0.55, 0.95
+# Above a panel, for each more line of its title, below and at the right of all, in [inch].
+GAP, TITLE, BELOW, RIGHT = 0.32, 0.22, 0.55, 0.95
 # Width of a letter and least width of labels, in [inch], and letters of a name that are shown.
 LETTER, LABELS, LONGEST = 0.085, 1.2, 32
 SHADE = 0.35  # opacity of a finding behind a curve
+# Height in [inch] of a panel over time, and what draws it.
+Panel: TypeAlias = "tuple[float, Callable[[Axes], None]]"
 MOST_OVER_DB = 12.0  # largest level over the reference that has a colour of its own
 
 
@@ -42,98 +44,77 @@ def require(what: str = "a picture") -> None:
 
 def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
     """Draw a run; how it compares with a reference takes the place of the probability."""
-    run, links = analysis.run, analysis.links
-    names = classes_of(analysis)
-    strips = {"joints": (levels.JOINTS, _strip(analysis, *analysis.joint_levels, run.joint_names))}
-    if links is not None:
-        strip = _strip(analysis, *levels.link_levels(links), links.links)
-        strips["links"] = levels.LINKS, strip
+    run, links, names = analysis.run, analysis.links, classes_of(analysis)
     beside = None if beside is None or beside.empty else beside
-    over = [] if beside is None else beside.loudest(SHOWN)
-    alarmed = analysis.labels is not None and analysis.alarm is not None and beside is None
     told = _told(analysis)
-    panels = {
-        "classes": (ROW * len(names), TITLE * len(told)),
-        "noise": (1.2, 0.0),
-        "level": (1.1, 0.0),
-        "probability": (0.8 * alarmed, 0.0),
-        "over": (ROW * len(over), TITLE),
-        "spectrogram": (2.0, 0.0),
-        **{name: (ROW * len(rows), TITLE) for name, (_, (*_, rows)) in strips.items()},
-    }
-    figure, axes = _panels(
-        panels, (*names, *(n for _, (*_, rows) in strips.values() for n in rows))
-    )
-    if "classes" in axes:
-        _classes(axes["classes"], analysis, names, told)
-    _noise(axes["noise"], analysis)
-    _level(axes["level"], analysis, beside)
-    if alarmed:
-        _probability(axes["probability"], analysis)
+    panels: list[Panel] = [
+        (ROW * len(names), lambda axes: _classes(axes, analysis, names, told)),
+        (1.2, lambda axes: _noise(axes, analysis)),
+        (1.1, lambda axes: _level(axes, analysis, beside)),
+    ]
     if beside is not None:
-        _over(axes["over"], beside)
-    worst = worst_joint(analysis)
-    fast = worst_signal(analysis, worst)
-    spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
-    scale = levels.SPECTRUM.following(spectrum.decibel)
-    title = f"{'noise' if worst is None else _short(run.joint_names[worst])}\n[Hz]"
-    _spectrum(axes["spectrogram"], spectrum, scale, title)
-    for name, (own, (time, level, rows)) in strips.items():
-        if name not in axes:
-            continue
-        scale = own.following(level)
-        _heat(axes[name], time, range(len(rows)), np.maximum(level, scale.low), scale)
-        _rows(axes[name], rows, f"{name} above 10 Hz")
-    for name, panel in axes.items():
-        _gaps(panel, analysis, named=name == "noise")
-    axes["noise"].set_xlim(run.time[0], run.time[-1])
-    return _png(figure)
+        panels.append((ROW * len(beside.loudest(SHOWN)), partial(_over, beside=beside)))
+    elif analysis.labels is not None and analysis.alarm is not None:
+        panels.append((0.8, lambda axes: _probability(axes, analysis)))
+    panels.append((2.0, lambda axes: _spectrum(axes, analysis)))
+    labels = list(names)
+    strips = [("joints", levels.JOINTS, *analysis.joint_levels, run.joint_names)]
+    if links is not None:
+        strips.append(("links", levels.LINKS, *levels.link_levels(links), links.links))
+    for what, scale, time, level, every in strips:
+        which = chosen(analysis, time, level)  # those that vibrate most
+        rows, level = [every[index] for index in which], level[:, which].T
+        shown = partial(_strip, time=time, level=level, rows=rows, what=what, scale=scale)
+        panels.append((ROW * len(rows), shown))
+        labels += rows
+    return _drawn(panels, labels, (run.time[0], run.time[-1]), gaps(run), lines=len(told))
 
 
 def over_reference(beside: Comparison, title: str) -> bytes:
     """Draw how much louder a run is than its reference, by joint and time."""
+
+    def level(axes: "Axes") -> None:
+        _band(axes, beside)
+        axes.set_title(title, fontsize=9, loc="left", parse_math=False)
+
     joints = [beside.joints[place] for place in beside.loudest(SHOWN)]
-    panels = {"level": (1.1, TITLE), "over": (ROW * len(joints), TITLE)}
-    figure, axes = _panels(panels, joints)
-    _band(axes["level"], beside)
-    axes["level"].set_title(title, fontsize=9, loc="left", parse_math=False)
-    _over(axes["over"], beside)
-    axes["level"].set_xlim(beside.time[0], beside.time[-1])
-    return _png(figure)
+    panels: list[Panel] = [(1.1, level), (ROW * len(joints), partial(_over, beside=beside))]
+    return _drawn(panels, joints, (beside.time[0], beside.time[-1]))
 
 
-def _panels(
-    heights: Mapping[str, tuple[float, float]], names: Sequence[str]
-) -> "tuple[Figure, dict[str, Axes]]":
-    """A figure with panels over time below each other, those that have a height.
+def _drawn(
+    panels: Sequence[Panel],
+    labels: Sequence[str],
+    span: tuple[float, float],
+    missing: Sequence[tuple[float, float]] = (),
+    lines: int = 1,
+) -> bytes:
+    """Draw panels over time below each other, those that have a height, as a PNG file.
 
     Args:
-        heights: Of each panel and of its title, in [inch].
-        names: What stands at the left of rows.
+        labels: What stands at the left of rows.
+        missing: Gaps of the run, which are hatched in each panel.
+        lines: Of the title of the first panel.
     """
     from matplotlib.figure import Figure
 
     # Placing panels by hand takes half the time of matplotlib's layout.
-    longest = max((len(_short(name)) for name in names), default=0)
-    left = max(LABELS, LETTER * longest + 0.15)
-    shown = {name: each for name, each in heights.items() if each[0]}
-    height = sum(sum(each) + GAP for each in shown.values()) + BELOW
+    left = max(LABELS, LETTER * max((len(_short(name)) for name in labels), default=0) + 0.15)
+    heights, draw = zip(*(each for each in panels if each[0]), strict=True)
+    above, count, total = TITLE * (lines - 1) + GAP, len(heights), sum(heights)
+    height = above + total + GAP * (count - 1) + BELOW
     figure = Figure(figsize=(WIDTH, height), dpi=DPI)
-    axes: dict[str, Axes] = {}
-    first, bottom = None, height
-    for name, (own, above) in shown.items():
-        bottom -= own + above + GAP
-        place = (left / WIDTH, bottom / height, (WIDTH - left - RIGHT) / WIDTH, own / height)
-        axes[name] = figure.add_axes(place, sharex=first)
-        axes[name].tick_params(labelbottom=False)
-        first = first or axes[name]
-    last = axes[name]
-    last.tick_params(labelbottom=True)
-    last.set_xlabel("time [s]")
-    return figure, axes
-
-
-def _png(figure: "Figure") -> bytes:
+    place = {"left": left / WIDTH, "right": 1.0 - RIGHT / WIDTH, "bottom": BELOW / height}
+    place |= {"top": 1.0 - above / height, "hspace": GAP * count / total}
+    every = figure.subplots(
+        count, sharex=True, squeeze=False, height_ratios=heights, gridspec_kw=place
+    )[:, 0]
+    for axes, one in zip(every, draw, strict=True):
+        one(axes)
+        for start, stop in missing:
+            axes.axvspan(start, stop, facecolor="white", edgecolor=INK, linewidth=0.4, hatch="xxxx")
+    every[0].set_xlim(*span)
+    every[-1].set_xlabel("time [s]")
     file = io.BytesIO()
     figure.savefig(file, format="png", metadata={"Software": None})
     return file.getvalue()
@@ -145,19 +126,23 @@ def _short(name: str) -> str:
     return name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…"
 
 
-def _shade(color: colors.Color) -> tuple[float, float, float]:
-    red, green, blue = (channel / 255 for channel in color)
-    return red, green, blue
+def _shades(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:
+    """Colours of classes, as matplotlib takes them."""
+    found = colors.of_classes(tuple(dict.fromkeys(names)))
+    return {
+        name: (red / 255, green / 255, blue / 255) for name, (red, green, blue) in found.items()
+    }
 
 
 def _classes(axes: "Axes", analysis: Analysis, names: Sequence[str], told: Sequence[str]) -> None:
     """Draw a row for each class: findings filled, annotations hatched."""
-    shades = colors.of_classes(tuple(names))
+    shades = _shades(names)
     for row, name in enumerate(names):
-        shade = _shade(shades[name])
         events = [(e.start, e.stop - e.start) for e in analysis.findings if e.label == name]
         others = [(start, stop - start) for start, stop, label in analysis.lane if label == name]
-        axes.broken_barh(events or others, (row - 0.4, 0.45), facecolor=shade, edgecolor="none")
+        axes.broken_barh(
+            events or others, (row - 0.4, 0.45), facecolor=shades[name], edgecolor="none"
+        )
         blocks = [(b.start, b.stop - b.start) for b in analysis.run.blocks if b.label == name]
         axes.broken_barh(
             blocks, (row + 0.1, 0.3), facecolor="white", edgecolor=INK, linewidth=0.6, hatch="////"
@@ -177,9 +162,9 @@ def _told(analysis: Analysis) -> list[str]:
 
 def _shaded(axes: "Axes", analysis: Analysis) -> None:
     """Shade the findings behind a curve."""
-    shades = colors.of_classes(tuple(dict.fromkeys(event.label for event in analysis.findings)))
+    shades = _shades(event.label for event in analysis.findings)
     for event in analysis.findings:
-        shade = _shade(shades[event.label])
+        shade = shades[event.label]
         axes.axvspan(event.start, event.stop, facecolor=shade, alpha=SHADE, linewidth=0)
     axes.grid(alpha=0.3)
 
@@ -249,23 +234,29 @@ def _probability(axes: "Axes", analysis: Analysis) -> None:
     _shaded(axes, analysis)
 
 
-def _spectrum(axes: "Axes", spectrum: Spectrogram, scale: Scale, title: str) -> None:
-    """Draw a spectrogram on a logarithmic axis; what is not known stays white."""
+def _spectrum(axes: "Axes", analysis: Analysis) -> None:
+    """Draw the spectrogram of the worst joint; what is not known stays white."""
+    run, worst = analysis.run, worst_joint(analysis)
+    fast = worst_signal(analysis, worst)
+    spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
     level = np.where(spectrum.valid, 2 * decibel(spectrum.amplitude), np.nan)
+    scale = levels.SPECTRUM.following(spectrum.decibel)
     _heat(axes, spectrum.time, spectrum.frequency, level, scale)
     if len(spectrum.frequency) > 1:
         axes.set_yscale("log")
         axes.set_ylim(spectrum.frequency[0], spectrum.frequency[-1])
         axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_ylabel(title, parse_math=False)
+    name = "noise" if worst is None else _short(run.joint_names[worst])
+    axes.set_ylabel(f"{name}\n[Hz]", parse_math=False)
 
 
 def _strip(
-    analysis: Analysis, time: Array, level: Array, names: Sequence[str]
-) -> tuple[Array, Array, list[str]]:
-    """Times, levels and names of the rows of those that vibrate most."""
-    which = chosen(analysis, time, level)
-    return time + levels.STEP / 2, level[:, which].T, [names[index] for index in which]
+    axes: "Axes", time: Array, level: Array, rows: Sequence[str], what: str, scale: Scale
+) -> None:
+    """Draw the levels of joints or links, a row each."""
+    scale = scale.following(level)
+    _heat(axes, time + levels.STEP / 2, range(len(rows)), np.maximum(level, scale.low), scale)
+    _rows(axes, rows, f"{what} above 10 Hz")
 
 
 def _rows(axes: "Axes", names: Sequence[str], title: str) -> None:
@@ -290,12 +281,3 @@ def _bar(axes: "Axes", image: "QuadMesh", label: str) -> None:
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.colorbar(image, cax=axes.inset_axes((1.01, 0.0, 0.015, 1.0)), label=label)
-
-
-def _gaps(axes: "Axes", analysis: Analysis, *, named: bool) -> None:
-    """Hatch the gaps of a run, and name the first."""
-    for place, (start, stop) in enumerate(gaps(analysis.run)):
-        axes.axvspan(start, stop, facecolor="white", edgecolor=INK, linewidth=0.4, hatch="xxxx")
-        if named and place == 0:
-            above, middle = axes.get_xaxis_transform(), (start + stop) / 2
-            axes.text(middle, 1.0, "gap", transform=above, fontsize=8, ha="center", va="bottom")
