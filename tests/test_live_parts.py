@@ -196,7 +196,7 @@ def test_silence_and_gaps_are_dark():
 def test_a_robot_is_in_the_picture_with_room_to_move(robot):
     names = nm.Robot.load(robot).joint_names[:7]
     drawn = LiveRobot(Messages(rr.RecordingStream("test")), robot, names, moves=False)
-    camera = drawn.camera(np.zeros(7), None)
+    camera = drawn.camera({"position": np.zeros((1, 7))})
     right, up, ahead = sight()
     most, poses = 0.0, drawn._drawn.poses(1, {}, None)
     for points in scene.reached(drawn._drawn, poses):

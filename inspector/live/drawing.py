@@ -9,7 +9,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from threading import Event as Signal
 from threading import Thread
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 import rerun as rr
@@ -189,6 +189,9 @@ SEND_INTERVAL = 0.1
 FILE_INTERVAL = 10.0
 
 
+Columns: TypeAlias = Callable[[Any], Iterable[Any]]
+
+
 class Messages:
     """Holds rows of entities back until a message has enough of them."""
 
@@ -196,22 +199,20 @@ class Messages:
         self.recording, self._watched = recording, watched
         self._interval = SEND_INTERVAL if watched else FILE_INTERVAL
         self._held = 0.0  # time that waits, in [s]
-        self._makers: dict[str, Callable[[Any], Iterable[Any]]] = {}
-        self._waiting: dict[str, list[tuple[NDArray[np.int64], Any]]] = {}
+        self._waiting: dict[str, tuple[Columns, list[tuple[NDArray[np.int64], Any]]]] = {}
 
     def add(
         self,
         path: str,
         time: NDArray[np.int64],
         values: Any,
-        columns: Callable[[Any], Iterable[Any]] = scalars,
+        columns: Columns = scalars,
         *,
         urgent: bool = False,
     ) -> None:
         """Let rows wait, at times in [ns]; `columns` makes rerun's columns of all that waited."""
         if len(time):
-            self._makers[path] = columns
-            self._waiting.setdefault(path, []).append((time, values))
+            self._waiting.setdefault(path, (columns, []))[1].append((time, values))
         if urgent and self._watched:
             self._send(path)
 
@@ -228,11 +229,11 @@ class Messages:
         self._held = 0.0
 
     def _send(self, path: str) -> None:
-        if pieces := self._waiting.pop(path, None):
+        if path in self._waiting:
+            columns, pieces = self._waiting.pop(path)
             time, values = (np.concatenate(each) for each in zip(*pieces, strict=True))
             index = rr.TimeColumn(TIMELINE, duration=time.astype("timedelta64[ns]"))
-            columns = self._makers[path](values)
-            self.recording.send_columns(path, indexes=[index], columns=columns)
+            self.recording.send_columns(path, indexes=[index], columns=columns(values))
 
 
 def nanoseconds(time: Array) -> NDArray[np.int64]:
@@ -248,11 +249,11 @@ class SpectrogramStream:
         self._hop = max(1, self._length // 4)
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
         self.edges = np.geomspace(self._frequency[0], self._frequency[-1], panels.BANDS + 1)
-        self._hold(0)
+        self._samples, self._valid = np.zeros((0, 1)), np.zeros(0, dtype=bool)
 
-    def _hold(self, samples: int) -> None:
-        """Begin anew, after so many samples that are not valid."""
-        self._samples, self._valid = np.zeros((samples, 1)), np.zeros(samples, dtype=bool)
+    def skip(self) -> None:
+        """Begin anew after a gap, with a window that touches it and is dark."""
+        self._samples, self._valid = np.zeros((self._hop, 1)), np.zeros(self._hop, dtype=bool)
 
     def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
         """Take samples; centres of windows in [s], and levels, shape (columns, bands)."""
@@ -278,10 +279,6 @@ class SpectrogramStream:
         since = len(samples) - hop * np.arange(count)  # samples from starts to the end
         return np.asarray(end - (since - length / 2) / self._rate), level
 
-    def skip(self) -> None:
-        """Begin anew after a gap, with a window that touches it and is dark."""
-        self._hold(self._hop)
-
 
 ROOM = 1.6  # what the camera sees, by the size of the robot as it stands at first
 # How far the floor of a robot that moves its base reaches from the first pose, in [m].
@@ -299,29 +296,30 @@ class LiveRobot:
         recording = messages.recording
         self._drawn = scene.log_robot(recording, robot, joint_names, moves=moves, color=ROBOT)
 
-    def _poses(self, position: Array, base: Array | None) -> Array | None:
-        """Poses of all links; None if one is not known."""
-        if not all(np.isfinite(each).all() for each in (position, base) if each is not None):
+    def _poses(self, signals: Mapping[str, Array], row: int) -> Array | None:
+        """Poses of all links in a sample; None if one is not known."""
+        position, base = signals["position"][row], signals.get("base_pose")
+        if not np.isfinite(position).all():
             return None
-        if base is not None and not base[3:].any():
+        if base is not None and not (np.isfinite(base[row]).all() and base[row, 3:].any()):
             return None
         columns = dict(zip(self._names, position[:, None], strict=True))
-        return self._drawn.poses(1, columns, None if base is None else base[None])
+        return self._drawn.poses(1, columns, None if base is None else base[[row]])
 
-    def camera(self, position: Array, base: Array | None) -> Camera:
+    def camera(self, signals: Mapping[str, Array]) -> Camera:
         """Place the camera by the first pose, before it is known what will come."""
-        poses = self._poses(position, base)
+        poses = self._poses(signals, 0)
         poses = self._drawn.poses(1, {}, None) if poses is None else poses
         parts = scene.reached(self._drawn, poses)
         seen = scene.standing(scene.fitted(parts, room=ROOM), self._drawn)
-        if base is not None:
+        if self._drawn.moves:
             around = poses[0, -1, :2] + AROUND
             scene.log_floor(self._messages.recording, self._drawn, seen, around)
         return seen
 
-    def show(self, time: float, position: Array, base: Array | None) -> None:
-        """Move the robot, if its pose is known, at a time in [s]."""
-        if (poses := self._poses(position, base)) is not None:
+    def show(self, time: float, signals: Mapping[str, Array]) -> None:
+        """Move the robot to the last pose, if it is known, at a time in [s]."""
+        if (poses := self._poses(signals, -1)) is not None:
             index = nanoseconds(np.full(poses.shape[1], time))
             self._messages.add("/robot/motion", index, poses[0], self._drawn.columns, urgent=True)
 
@@ -402,6 +400,7 @@ class Drawing:
             return
         own = [self._colours[name] for name in classes]
         style_lines(recording, SCORES, names=classes, colours=own)
+        self._titles["Scores"] = [SCORES]
         shades = [self._colours[name] for name in self._rows]
         names = [spoken(name) for name in self._rows]
         views.style_bands(recording, "/class/found", names, shades, views.COPIES)
@@ -414,35 +413,30 @@ class Drawing:
             return
         self._begun = True
         if self._robot is not None:
-            pose = signals.get("base_pose")
-            first = None if pose is None else pose[0]
-            self._camera = self._robot.camera(signals["position"][0], first)
+            self._camera = self._robot.camera(signals)
         self.findings(time, ())
         self._recording.send_blueprint(self._layout())
 
-    def piece(self, time: Array, valid: Mask, velocity: Array) -> None:
+    def piece(self, time: Array, valid: Mask, velocity: Array, *, after_gap: bool) -> None:
         """Draw the spectrogram of a stretch without missing samples."""
+        if after_gap:
+            self._spectrogram.skip()
         velocity = np.where(valid[:, None], velocity, 0.0)
         end = float(time[-1]) + 1.0 / self._rate
         centres, level = self._spectrogram.push(velocity, valid, end)
         if self._sink.open:
             self._messages.add(BANDS_PATH, nanoseconds(centres), level, _heat_map)
 
-    def skip(self) -> None:
-        """Begin anew after a gap."""
-        self._spectrogram.skip()
-
     def batch(self, time: Array, motion: Array, valid: Mask, signals: Mapping[str, Array]) -> None:
         """Draw the noise, the joints' signals and the robot of the next stretch, where valid."""
-        now, seconds = float(time[-1]), len(valid) / self._rate
+        seconds = len(valid) / self._rate
         noise = nm.simplified(motion)[:, None]
         self._lines(time[valid], noise[valid], {NOISE: slice(None)}, seconds * NOISE_POINTS)
         for kind, plots in self._plots.items():
             known = valid & np.isfinite(signals[kind]).all(axis=1)
             self._lines(time[known], signals[kind][known], plots, seconds * JOINT_POINTS)
         if self._robot is not None:
-            pose = signals.get("base_pose")
-            self._robot.show(now, signals["position"][-1], None if pose is None else pose[-1])
+            self._robot.show(float(time[-1]), signals)
         self._messages.passed(seconds)
 
     def _lines(self, time: Array, values: Array, plots: Mapping[str, slice], points: float) -> None:
@@ -495,42 +489,32 @@ class Drawing:
     def _layout(self) -> Blueprint:
         """Lay the recording out; every plot shows the last ten seconds."""
         over_time = [
-            views.timed(NOISE_PANEL, title="Noise", paths=BELOW, between=None, last=SHOWN),
-            views.timed(SPECTROGRAM_PANEL, title="Spectrum", paths=BELOW, last=SHOWN),
+            views.timed(NOISE_PANEL, title="Noise", between=None, last=SHOWN),
+            views.timed(SPECTROGRAM_PANEL, title="Spectrum", last=SHOWN),
         ]
         left = [(views.events("Events", "/events"), 2.4)]
-        signals = {title: ("/joints", paths) for title, paths in self._titles.items()}
         if self._classes is not None:  # otherwise there is no verdict
-            classes = views.timed(self._classes, title="Classes", paths=BELOW, last=SHOWN)
+            classes = views.timed(self._classes, title="Classes", last=SHOWN)
             over_time.insert(0, classes)
             left.insert(0, (views.drawing("/verdict"), 0.32))
-            signals["Scores"] = (SCORES, list(BELOW))
         if self._camera is not None:
             robot = views.robot("Robot", "/robot", self._camera)
             left.insert(len(left) - 1, (robot, 4.4))
         plots = [
             views.timed(
-                SIGNALS_PANEL, origin, title=title, name=title, between=None, paths=paths,
+                SIGNALS_PANEL, "/joints", title=title, name=title, between=None, paths=paths,
                 legend=True, last=SHOWN,
             )
-            for title, (origin, paths) in signals.items()
+            for title, paths in self._titles.items()
         ]  # fmt: skip
         over_time.append((views.tabs(*(part for part, _ in plots)), SIGNALS_PANEL.height))
         whole = views.beside((views.above(*left), 36.0), (views.above(*over_time), 64.0))
         return views.blueprint(whole, following=True)
 
 
-BELOW = ("$origin/**",)
-
-
 def _heat_map(level: Array) -> list[Any]:
     """Columns of lines that are bands, in colours of their levels, shape (columns, bands)."""
-    count, width = level.shape
-    shades = colors.heat(level).reshape(-1, 4)
-    return [
-        *scalars(np.tile(views.middles(width)[::-1], (count, 1))),
-        *rr.SeriesLines.columns(colors=shades).partition([width] * count),
-    ]
+    return views.shaded(np.array(views.middles(level.shape[1])[::-1]), colors.heat(level))
 
 
 def _found(shown: Mask) -> Iterable[Any]:

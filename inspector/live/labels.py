@@ -40,6 +40,7 @@ class Labeller:
         # Without a model there are no classes; duration of frames, from one to the next, in [s].
         self.classes, self.length, self.hop = tuple[str, ...](), 0.0, 0.0
         self._stream: nc.Stream | None = None
+        self._windows: tuple[()] | tuple[nc.Lasting, nc.Bursts] = ()  # beside it
         self._samples = 0
         self._shift: float | None = None  # from the first sample to the clock of the samples, [s]
         self._base, self._joints, desired = (widths.get(name, 0) for name in NOISY)
@@ -60,7 +61,7 @@ class Labeller:
         self.model, self.classes, self.length = model, chosen.classes, chosen.profile.duration
         self.hop, self._names = chosen.profile.hop / rate, chosen.profile.signals
         self._stream = nc.Stream(chosen, rate=rate, joints=self._joints)
-        self._lasting, self._bursts = nc.Lasting(rate), nc.Bursts(rate)
+        self._windows = nc.Lasting(rate), nc.Bursts(rate)
 
     def push(self, motion: Array, valid: Mask, end: float) -> Labels | None:
         """Take a motion, shape (samples, columns), that ends at a time; labels now complete."""
@@ -69,8 +70,8 @@ class Labeller:
             return None
         names = dict.fromkeys((*self._followed, *self._names))
         signals = {n: noise_signal(n, motion, self._base, self._joints) for n in names}
-        self._lasting.push(signals, valid)
-        self._bursts.push(signals, valid)
+        for each in self._windows:
+            each.push(signals, valid)
         labels = self._stream.push(signals, valid)
         if not len(labels):
             return None
@@ -81,26 +82,24 @@ class Labeller:
     @property
     def lasting(self) -> tuple[Event, ...]:
         """What lasts, and bursts, so far."""
-        shift = self._shift or 0.0
-        found = () if self._stream is None else (*self._lasting.events, *self._bursts.events)
+        shift, found = self._shift or 0.0, [e for each in self._windows for e in each.events]
         return tuple(replace(e, start=e.start + shift, stop=e.stop + shift) for e in found)
 
     @property
     def decided(self) -> float:
         """Time before which nothing begins any more that lasts."""
-        return inf if self._stream is None else self._lasting.decided + (self._shift or 0.0)
+        return self._windows[0].decided + (self._shift or 0.0) if self._windows else inf
 
     def finish(self) -> None:
         """End the signal."""
-        if self._stream is not None:
-            self._lasting.finish()
-            self._bursts.finish()
+        for each in self._windows:
+            each.finish()
 
     def skip(self, samples: int) -> None:
         """Pass over samples that were lost."""
         self._samples += samples
         if self._stream is not None:
-            for each in (self._stream, self._lasting, self._bursts):
+            for each in (self._stream, *self._windows):
                 each.skip(samples)
 
 
@@ -159,13 +158,10 @@ class Findings:
 class News:
     """Tells of each event twice: when it is there, and when it is over.
 
-    The frames at the edges of a failure often look like another one: an event is told of when there
-    are frames that begin `SETTLED` hops after it. What it is called may still change: `unknown`
-    frames take the class of a failure that follows. Such an event is told of again under its new
-    name, and only that ends.
-
-    Args:
-        wait: Time from the start of an event to the stop of the frames that it waits for, in [s].
+    The frames at the edges of a failure often look like another one: an event is told of when
+    frames stop a time ``wait`` after its start, in [s]. What it is called may still change:
+    `unknown` frames take the class of a failure that follows. Such an event is told of again under
+    its new name, and only that ends.
     """
 
     def __init__(self, tell: Callable[[Event, bool], None], wait: float = 0.0) -> None:
@@ -174,18 +170,15 @@ class News:
         self._ended: dict[str, float] = {}
 
     def update(self, events: Sequence[Event], decided: float, now: float = inf) -> None:
-        """Tell of what is new.
+        """Tell of what is new when the latest frame stops.
 
-        Args:
-            now: Stop of the latest frame, in [s].
-            decided: Time up to which nothing changes any more, in [s]: an event that stops earlier
-                is over, since what continues it would begin before its end.
+        An event that stops before the time up to which all is ``decided`` is over, since what
+        continues it would begin before its end.
         """
         for event in events:
             begun, over = self._begun.get(event.label, -inf), event.stop < decided
-            if event.stop <= self._ended.get(event.label, -inf):
-                continue
-            if event.start + self._wait > now and not over:
+            early = event.start + self._wait > now and not over
+            if early or event.stop <= self._ended.get(event.label, -inf):
                 continue
             if begun < event.start:  # otherwise it continues one of its class
                 self._tell(event, False)

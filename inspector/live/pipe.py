@@ -191,21 +191,17 @@ class CsvReader:
 
     def _read_lines(self, lines: bytes, first: int, note: Note) -> Array:
         """Read rows one by one, of which some have cells that are empty, padded or no numbers."""
-        rows, width = [], len(self._header)
-        for number, line in enumerate(lines.splitlines(), start=first):
-            if not line.strip():
-                continue
+        width = len(self._header)
+
+        def parse(line: bytes) -> list[float]:
             cells = line.decode(errors="replace").split(self._delimiter)
-            try:
-                if len(cells) != width:
-                    raise ValueError(f"{len(cells)} cells where the header names {width}")
-                row = [nan if cell.strip().lower() in UNKNOWN else float(cell) for cell in cells]
-                rows.append(row)
-            except ValueError as error:
-                note("malformed rows", f"line {number}: {str(error)[:200]}; such rows are left out")
-                if self._time is None:  # without timestamps, the row alone keeps the time
-                    rows.append([nan] * width)
-        return np.array(rows).reshape(-1, width)
+            if len(cells) != width:
+                raise ValueError(f"{len(cells)} cells where the header names {width}")
+            return [nan if cell.strip().lower() in UNKNOWN else float(cell) for cell in cells]
+
+        # Without timestamps, the row alone keeps the time.
+        instead = [[nan] * width] if self._time is None else []
+        return np.array(_parsed(lines, first, parse, note, instead)).reshape(-1, width)
 
 
 class JsonReader:
@@ -216,22 +212,27 @@ class JsonReader:
 
     def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
         """Read whole lines; those that cannot be read are noted."""
-        samples = []
-        for number, line in enumerate(lines.splitlines(), start=first):
-            if not line.strip():
-                continue
-            try:
-                samples.append(_sample(line))
-            except (ValueError, RecursionError) as error:
-                note("malformed rows", f"line {number}: {error}; such rows are left out")
-        for widths, alike in groupby(
-            samples, key=lambda each: {k: len(v) for k, v in each.items()}
-        ):
+        samples = _parsed(lines, first, _sample, note, [])
+        for widths, alike in groupby(samples, lambda each: {k: len(v) for k, v in each.items()}):
             together = list(alike)
             rows = {name: np.array([each[name] for each in together]) for name in widths}
             if "time" in rows:
                 rows["time"] = rows["time"][:, 0]
             yield rows
+
+
+def _parsed(
+    lines: bytes, first: int, parse: Callable[[bytes], Item], note: Note, instead: list[Item]
+) -> list[Item]:
+    """Parse lines that are not blank; those that cannot be read are noted, and replaced."""
+    found: list[Item] = []
+    for number, line in enumerate(lines.splitlines(), start=first):
+        try:
+            found += [parse(line)] if line.strip() else []
+        except (ValueError, RecursionError) as error:
+            note("malformed rows", f"line {number}: {str(error)[:200]}; such rows are left out")
+            found += instead
+    return found
 
 
 def _sample(line: bytes) -> dict[str, list[float]]:
@@ -314,7 +315,7 @@ class Gate:
 
     def end(self, summary: Summary) -> int:
         """Print what became of the stream."""
-        verdict, duration = self._verdict(summary), summary.samples / summary.rate
+        verdict = self._verdict(summary)
         if self._as_json:
             line = {
                 "event": "summary",
@@ -324,7 +325,7 @@ class Gate:
                 "reason": summary.reason if verdict.status is Status.CANNOT_TELL else "",
                 "model": summary.model,
                 "samples": summary.samples,
-                "duration": round(duration, 6),
+                "duration": round(verdict.duration, 6),
                 "frames": dict(summary.labels),
                 "counts": counts([verdict])["findings"],
                 "missing": [str(each) for each in verdict.missing],
@@ -338,13 +339,11 @@ class Gate:
             return EXIT[verdict.status]
         shown = summary.findings if self._reference is None else verdict.failing
         self._tell(str(replace(summary, status=verdict.status, findings=shown)))
-        for event in verdict.events if self._reference is not None else ():
-            if not event.evidence.excused:
-                span = interval(event.start, event.stop)
-                self._tell(f"  {event.label} from {span}: {event.evidence}")
-        for event in verdict.excused:
-            span = interval(event.start, event.stop)
-            self._tell(f"  {event.label} from {span} does not count: {event.became}")
+        compared = () if self._reference is None else verdict.events
+        told = [(each, f": {each.evidence}") for each in compared if not each.evidence.excused]
+        told += [(each, f" does not count: {each.became}") for each in verdict.excused]
+        for event, why in told:
+            self._tell(f"  {event.label} from {interval(event.start, event.stop)}{why}")
         for missing in verdict.missing:
             self._tell(f"  {missing}")
         if verdict.beside is not None:

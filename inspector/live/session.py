@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -57,20 +56,7 @@ class SampleBuffer:
     def __init__(self, size: int, widths: Mapping[str, int], warnings: Warnings) -> None:
         self._size, self._widths, self._warnings = size, widths, warnings
         self._pieces: list[dict[str, Array]] = []
-        self.held = self._waiting = 0
-
-    @property
-    def room(self) -> int:
-        """Samples that are missing from a batch."""
-        return self._size + self._waiting - self.held
-
-    @property
-    def stamps(self) -> Array:
-        """Timestamps of all samples that are held, shape (held,)."""
-        names = ("time", *self._widths)
-        joined = {name: np.concatenate([each[name] for each in self._pieces]) for name in names}
-        self._pieces = [joined]
-        return joined["time"]
+        self.held, self.room = 0, size  # samples here, and those that are missing from a batch
 
     def put(self, rows: Mapping[str, Array], time: Array) -> None:
         """Take samples; missing signals, or of other widths, are unknown."""
@@ -88,16 +74,25 @@ class SampleBuffer:
             known = widths.get(name) == width
             piece[name] = rows[name] if known else np.full((len(time), width), np.nan)
         self._pieces.append(piece)
-        self.held += len(time)
+        self.held, self.room = self.held + len(time), self.room - len(time)
+
+    @property
+    def whole(self) -> dict[str, Array]:
+        """All samples that are held: their timestamps and signals."""
+        first, *others = self._pieces
+        if others:
+            first = {name: np.concatenate([p[name] for p in self._pieces]) for name in first}
+            self._pieces = [first]
+        return first
 
     def take(self, kept: Mask) -> dict[str, Array]:
         """Take out the signals of the samples that are kept; those after them wait."""
-        (whole,) = self._pieces
-        signals = {name: whole[name][: len(kept)][kept] for name in self._widths}
+        whole, count = self.whole, len(kept)
+        signals = {name: whole[name][:count][kept] for name in self._widths}
         for values in signals.values():
             values[~(np.abs(values) < LARGEST)] = np.nan  # the square of others would overflow
-        self._pieces = [{name: values[len(kept) :] for name, values in whole.items()}]
-        self.held = self._waiting = self.held - len(kept)
+        self._pieces = [{name: values[count:] for name, values in whole.items()}]
+        self.held, self.room = self.held - count, self._size
         return signals
 
 
@@ -165,16 +160,11 @@ class Clock:
         self._checked = False
 
     def take(self, stamps: Array, *, ended: bool = False) -> tuple[Mask, Array, Array]:
-        """Decide about samples, those that waited before first.
-
-        Args:
-            stamps: Timestamps, shape (samples,), in [s], or in the unit that the rate tells.
-            ended: Whether none will follow, so that none has to wait.
+        """Decide about samples, those that waited before first; if the stream ended, about all.
 
         Returns:
-            Which samples are kept, shape (decided,), since of those at the end only what follows
-            can decide; how many are missing before each that is kept; and their times, always
-            increasing, in [s].
+            Which of the decided ones are kept; how many are missing before each that is kept; and
+            their times, always increasing, in [s].
         """
         stamps = np.where(np.abs(stamps) < 1e100, stamps, np.nan)  # differences would overflow
         if not self._unit and not self._begin(stamps, ended=ended):
@@ -192,9 +182,8 @@ class Clock:
                 self._last = float(known[place - 1])
             if place < decided:
                 stop, found = self._ahead(known, place)
-                if found == "open" and not ended:
-                    decided = stop
-                stop = decided if found == "open" else stop
+                if found == "open":
+                    stop = decided = decided if ended else stop
                 self._note_dropped(known[place:stop])
                 if found == "jump":
                     self._jump(float(known[stop]))
@@ -488,12 +477,7 @@ class LiveSession:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     def _emit(self, line: str) -> None:
@@ -569,7 +553,7 @@ class LiveSession:
         """Show the samples that a buffer holds, and empty it; few may have to wait for others."""
         if not buffer.held:
             return
-        kept, lost, time = self._clock.take(buffer.stamps, ended=ended)
+        kept, lost, time = self._clock.take(buffer.whole["time"], ended=ended)
         signals = buffer.take(kept)
         self._samples += len(kept)
         if not len(time):
@@ -592,9 +576,9 @@ class LiveSession:
             piece = slice(first, stop)
             if lost[first]:
                 self._labeller.skip(int(lost[first]))
-                self._drawing.skip()
             self._label(time[piece], motion[piece], valid[piece])
-            self._drawing.piece(time[piece], valid[piece], signals["velocity"][piece])
+            velocity, after_gap = signals["velocity"][piece], bool(lost[first])
+            self._drawing.piece(time[piece], valid[piece], velocity, after_gap=after_gap)
         if self._sink.open:
             self._drawing.batch(time, motion, valid, signals)
         if self._watch is not None:

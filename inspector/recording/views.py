@@ -548,13 +548,15 @@ def log_rows(
         recording.send_columns(
             entity,
             indexes=[at(edges[kept])],
-            columns=[
-                *scalars(np.tile(place + apart, (len(shown), 1))),
-                *rr.SeriesLines.columns(colors=shown.repeat(lines, axis=0)).partition(
-                    np.full(len(shown), lines)
-                ),
-            ],
+            columns=shaded(place + apart, shown[:, None].repeat(lines, axis=1)),
         )
+
+
+def shaded(places: Array, rgba: NDArray[np.uint8]) -> list[Any]:
+    """Columns of lines at fixed places that change colour, shape (columns, lines, 4)."""
+    count, width, _ = rgba.shape
+    colours = rr.SeriesLines.columns(colors=rgba.reshape(-1, 4)).partition([width] * count)
+    return [*scalars(np.tile(places, (count, 1))), *colours]
 
 
 def log_levels(
