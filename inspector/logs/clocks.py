@@ -368,12 +368,12 @@ def _estimated(
         for other in (one, "velocity", "position")
         if one in measured and other in desired
     )
-    pair = next((pair for pair in pairs if _move(*pair)), None)
+    found = next(filter(None, (_estimate(*pair) for pair in pairs)), None)
     unknown = "no joint moves in both"
-    if pair is None and not apart:
+    if not found and not apart:
         return 0.0, ""
-    if pair is not None:
-        seconds, correlation, next_best = _estimate(*pair)
+    if found:
+        seconds, correlation, next_best = found
         said = f"offset {seconds:+.4f} s (correlation {correlation:.2f}, next best {next_best:.2f})"
         if correlation >= CORRELATION and next_best <= NEXT_BEST * correlation:
             if abs(seconds) <= LAG:
@@ -386,12 +386,6 @@ def _estimated(
     return 0.0, f"{assumed} {unknown}; {HOW}"
 
 
-def _move(one: Track, other: Track) -> bool:
-    """Whether a joint moves in both tracks."""
-    shared = set(one.joints) & set(other.joints)
-    return any(np.ptp(one.of([j])) > 0 and np.ptp(other.of([j])) > 0 for j in shared)
-
-
 def no_overlap(desired: Stamps, measured: Stamps) -> str:
     """Message that the stamps of two logs do not overlap."""
 
@@ -402,8 +396,11 @@ def no_overlap(desired: Stamps, measured: Stamps) -> str:
     return f"{span(desired)} do not overlap with {span(measured)}"
 
 
-def _estimate(measured: Track, desired: Track) -> tuple[float, float, float]:
-    """Offset of the desired clock, in [s], its correlation, and that of the next best offset."""
+def _estimate(measured: Track, desired: Track) -> tuple[float, float, float] | None:
+    """Offset of the desired clock, in [s], its correlation, and that of the next best offset.
+
+    It is None if no joint moves in both.
+    """
     rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in (measured, desired)))
     joints = [joint for joint in measured.joints if joint in desired.joints]
     speeds = []
@@ -412,8 +409,14 @@ def _estimate(measured: Track, desired: Track) -> tuple[float, float, float]:
         if track.signal.startswith("position"):
             values = np.gradient(np.unwrap(values, axis=0), time, axis=0)
         instants = np.arange(time[0], time[-1], 1 / rate)
-        speeds.append(_at(replace(track, values=values), instants))
-    correlations = _correlation(*_moving(*speeds), int(SHARE * min(map(len, speeds))))
+        columns = [np.interp(instants, time, column) for column in values.T]
+        speeds.append(np.reshape(columns, (len(joints), len(instants))))
+    one, other = speeds
+    scale = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))[:, None]
+    if not scale.any():
+        return None
+    weight = np.sqrt(1 / np.where(scale > 0, scale, np.inf))  # of joints, fast or slow
+    correlations = _correlation(one * weight, other * weight)
     best = int(np.argmax(correlations))
     distance, correlation = np.abs(np.arange(len(correlations)) - best), correlations[best]
     # The peak reaches to where the correlation falls below half of it.
@@ -423,46 +426,25 @@ def _estimate(measured: Track, desired: Track) -> tuple[float, float, float]:
     bend = 2 * correlation - before - after
     top = best + (after - before) / (2 * bend) if bend > 0 else best  # of a parabola
     start = float(measured.stamps.time[0] - desired.stamps.time[0])
-    return start + (float(top) - len(speeds[1]) + 1) / rate, float(correlation), next_best
+    return start + (float(top) - other.shape[1] + 1) / rate, float(correlation), next_best
 
 
-def _at(motion: Track, instants: Array) -> Array:
-    """Linearly interpolated velocities, 0 in gaps and outside, shape (instants, joints)."""
-    found = np.zeros((len(instants), motion.values.shape[1]))
-    for stretch in motion.stamps.clock.stretches:
-        known = motion.stamps.time[stretch]
-        part = slice(*np.searchsorted(instants, [known[0], known[-1]]))
-        for joint, values in enumerate(motion.values[stretch].T):
-            found[part, joint] = np.interp(instants[part], known, values)
-    return found
-
-
-def _moving(one: Array, other: Array) -> tuple[Array, Array]:
-    """Joints that move in both motions, scaled to have equal weight, fast or slow."""
-    scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
-    moving = scale > 0
-    weight = np.sqrt(1 / scale[moving])
-    return one[:, moving] * weight, other[:, moving] * weight
-
-
-def _correlation(one: Array, other: Array, least: int) -> Array:
-    """Normalised correlation at each lag of one behind the other, from 1 - len(other) on.
-
-    It is -1 where fewer samples than ``least`` overlap.
-    """
+def _correlation(one: Array, other: Array) -> Array:
+    """Normalised correlation at each lag of one behind the other, -1 where too little overlaps."""
     from scipy import fft
 
-    length = fft.next_fast_len(len(one) + len(other), real=True)
-    product = fft.rfft(one, length, axis=0) * np.conj(fft.rfft(other, length, axis=0))
-    lags = np.arange(1 - len(other), len(one))
-    crossed = fft.irfft(product.sum(axis=1), length)[lags]
-    start, stop = np.maximum(lags, 0), np.minimum(lags + len(other), len(one))
-    sums = (np.cumsum((each**2).sum(axis=1)) for each in (one, other))
+    count, width = one.shape[1], other.shape[1]
+    length = fft.next_fast_len(count + width, real=True)
+    product = fft.rfft(one, length) * np.conj(fft.rfft(other, length))
+    lags = np.arange(1 - width, count)
+    crossed = fft.irfft(product.sum(axis=0), length)[lags]
+    start, stop = np.maximum(lags, 0), np.minimum(lags + width, count)
+    sums = (np.cumsum((each**2).sum(axis=0)) for each in (one, other))
     of_one, of_other = (np.concatenate(([0.0], each)) for each in sums)
     energy = (of_one[stop] - of_one[start]) * (of_other[stop - lags] - of_other[start - lags])
     tiny = np.finfo(np.float64).tiny
     found = crossed / np.sqrt(np.maximum(energy, max(1e-9 * energy.max(), tiny)))
-    return np.where(stop - start >= least, found, -1.0)
+    return np.where(stop - start >= int(SHARE * min(count, width)), found, -1.0)
 
 
 # A hold: slow signals that were sampled faster
