@@ -48,19 +48,12 @@ PANELS = {
     "Simulate": {"simulate": "Simulate runs with annotated failures."},
     "Help": {"help": "Print the help of a command or a topic: logs."},
 }
-IN = (
-    "commands.inspect",
-    "commands.check",
-    "commands.convert",
-    "commands.train",
-    "commands.simulate",
-    "cli",
-)  # the module of each panel
+IN = ("inspect", "check", "convert", "train", "simulate")  # the module of each panel
 MODULES = {
-    name: f"inspector.{module}"
-    for module, own in zip(IN, PANELS.values(), strict=True)
+    name: f"inspector.commands.{module}"
+    for module, own in zip(IN, PANELS.values(), strict=False)
     for name in own
-}
+} | {"help": "inspector.cli"}
 EXAMPLES = {
     "view": "view run.npz -o run.png",
     "noise": "noise run.npz --csv n.csv",

@@ -45,6 +45,16 @@ def test_a_controllers_lag_is_reported_and_not_corrected(tmp_path):
     assert expected.startswith("desired.csv: offset +0.0200 s (correlation 1.00")
 
 
+def test_a_gap_does_not_move_the_offset(tmp_path):
+    time = np.arange(60 * 250) / 250
+    known = (time < 20) | (time > 32)
+    measured = csv(tmp_path / "measured.csv", time[known], motion(time)[1][known])
+    meant = 5 + np.arange(5000) / 100
+    desired = csv(tmp_path / "desired.csv", meant - 3.21, motion(meant)[1])
+    found = read_log(measured, desired=desired).run.meta["offset"]
+    assert found == {"seconds": pytest.approx(3.21, abs=1e-3)}
+
+
 def test_positions_give_the_offset_where_there_are_no_velocities(tmp_path):
     time = np.arange(6000) / 100
     for name, since, shift in (("measured", time, 0.0), ("desired", time[500:5000], 77.7)):

@@ -410,7 +410,10 @@ def _estimate(measured: Track, desired: Track) -> tuple[float, float, float] | N
             values = np.gradient(np.unwrap(values, axis=0), time, axis=0)
         instants = np.arange(time[0], time[-1], 1 / rate)
         columns = [np.interp(instants, time, column) for column in values.T]
-        speeds.append(np.reshape(columns, (len(joints), len(instants))))
+        speed = np.reshape(columns, (len(joints), len(instants)))
+        for gap in track.stamps.clock.gaps:
+            speed[:, slice(*np.searchsorted(instants, gap))] = 0.0
+        speeds.append(speed)
     one, other = speeds
     scale = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))[:, None]
     if not scale.any():
