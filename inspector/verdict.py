@@ -106,8 +106,8 @@ class Missing:
 
     @property
     def told(self) -> str:
-        """What is said of it beside its scenario and the word."""
-        return str(self) if self.words == "FAIL" else self.reason
+        """What is said of it beside its scenario."""
+        return self.reason if self.scenario else str(self)
 
 
 @dataclass(frozen=True)

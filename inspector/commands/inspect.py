@@ -31,7 +31,7 @@ from inspector.reference.judging import Comparison
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import References, seen
 from inspector.report import html, sentence
-from inspector.report.formats import excused, failing
+from inspector.report.formats import case_of
 from inspector.report.picture import require
 from inspector.text import cell, progress
 from inspector.verdict import EXPECTED, Verdict
@@ -205,7 +205,8 @@ def _one(runs: list[Opened], target: Path, request: Request) -> None:
     if verdict is None:
         lines = [sentence(found, event) for event in found.findings]
     else:
-        lines = [*failing(verdict), *excused(verdict)]
+        case = case_of([verdict])
+        lines = [*case.sentences, *case.notes]
         lines += [f"beside {verdict.beside.path}: {verdict.beside.words}"] if verdict.beside else []
     for line in (*lines, *found.remarks):
         typer.echo(f"  {line}")

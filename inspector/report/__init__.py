@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from inspector.analysis import Analysis
+from inspector.errors import Status
 from inspector.localisation import Localisation, fault_links, has_stages
 from inspector.text import counted
 from inspector.verdict import Finding
@@ -10,6 +11,14 @@ from noiseclassifier import UNKNOWN, Event
 from noiseclassifier.labels import interval
 from noisemodel import Block
 
+# How people read a status.
+WORDS = {
+    Status.INTERNAL_ERROR: "internal error",
+    Status.BAD_INPUT: "bad input",
+    Status.FINDINGS: "FAIL",
+    Status.CANNOT_TELL: "cannot tell",
+    Status.OK: "ok",
+}
 LEAST = 0.05  # joints with a smaller share are left out
 
 

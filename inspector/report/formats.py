@@ -23,7 +23,7 @@ from inspector.errors import EXIT, IGNORED, Status, Unknown
 from inspector.reference import difference as diff
 from inspector.reference.difference import LOUDER, NEW, RESOLVED, Difference
 from inspector.reference.store import REPETITION
-from inspector.report import words
+from inspector.report import WORDS, words
 from inspector.text import counted, program_version
 from inspector.verdict import UNREAD, Beside, Finding, Verdict, counts, exit_status
 from noiseclassifier.labels import interval
@@ -47,14 +47,6 @@ REPEATED = r"\d+% by \d+ repetitions? of "  # what the line on the reference say
 AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
 # Onsets this close in repetitions are one row, in [s]: the hop of frames is 0.1 s or 0.2 s.
 TOGETHER = 0.25
-# How people read a status.
-WORDS = {
-    Status.INTERNAL_ERROR: "internal error",
-    Status.BAD_INPUT: "bad input",
-    Status.FINDINGS: "FAIL",
-    Status.CANNOT_TELL: "cannot tell",
-    Status.OK: "ok",
-}
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}  # how people count them
 
 # What a case is as a test, by its element in JUnit XML.
@@ -104,7 +96,7 @@ class Job:
     counts: Mapping[str, Mapping[str, int]]
     cases: Sequence[Case]
     exit_status: int
-    remarks: tuple[str, ...] = ()
+    remark: str = ""
 
     @property
     def ranked(self) -> list[Case]:
@@ -177,7 +169,7 @@ def github(job: Job) -> str:
     shown = [*bad[: max(ANNOTATIONS // 2, ANNOTATIONS - len(failed))], *failed][:ANNOTATIONS]
     lines = [_annotation("error", case) for case in shown]
     lines += [_annotation("warning", case) for case in skipped[:ANNOTATIONS]]
-    lines += [f"::notice::{_escaped(remark)}" for remark in job.remarks]
+    lines += [f"::notice::{_escaped(job.remark)}"] if job.remark else []
     left = len(bad) + len(failed) - len(shown)
     more = f"; {left} more are not shown here" if left else ""
     if len(job.cases) > 1 or not lines:
@@ -225,7 +217,7 @@ def sarif(job: Job) -> str:
         "toolExecutionNotifications": notes,
     }
     driver = {"name": "noise-inspector", "version": program_version(), "rules": rules}
-    remark = {"remark": job.remarks[0]} if job.remarks else {}
+    remark = {"remark": job.remark} if job.remark else {}
     about = {"counts": job.counts, **remark}
     run = {"tool": {"driver": driver}, "invocations": [invocation], "results": results}
     whole = {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [{**run, "properties": about}]}
@@ -275,8 +267,8 @@ def markdown(job: Job) -> str:
     ranked = job.ranked
     shown = [case for case in ranked if case.outcome or case.status not in QUIET]
     lines, tail = [job.marker, f"### {job.title}: {job.summary}", ""], [""]
-    for remark in job.remarks:
-        tail += [f"{_cell(remark[:1].upper() + remark[1:])}.", ""]
+    if job.remark:
+        tail += [f"{job.remark.capitalize()}.", ""]
     worst = next((case for case in ranked if case.picture is not None), None)
     if worst is not None and shown:
         tail += [f"Picture of {_code(worst.name)}: {_code(worst.picture)}."]
@@ -363,17 +355,6 @@ def _listed(*parts: str) -> str:
     return ", ".join(filter(None, parts)).replace(", (", " (")
 
 
-def failing(verdict: Verdict) -> list[str]:
-    """Sentences on what fails a run."""
-    findings = [told(event, verdict.beside) for event in verdict.failing]
-    return [*findings, *map(str, verdict.missing)]
-
-
-def excused(verdict: Verdict) -> list[str]:
-    """Sentences on findings that do not."""
-    return [told(event, verdict.beside) for event in verdict.excused]
-
-
 def folded(
     found: Iterable[tuple[Path, Finding, Beside | None]], runs: int
 ) -> list[tuple[Finding, Beside | None, str]]:
@@ -401,7 +382,7 @@ def folded(
     return result
 
 
-def groups(verdicts: Iterable[Verdict], *, by_run: bool = False) -> list[tuple[str, list[Verdict]]]:
+def groups(verdicts: Iterable[Verdict], *, by_run: bool = False) -> list[tuple[list[Verdict], str]]:
     """Runs by scenario, the worst first, or in order and each alone; with their names.
 
     A scenario is what runs of one folder name so, or have one name but for a number, and one that
@@ -413,19 +394,19 @@ def groups(verdicts: Iterable[Verdict], *, by_run: bool = False) -> list[tuple[s
         every += [verdict] if verdict.of_run else absent
     if not by_run:
         every.sort(key=lambda each: (each.of_run, each.severity))
-    found: dict[tuple[Path, str], tuple[str, list[Verdict]]] = {}
+    found: dict[tuple[Path | int, str], list[Verdict]] = {}
     for place, verdict in enumerate(every):
         path, repeated = verdict.path, REPETITION.fullmatch(verdict.path.stem)
-        name, key = str(path), (path, f"{place}")
-        if not verdict.of_run:
-            name = verdict.missing[0].scenario
-        elif not by_run and verdict.status not in UNREAD:
-            name = verdict.scenario or str(path.with_name(repeated["name"]) if repeated else path)
-            key = path.parent, f"of {name}"
-        found.setdefault(key, (name, []))[1].append(verdict)
+        if by_run or not verdict.of_run or verdict.status in UNREAD:
+            name = "" if verdict.of_run else verdict.missing[0].scenario
+            key: tuple[Path | int, str] = place, name
+        else:
+            name = str(path.with_name(repeated["name"]) if repeated else path)
+            key = path.parent, verdict.scenario or name
+        found.setdefault(key, []).append(verdict)
     return [
-        (name if len(each) > 1 or not each[0].of_run else str(each[0].path), each)
-        for name, each in found.values()
+        (each, name if len(each) > 1 or not each[0].of_run else str(each[0].path))
+        for (_, name), each in found.items()
     ]
 
 
@@ -450,10 +431,10 @@ def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
     Bad inputs are left out: the command line prints them on stderr.
     """
     read = [each for each in verdicts if each.status not in UNREAD]
-    if len(verdicts) == 1 and read:
+    if len(verdicts) == 1 and read and read[0].of_run:
         lines = _one(read[0])
     else:
-        lines = _rows(_case(*group) for group in groups(read))
+        lines = _rows(case_of(*group) for group in groups(read))
     runs = [each for each in read if each.of_run]
     if verbose:
         lines += [f"run:     {each.path} [{each.model or 'no model'}]" for each in runs]
@@ -473,8 +454,7 @@ def _one(verdict: Verdict) -> list[str]:
     facts = facts if verdict.rate else ""
     by = f"by {verdict.expectations}" if verdict.expectations and verdict.of_run else ""
     head = "   ".join(filter(None, [str(verdict.path), status, facts, by]))
-    found = [row(event, verdict.beside) for event in (*verdict.failing, *verdict.excused)]
-    return [head, *(f"  {line}" for line in [*table(found), *map(str, verdict.missing)])]
+    return [head, *(f"  {line}" for line in table(case_of([verdict]).cells))]
 
 
 def _rows(cases: Iterable[Case]) -> list[str]:
@@ -482,9 +462,11 @@ def _rows(cases: Iterable[Case]) -> list[str]:
     rows = []
     for case in cases:
         left = len(case.cells) - MOST
-        more = [(f"and {left} more (--format json)",)] if left > 0 else []
+        cells = [*case.cells[:MOST], *([(f"and {left} more (--format json)",)] if left > 0 else [])]
+        if case.status == Status.CANNOT_TELL or not cells:
+            cells.append((case.message if case.outcome == SKIPPED else "",))
         head = case.name, case.words
-        for each in [*case.cells[:MOST], *more] or [("",)]:
+        for each in cells:
             rows.append((*head, *each))
             head = "", ""
     return table(rows)
@@ -527,40 +509,31 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
     return json.dumps(whole, indent=2)
 
 
-def _case(name: str, verdicts: Sequence[Verdict]) -> Case:
+def case_of(verdicts: Sequence[Verdict], name: str = "") -> Case:
     """A run as a case, all runs of a scenario, the worst first, or a scenario that has no log."""
-    worst = verdicts[0]
+    worst, number = verdicts[0], len(verdicts)
+    every = [(one.path, each, one.beside) for one in verdicts for each in one.events]
     failing, others = (
-        folded(
-            [
-                (one.path, each, one.beside)
-                for one in verdicts
-                for each in one.events
-                if each.fails is fails
-            ],
-            len(verdicts),
-        )
+        folded([each for each in every if each[1].fails is fails], number)
         for fails in (True, False)
     )
     missing = list(dict.fromkeys(each for one in verdicts for each in one.missing))
     cells = [*(row(*each) for each in (*failing, *others)), *((each.told,) for each in missing)]
-    if len(verdicts) > 1 and not cells:
-        cells = [(counted(len(verdicts), "run"),)]
-    if worst.status is Status.CANNOT_TELL:
-        cells.append((worst.message,))
+    if number > 1 and not cells:
+        cells = [(counted(number, "run"),)]
     kind = "missing" if worst.missing else worst.status.value
     if worst.failing:
         kind = max(worst.failing, key=lambda event: event.score).label
     lacks = worst.missing and not worst.failing  # a scenario may be missing or cut
     return Case(
-        name=name,
+        name=name or str(worst.path),
         path=worst.path,
         status=worst.status,
         words=worst.missing[0].words if lacks else WORDS[worst.status],
         outcome=SKIPPED if worst.ignored else OUTCOMES[worst.status],
         rank=worst.severity,
         kind=kind,
-        sentences=(*(told(*each) for each in failing), *map(str, missing)),
+        sentences=(*(told(*each) for each in failing), *(each.told for each in missing)),
         rules=(
             *((each.label, _rounded(each, "start", "stop")) for each, *_ in failing),
             *((f"missing-{each.kind}", {}) for each in missing),
@@ -580,10 +553,10 @@ def _rounded(of: object, *names: str, digits: int = 6) -> dict[str, float]:
 
 def _job(verdicts: Sequence[Verdict], *, by_run: bool) -> Job:
     """All runs as cases, or all scenarios."""
-    cases = [_case(*each) for each in groups(verdicts, by_run=by_run)]
-    remarks = (IGNORED,) if any(each.unknown is Unknown.IGNORE for each in verdicts) else ()
+    cases = [case_of(*each) for each in groups(verdicts, by_run=by_run)]
+    remark = IGNORED if any(each.unknown is Unknown.IGNORE for each in verdicts) else ""
     number, status = counts(verdicts), exit_status(verdicts)
-    return Job("Noise", MARKER, summary(verdicts), number, cases, status, remarks)
+    return Job("Noise", MARKER, summary(verdicts), number, cases, status, remark)
 
 
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
@@ -723,8 +696,7 @@ def _of_difference(found: Difference) -> Job:
     """All scenarios as cases, and the files that cannot be compared."""
     outcome = ERROR if found.gate.failed else SKIPPED
     cases = [_of_row(found, each) for each in found.rows]
-    for name, each in groups(found.failed, by_run=True):
-        cases.append(replace(_case(name, each), outcome=outcome, seconds=0.0))
+    cases += [replace(case_of([each]), outcome=outcome, seconds=0.0) for each in found.failed]
     title, number = "Noise beside the runs before", _diff_counts(found)
     return Job(title, DIFF_MARKER, _diff_summary(found), number, cases, found.exit_status)
 

@@ -25,7 +25,7 @@ from inspector.export.sound import clip, common_gain, worst_time
 from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
 from inspector.report import annotated, facts, note, sentence, spoken
-from inspector.report.formats import COUNTED, excused, failing, groups, summary
+from inspector.report.formats import COUNTED, case_of, groups, summary
 from inspector.report.picture import picture, require
 from inspector.text import counted, natural
 from inspector.verdict import Verdict, read_results
@@ -98,7 +98,7 @@ def page(
         add(body, "p", remark, "note")
     if verdict is not None:
         _add_list(body, "Missing", [str(each) for each in verdict.missing])
-        _add_list(body, "Does not count", excused(verdict))
+        _add_list(body, "Does not count", case_of([verdict]).notes)
     add(body, "h2", "Over time")
     image = f"data:image/png;base64,{b64encode(picture(analysis, beside)).decode()}"
     described = f"Noise, classes and spectrograms over {analysis.run.duration:.2f} s"
@@ -200,9 +200,10 @@ def index_page(verdicts: Sequence[Verdict]) -> str:
     html, body = document(f"Noise: {summary(verdicts)}", INDEX_POLICY)
     add(body, "h1", "Noise of the joints")
     add(body, "p", summary(verdicts), "verdict")
-    ranked = sorted(verdicts, key=lambda each: each.severity)
+    cases = [(case_of(*each), each[0][0]) for each in groups(verdicts, by_run=True)]
+    ranked = sorted(cases, key=lambda each: each[0].rank)
     # What is so of all runs that a model could label, if they are several, is said once.
-    first, *others = [_facts(each) for each in ranked if each.model] or [[]]
+    first, *others = [_facts(each) for _, each in ranked if each.model] or [[]]
     shared = [fact for fact in first if others and all(fact in other for other in others)]
     for fact in shared:
         add(body, "p", fact, "note")
@@ -211,12 +212,25 @@ def index_page(verdicts: Sequence[Verdict]) -> str:
     for cell in ("status", "run", "findings"):
         add(head, "th", cell)
     add(body, "h2", "Pictures")
-    for number, verdict in enumerate(ranked, 1):
-        row = add(rows, "tr")
+    for number, (case, verdict) in enumerate(ranked, 1):
+        row, part = add(rows, "tr"), add(body, "section", id=f"run-{number}")
         _add_status(add(row, "td"), verdict)
-        add(add(row, "td"), "a", str(verdict.path), href=f"#run-{number}")
+        add(add(row, "td"), "a", case.name, href=f"#run-{number}")
         add(row, "td", _in_short(verdict))
-        _add_run(add(body, "section", id=f"run-{number}"), verdict, shared)
+        told = add(part, "div")
+        add(told, "h2", case.name)
+        _add_status(add(told, "p"), verdict)
+        for line in case.sentences:
+            add(told, "p", line)
+        message = "" if verdict.model else verdict.message
+        own = [fact for fact in _facts(verdict) if fact not in shared]
+        length = f"{verdict.duration:.2f} s" if verdict.duration else ""
+        for remark in filter(None, [*case.notes, message, *own, length]):
+            add(told, "p", remark, "note")
+        if case.picture is not None:
+            source = f"{PICTURES}/{case.picture.name}"
+            link = add(add(part, "div"), "a", href=source)
+            add(link, "img", src=source, alt=f"{case.name} over time", loading="lazy")
     return written(html)
 
 
@@ -238,23 +252,6 @@ def _in_short(verdict: Verdict) -> str:
     told += [f"missing: {each.label}" for each in verdict.missing]
     told += [f"{len(verdict.excused)} that do not count"] if verdict.excused else []
     return ", ".join(told)
-
-
-def _add_run(part: ET.Element, verdict: Verdict, shared: Sequence[str]) -> None:
-    told = add(part, "div")
-    add(told, "h2", str(verdict.path))
-    _add_status(add(told, "p"), verdict)
-    for line in failing(verdict):
-        add(told, "p", line)
-    message = "" if verdict.model else verdict.message
-    own = [fact for fact in _facts(verdict) if fact not in shared]
-    length = f"{verdict.duration:.2f} s" if verdict.duration else ""
-    for remark in filter(None, [*excused(verdict), message, *own, length]):
-        add(told, "p", remark, "note")
-    if verdict.picture is not None:
-        source = f"{PICTURES}/{verdict.picture.name}"
-        link = add(add(part, "div"), "a", href=source)
-        add(link, "img", src=source, alt=f"{verdict.path} over time", loading="lazy")
 
 
 def _add_status(parent: ET.Element, verdict: Verdict) -> None:
@@ -346,7 +343,7 @@ def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
     over: dict[tuple[str, str], Array] = defaultdict(nowhere)
     found: dict[tuple[str, str], Array] = defaultdict(none)
     for commit, verdicts in enumerate(results):
-        for called, of in groups(verdicts):
+        for of, called in groups(verdicts):
             name = of[0].scenario or str(Path(called).with_suffix(""))
             runs[name][commit] = np.nansum((runs[name][commit], len(of)))
             for verdict in of:
