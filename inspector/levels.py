@@ -127,8 +127,7 @@ class Spectrogram:
     @cached_property
     def decibel(self) -> Array:
         """Levels of the amplitudes, shape (bins, columns), in [dB]; -inf where there is none."""
-        with np.errstate(divide="ignore"):
-            return np.asarray(20 * np.log10(self.amplitude))
+        return 2 * decibel(self.amplitude)
 
 
 def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spectrogram:

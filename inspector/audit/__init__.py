@@ -1,20 +1,14 @@
 """Audit of a log: gaps, bandwidth, warnings, and which failure classes it can show.
 
-The limits of a class:
+A class is observable if all of its band is. It is partly if two of the model's bands are, as fewer
+are no spectrum, or if some are at the quantisation floor, which a failure must exceed. The limits:
 
-- *Its bands.* The paper puts oscillations at 20 to 1000 Hz (its table of scenarios: multi-sines of
-  20-30 up to 900-1000 Hz). It gives no band for impacts and high accelerations, which are short and
-  broad: they take the model's band, from its first band to its last.
+- *Its band.* The paper puts oscillations at 20 to 1000 Hz. Impacts and high accelerations are short
+  and broad: they take the model's band, from its first band to its last.
 - *The model.* A run is labelled by the general model at the rate of its values, or by the model of
-  the nearest rate at or below. Outside of its bands nothing is observable; below all models the
-  status is *cannot tell*.
+  the nearest rate at or below. Below all models, and outside of its bands, nothing is observable.
 - *The log.* Its bandwidth: the Nyquist frequency, or less with a zero-order hold, differentiation
-  or a filter.
-- *Two bands.* Fewer than two of the model's bands are no spectrum; `LogBands` has the same limit.
-- *The frame.* A model labels frames (the paper's 0.4 s) that touch no gap; there has to be one.
-
-A class is observable if all of its band is, partly if two bands of the model or more are, or if
-some are at the quantisation floor: then a failure must exceed that.
+  or a filter. It needs a frame (the paper's 0.4 s) that touches no gap.
 """
 
 import json
@@ -77,12 +71,7 @@ class ClassObservability:
 
 
 def observable_classes(
-    bandwidth: Bandwidth,
-    valid: Mask,
-    library: Library,
-    signals: Collection[str],
-    *,
-    rate: float,
+    bandwidth: Bandwidth, valid: Mask, library: Library, signals: Collection[str], *, rate: float
 ) -> tuple[ClassObservability, ...]:
     """Determine the observability of each failure class."""
     logged = 2 * bandwidth.nyquist
@@ -117,36 +106,26 @@ def _none_of(
 
 
 def _observability(
-    label: str,
-    bandwidth: Bandwidth,
-    profile: Profile,
-    library: Library,
-    *,
-    general: bool,
+    label: str, bandwidth: Bandwidth, profile: Profile, library: Library, *, general: bool
 ) -> ClassObservability:
+    partly, whole = Observability.PARTLY, bandwidth.usable >= bandwidth.nyquist
     edges = band_edges(profile)
     wanted = OSCILLATIONS if label == "oscillations" else (edges[0], edges[-1])
     low, high = max(wanted[0], edges[0]), min(wanted[1], edges[-1], bandwidth.usable)
     if np.sum((edges[:-1] < high) & (edges[1:] <= high) & (edges[1:] > low)) < FEWEST:
-        needed = _rate_for(low, library) if bandwidth.usable >= bandwidth.nyquist else None
-        return ClassObservability(
-            label, Observability.CANNOT_TELL, needed=needed, reason=bandwidth.limit
-        )
+        needed = _rate_for(low, library) if whole else None
+        return _none_of([label], bandwidth.limit, needed)[0]
     if high < wanted[1]:
         # A general model has the bands that the log has.
         by_model = edges[-1] <= bandwidth.usable and not general
         reason = f"the model of {profile.rate:g} Hz ends there" if by_model else bandwidth.limit
         needed = _rate_for(wanted[1], library)
-        helps = bandwidth.usable >= bandwidth.nyquist and needed > 2 * bandwidth.nyquist
-        return ClassObservability(
-            label, Observability.PARTLY, low, high, needed if helps else None, reason
-        )
+        helps = whole and needed > 2 * bandwidth.nyquist
+        return ClassObservability(label, partly, low, high, needed if helps else None, reason)
     if bandwidth.floor_from is not None and bandwidth.floor_from < high:
-        reason = (
-            f"{MASKED} below {bandwidth.floor_amplitude:.2g} rad/s"
-            f" above {plain(bandwidth.floor_from)} Hz"
-        )
-        return ClassObservability(label, Observability.PARTLY, low, high, reason=reason)
+        floor, above = bandwidth.floor_amplitude, plain(bandwidth.floor_from)
+        reason = f"{MASKED} below {floor:.2g} rad/s above {above} Hz"
+        return ClassObservability(label, partly, low, high, reason=reason)
     return ClassObservability(label, Observability.OBSERVABLE, low, high)
 
 
@@ -213,13 +192,10 @@ class Audit:
 
 
 def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = None) -> Audit:
-    """Audit a run.
-
-    Gaps are counted in the whole run; signals are examined in an excerpt of it.
-    """
+    """Audit a run: gaps are counted in all of it, signals are examined in an excerpt."""
     check_joints(run.joint_names, run.robot)
     check_joints(run.desired_joint_names, run.robot)
-    part = excerpt(run)
+    part, rate = excerpt(run), (slower or without_hold(run)).rate
     reach = bandwidth(part)
     edges = np.flatnonzero(np.diff(np.concatenate(([True], run.mask, [True]))))
     lengths = np.diff(edges)[::2] / run.rate  # of its gaps
@@ -236,13 +212,7 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
         bandwidth=reach,
         warnings=(*_warnings(part, reach), *limit_warnings(run)),
         notes=tuple(_notes(part, reach)),
-        classes=observable_classes(
-            reach,
-            run.mask,
-            library,
-            signal_names(part),
-            rate=(slower or without_hold(run)).rate,
-        ),
+        classes=observable_classes(reach, run.mask, library, signal_names(part), rate=rate),
     )
 
 
@@ -360,9 +330,7 @@ def _sentence(audit: Audit) -> str:
         if each.observability is not Observability.OBSERVABLE:
             limited.setdefault(_limit(each, audit), []).append(each.label)
     clauses = [f"{lead}{_and(labels)} {rest}" for (lead, rest), labels in limited.items()]
-    if not clauses:
-        clauses = [f"the log can show {_and([each.label for each in audit.classes])}"]
-    sentence = "; ".join(clauses)
+    sentence = "; ".join(clauses) or f"the log can show {_and([c.label for c in audit.classes])}"
     return f"{sentence[0].upper()}{sentence[1:]}."
 
 
@@ -418,12 +386,9 @@ def audit_all(
 ) -> tuple[dict[str, tuple[Audit, str]], dict[str, str]]:
     """Audit all runs of many files; one bad file never stops the rest.
 
-    Returns:
-        Audits by the name of the run, with what was assumed when its log was read, in a line; and
-        why other files cannot be read.
+    Audits come with what was assumed when the log was read; other files with why they cannot be.
     """
-    found: dict[str, tuple[Audit, str]] = {}
-    failed: dict[str, str] = {}
+    found, failed = dict[str, tuple[Audit, str]](), dict[str, str]()
     for source in runs:
         name = str(source.shown)
         try:

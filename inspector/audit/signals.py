@@ -10,6 +10,7 @@ from inspector.logs.clocks import hold_length
 from inspector.logs.motion import contradictions, derived
 from noiseclassifier import LogBands
 from noisemodel import Run
+from noisemodel.noise import in_both
 from noisemodel.run import ORDER, WINDOW, stretches
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask, Real
@@ -42,7 +43,6 @@ class Spectrum:
 
     frequency: Array  # above 0, rising, shape (frequency,), in [Hz]
     total: Array  # shape (frequency,), in [(rad/s)²/Hz]
-    rate: float  # of the samples, in [Hz]
 
 
 def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
@@ -73,7 +73,7 @@ def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
     # P. Welch, IEEE Trans. Audio Electroacoust. 15 (1967): one-sided, per hertz
     density: Array = 2.0 * power / (len(chosen) * rate * np.square(window).sum())
     frequency = np.arange(1.0, length // 2 + 1.0) * (rate / length)
-    return Spectrum(np.asarray(frequency, dtype=np.float64), density.T[1:].sum(axis=1), rate)
+    return Spectrum(np.asarray(frequency, dtype=np.float64), density.T[1:].sum(axis=1))
 
 
 def smoothed(
@@ -124,11 +124,9 @@ SMOOTH = Differentiator(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", tuple
 
 
 def differentiator_of(run: Run) -> Differentiator | None:
-    """Method by which a run's velocities were differentiated from its positions.
+    """Method by which a run's velocities were differentiated from its positions; None if measured.
 
-    Returns:
-        The method, by the run's ``meta`` or as a difference that holds in 99 of 100 samples; None
-        where velocities were measured, or neither is known.
+    It is known by the run's ``meta``, or as a difference that holds in 99 of 100 samples.
     """
     if derived(run, "velocity"):
         return SMOOTH
@@ -180,18 +178,15 @@ def step_of(values: Real) -> float:
     return float(distances.min()) if fits else 0.0
 
 
-def floor_frequency(spectrum: Spectrum, floor: Array) -> float:
-    """Frequency above which a spectrum is less than twice its noise floor, in amplitude.
-
-    The Nyquist frequency if it stays above.
-    """
+def floor_frequency(spectrum: Spectrum, floor: Array) -> float | None:
+    """Frequency above which a spectrum has less than twice its noise floor's amplitude, if any."""
     frequency, level = smoothed(spectrum.frequency, spectrum.total, np.mean)
     _, lowest = smoothed(spectrum.frequency, floor, np.mean)
     above = np.flatnonzero(level > lowest + 6.0)
     # The last band is left out: anti-aliasing filters end there.
     above = above[above < len(level) - 1]
     first = int(above[-1]) + 1 if len(above) else 0
-    return float(frequency[first]) if first < len(level) - 1 else spectrum.rate / 2
+    return float(frequency[first]) if first < len(level) - 1 else None
 
 
 # Bandwidth
@@ -264,21 +259,19 @@ def bandwidth(run: Run) -> Bandwidth:
         noise = noise * np.square(differentiator.response(found.frequency, run.rate))
     # A sine of amplitude a in a band of width b has the mean density a² / 2b.
     encoders = np.full(len(noise), ENCODER_NOISE**2 / (2 * RESOLUTION))
-    floor, quiet = floor_frequency(found, noise), floor_frequency(found, encoders)
-    place = min(int(np.searchsorted(found.frequency, floor)), len(noise) - 1)
+    floor, amplitude = floor_frequency(found, noise), 0.0
+    if floor is not None:
+        place = min(int(np.searchsorted(found.frequency, floor)), len(noise) - 1)
+        amplitude = float(np.sqrt(2 * RESOLUTION * noise[place]))
     # Hold and differentiation attenuate high frequencies too, without a filter.
     attenuated = hold > 1 or differentiator is not None
-    return Bandwidth(
-        run.rate / 2,
-        hold,
-        differentiator,
+    return replace(
+        plain,
         corner=None if attenuated else corner(found, np.maximum(noise, encoders)),
         step=float(steps.max()),
-        floor_from=floor if floor < run.rate / 2 else None,
-        floor_amplitude=(
-            float(np.sqrt(2 * RESOLUTION * noise[place])) if floor < run.rate / 2 else 0.0
-        ),
-        quiet_from=quiet if quiet < run.rate / 2 else None,
+        floor_from=floor,
+        floor_amplitude=amplitude,
+        quiet_from=floor_frequency(found, encoders),
     )
 
 
@@ -294,15 +287,12 @@ LOUD = 0.03
 
 
 def corner(spectrum: Spectrum, floor: Array) -> float | None:
-    """Find the corner frequency of a filter.
+    """Find the -3 dB frequency of a filter, in [Hz]; None without a sign of one.
 
     A robot's spectrum falls from its motion to the noise of sensors and drives, which is flat or
     falls gently. A filter shows as an octave of that noise that is flat, and a fall that is steep
     and extends to the Nyquist frequency or into the ``floor``. A vibration in one band falls
     steeply too, but is louder, or ends on noise.
-
-    Returns:
-        Its -3 dB frequency, in [Hz]; None if there is no sign of a filter.
     """
     frequency, level = smoothed(spectrum.frequency, spectrum.total, _median)
     _, lowest = smoothed(spectrum.frequency, floor, _median)
@@ -364,12 +354,9 @@ def copies(run: Run) -> tuple[Copy, ...]:
             continue
         actual, wanted = (np.ascontiguousarray(valid(run, each).T) for each in (measured, desired))
         lags = {}
-        for name in (name for name in run.joint_names if name in run.desired_joint_names):
-            lag = _lag(
-                actual[run.joint_names.index(name)], wanted[run.desired_joint_names.index(name)]
-            )
-            if lag is not None:
-                lags[name] = lag
+        for own, other in zip(*in_both(run), strict=True):
+            if (lag := _lag(actual[own], wanted[other])) is not None:
+                lags[run.joint_names[own]] = lag
         if lags:
             found.append(Copy(signal, tuple(lags), min(lags.values(), key=abs)))
     return tuple(found)
@@ -432,16 +419,13 @@ FAINTEST = 0.05
 
 
 def placeholder(run: Run) -> str:
-    """Check whether the desired velocity is not the desired motion.
+    """Say why the desired velocity is not the desired motion, in a clause; empty if it is, or none.
 
     Controllers that take position targets write zeros in its place. They are a placeholder if the
     desired position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters
     of any two seconds. The zeros of a robot that has to stand remain, also when it is pushed.
     A velocity that was differentiated from desired positions is none if their quantisation steps
     alone make more than 0.05 rad/s of it.
-
-    Returns:
-        A clause that says so; empty if the desired velocity is one, or there is none.
     """
     desired = run.velocity_desired
     if desired is None or not desired.size:
@@ -459,14 +443,8 @@ def placeholder(run: Run) -> str:
 
 
 def without_placeholder(run: Run) -> tuple[Run, str]:
-    """Leave a desired velocity out that is a placeholder.
-
-    Returns:
-        The run, without its desired velocity if that is a placeholder, and a sentence that says
-        so; the run itself and an empty text otherwise.
-    """
-    clause = placeholder(run)
-    if not clause:
+    """Leave a desired velocity out that is a placeholder, and say so in a sentence."""
+    if not (clause := placeholder(run)):
         return run, ""
     said = f"{clause[0].upper()}{clause[1:]}: it was left out."
     return replace(run, velocity_desired=None), said
