@@ -1,7 +1,7 @@
 """Commands that check runs: `classify`, `diff`, `accept`, `audit`, `smoothness` and more."""
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from datetime import date
 from fnmatch import fnmatchcase
@@ -89,7 +89,11 @@ def classify(
     references = References() if no_reference else References.found(shown, reference, ctx.obj)
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
     formats = FORMATS | {"text": partial(text, verbose=verbose)}
-    outputs = _outputs(write, formats, report, overwrite=overwrite)
+    outputs = shared.outputs_of(write, formats, overwrite=overwrite)
+    if report:
+        require("a report")
+        shared.prepare(report, html.PAGE, overwrite=overwrite)
+        outputs[report] = partial(html.write_index, folder=report)
     classified = classify_files(
         found,
         library,
@@ -112,18 +116,6 @@ def classify(
     if remark := left_out(others):
         typer.echo(f"inspector: {remark}", err=True)
     _end(verdicts, shared.written(verdicts, formats[format], outputs))
-
-
-def _outputs(
-    write: Sequence[str] | None, formats: Mapping[str, Any], report: Path | None, *, overwrite: bool
-) -> dict[Path, Any]:
-    """What writes each file that was asked for, and the report."""
-    outputs = shared.outputs_of(write, formats, overwrite=overwrite)
-    if report:
-        require("a report")
-        shared.prepare(report, html.PAGE, overwrite=overwrite)
-        outputs[report] = partial(html.write_index, folder=report)
-    return outputs
 
 
 def _classes(given: Sequence[str], library: Library) -> tuple[str, ...]:

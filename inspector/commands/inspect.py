@@ -284,7 +284,15 @@ def noise(
     if not compare and not robots:
         if len(runs or ()) != 1:
             raise typer.BadParameter("name one run; --compare takes several")
-        _print_levels((runs or [])[0], ctx.obj, kinds, csv, overwrite=overwrite)
+        (run,) = runs or ()
+        recorded = opened(run, ctx.obj).run
+        shared.say_warnings(recorded)
+        estimates = tuple(estimate(recorded, each) for each in kinds or default_kinds(recorded))
+        if csv:
+            write_csv(recorded, estimates, csv, overwrite=overwrite)
+        typer.echo(f"{run}: {recorded.duration:.2f} s at {recorded.rate:g} Hz")
+        for each in estimates:
+            typer.echo(noise_level(recorded, each))
         return
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
     sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
@@ -324,20 +332,6 @@ def write_numbers(found: nm.Comparisons, path: Path, *, overwrite: bool = False)
         writer.writeheader()
         for row in rows.to_pylist():
             writer.writerow({name: shown(name, value) for name, value in row.items()})
-
-
-def _print_levels(
-    run: Path, reading: Reading, kinds: list[str], csv: Path | None, *, overwrite: bool
-) -> None:
-    """Print the noise levels of a run, and write the noise over time."""
-    recorded = opened(run, reading).run
-    shared.say_warnings(recorded)
-    estimates = tuple(estimate(recorded, each) for each in kinds or default_kinds(recorded))
-    if csv:
-        write_csv(recorded, estimates, csv, overwrite=overwrite)
-    typer.echo(f"{run}: {recorded.duration:.2f} s at {recorded.rate:g} Hz")
-    for each in estimates:
-        typer.echo(noise_level(recorded, each))
 
 
 # --- listen

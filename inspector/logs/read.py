@@ -57,7 +57,17 @@ SUFFIXES = frozenset(
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of a log, chosen by its first bytes, or by the files in a folder."""
-    module = _module_of(path)
+    if _is_folder(path):
+        module = _module_of_folder(path)
+        if not module:
+            problem = "neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set (meta/info.json)"
+            raise LogError(path, f"a folder that is {problem}; name its files one by one")
+    else:
+        with errors_of(path):
+            runfile.check_regular(path)
+            with path.open("rb") as stream:
+                head = stream.read(16)
+        module = next((name for magic, name in MAGIC.items() if head.startswith(magic)), "csv")
     libraries, extra = NEEDS.get(module, ((), ""))
     for library in libraries:
         if find_spec(library) is None:
@@ -80,20 +90,6 @@ def _module_of_folder(folder: Path) -> str:
 def _is_folder(path: Path) -> bool:
     with errors_of(path):  # such as one whose name has more than 255 characters
         return path.is_dir()
-
-
-def _module_of(path: Path) -> str:
-    """The module that reads a log."""
-    if _is_folder(path):
-        if module := _module_of_folder(path):
-            return module
-        problem = "neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set (meta/info.json)"
-        raise LogError(path, f"a folder that is {problem}; name its files one by one")
-    with errors_of(path):
-        runfile.check_regular(path)
-        with path.open("rb") as stream:
-            head = stream.read(16)
-    return next((module for magic, module in MAGIC.items() if head.startswith(magic)), "csv")
 
 
 # Runs of logs
