@@ -38,11 +38,7 @@ class Scale:
         return np.asarray((level - self.low) / (self.high - self.low))
 
     def colours(self, level: Array, *, shades: int = 0) -> NDArray[np.uint8]:
-        """Colour levels, the louder, the lighter: red, green, blue and opacity, shape (…, 4).
-
-        Args:
-            shades: Number of colours; as many as there are levels if 0. Few change rarely.
-        """
+        """Colour levels, the louder, the lighter, by so many ``shades`` or any: RGBA, (…, 4)."""
         place = np.clip(self.place(level), 0.0, 1.0)
         return self.palette(np.round(place * (shades - 1)) / (shades - 1) if shades else place)
 
@@ -72,15 +68,10 @@ SPECTRUM = Scale(-60.0, 0.0, "dB re 1 rad/s")
 def velocity_levels(
     velocity: Real, valid: Mask, rate: float, *, start: float = 0.0
 ) -> tuple[Array, Array]:
-    """The level of velocities above 10 Hz over time, of a noise or of each joint.
+    """The level of velocities above 10 Hz over time, of each joint, or of a noise as one column.
 
-    Args:
-        velocity: Shape (samples, joints), in [rad/s]; a noise is a single column.
-        valid: False in gaps, shape (samples,).
-
-    Returns:
-        Starts of the steps of 50 ms, shape (steps,), in [s], and levels of the root mean square of
-        what is valid in each, shape (steps, joints), in [dB re 1 rad/s]; NaN in gaps.
+    Returns the starts of steps of 50 ms, in [s], and levels of the root mean square of what is
+    valid in each, shape (steps, joints), in [dB re 1 rad/s]; NaN in gaps.
     """
     size = max(1, round(STEP * rate))
     firsts = np.arange(0, len(valid), size)
@@ -97,12 +88,9 @@ def velocity_levels(
 def link_levels(noise: LinkNoise) -> tuple[Array, Array]:
     """The level of each link's vibration above 10 Hz over time.
 
-    The whole motion would not do: a link that moves fast and smoothly would be the loudest.
-
-    Returns:
-        Starts of the steps of 50 ms (or of the bins, if these are longer), shape (steps,), in [s],
-        and levels of the mean power in each, shape (steps, links), in [dB re 1 pW]; silence is at
-        -inf.
+    The whole motion would not do: a link that moves fast and smoothly would be the loudest. Returns
+    the starts of steps of 50 ms, or of the bins if these are longer, in [s], and levels of the mean
+    power in each, shape (steps, links), in [dB re 1 pW]; silence is at -inf.
     """
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else STEP
     firsts = np.arange(0, len(noise.time), max(1, round(STEP / width)))
@@ -181,11 +169,9 @@ def _hann(length: int) -> Array:
 
 
 def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
-    """Keep the least and the greatest value of each bucket of samples.
+    """Keep the least and the greatest value of each bucket: times and values of ``points`` at most.
 
-    Returns:
-        Times, shape (kept,), and values, shape (kept, series), kept ≤ points; everything, if
-        there are not more samples than points.
+    Everything is kept if there are not more samples, shape (samples, series), than points.
     """
     if len(time) <= points or not values.shape[1]:
         return time, np.asarray(values, dtype=np.float64)

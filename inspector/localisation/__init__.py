@@ -341,6 +341,8 @@ def first_stage(
 ) -> Localisation:
     """Find the stage in which a failure shows first; empty if none shows it, without its band.
 
+    It may have set in up to a time ``reach`` after its start, in [s].
+
     There is no run without the failure to compare with: the *innovation* of each stage shows where
     it enters, its `sudden` changes less their linear prediction from the stage before.
 
@@ -349,15 +351,11 @@ def first_stage(
       touch that starts a limit cycle, is not its source: the first stage that adds to it wins
       (`_adding`). A failure lasts if its vibration is within 6 dB of its loudest 50 ms for 0.3 s in
       all, of the first second; one without an onset is treated as if it lasted.
-
-    Args:
-        reach: How long after its start it may have set in, in [s].
     """
     stop = min(failure.stop, failure.start + LONGEST)
     edges = (failure.start - BEFORE, max(stop, failure.start + reach) + AFTER)
-    first, last = (int(index) for index in np.searchsorted(run.time, edges))
-    stages = flow(run, slice(first, last))
-    start, end = (int(index) for index in np.searchsorted(stages.time, (failure.start, stop)))
+    stages = flow(run, slice(*np.searchsorted(run.time, edges).tolist()))
+    start, end = np.searchsorted(stages.time, (failure.start, stop)).tolist()
     if end <= start or not stages.valid[start:end].any():
         return Localisation()
     change = sudden(stages.velocity, stages.valid, stages.rate)
@@ -389,17 +387,15 @@ def _earliest(
     moment = rise(relative, first, last, rate=rate)
     early, late = (max(1, round(time * rate)) for time in AROUND)
     around = slice(max(0, moment - early), min(samples, moment + late))
+    least = PASSED_ON * innovation.total[:, around].max(axis=1)
     onsets = [
-        (onset(level, moment, around, rate=rate, least=PASSED_ON * float(peak)), place)
-        for place, (level, peak) in enumerate(
-            zip(innovation.level, innovation.total[:, around].max(axis=1), strict=True)
-        )
+        onset(level, moment, around, rate=rate, least=own)
+        for level, own in zip(innovation.level, least.tolist(), strict=True)
     ]
-    found = sorted((at, place) for at, place in onsets if at is not None)
-    if found and found[0][1] == 0 and len(innovation.level) > 1:
+    found = sorted((at, place) for place, at in enumerate(onsets) if at is not None)
+    if found and found[0][1] == 0 and len(onsets) > 1:
         common = float(innovation.level[0, around].max()) <= EXCEEDS * quiet.peak[0]
-        responses = [at for at, place in found if place == 1]
-        if common and not any(at - found[0][0] <= RESPONSE * rate for at in responses):
+        if common and (onsets[1] is None or onsets[1] - found[0][0] > RESPONSE * rate):
             found = found[1:]
     if not found:
         return None
