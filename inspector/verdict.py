@@ -95,11 +95,6 @@ class Missing:
         return self.label.removeprefix(LOG) if self.label.startswith(LOG) else ""
 
     @property
-    def words(self) -> str:
-        """What that is of its scenario, in a word."""
-        return "MISSING" if self.scenario else "CUT" if self.label == END else "FAIL"
-
-    @property
     def kind(self) -> str:
         """For programs that count them."""
         return "log" if self.scenario else self.label.replace(" ", "-")

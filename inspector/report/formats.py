@@ -25,7 +25,7 @@ from inspector.reference.difference import LOUDER, NEW, RESOLVED, Difference
 from inspector.reference.store import REPETITION
 from inspector.report import WORDS, words
 from inspector.text import counted, program_version
-from inspector.verdict import UNREAD, Beside, Finding, Verdict, counts, exit_status
+from inspector.verdict import END, UNREAD, Beside, Finding, Verdict, counts, exit_status
 from noiseclassifier.labels import interval
 
 ANNOTATIONS = 10  # GitHub silently drops what goes beyond ten of a kind per step
@@ -35,10 +35,6 @@ COMMENT = 60_000  # most characters of the Markdown: GitHub refuses comments of 
 MARKER, DIFF_MARKER = "<!-- noise-inspector -->", "<!-- noise-inspector diff -->"
 RESULTS = 5000  # GitHub shows no more results of one SARIF file
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
-RULES = {
-    "missing-log": "A scenario that was accepted has no log.",
-    "louder": "A joint is louder than in accepted runs.",
-}
 # Findings of a scenario that are listed, and of a difference those of each kind.
 MOST, MOST_OF_KIND = 20, 5
 QUIET = (Status.OK, diff.Outcome.SAME)  # what tables leave out
@@ -197,10 +193,13 @@ def sarif(job: Job) -> str:
     Files that cannot be read and what cannot be told are notifications of the tool.
     """
     results = [result for case in job.ranked for result in _results(case)][:RESULTS]
-    known, level = dict.fromkeys(result["ruleId"] for result in results), {"level": "error"}
     rules = [
-        {"id": rule, "shortDescription": {"text": _described(rule)}, "defaultConfiguration": level}
-        for rule in known
+        {
+            "id": rule,
+            "shortDescription": {"text": f"Noise of the joints: {rule.replace('-', ' ')}"},
+            "defaultConfiguration": {"level": "error"},
+        }
+        for rule in dict.fromkeys(result["ruleId"] for result in results)
     ]
     notes = [
         {
@@ -253,13 +252,6 @@ def _uri(path: Path) -> str:
     full, here = path.absolute(), Path.cwd()
     inside = full.is_relative_to(here)
     return quote(os.fsencode(full.relative_to(here))) if inside else full.as_uri()
-
-
-def _described(rule: str) -> str:
-    label = rule.removeprefix("missing-")
-    wanted = f"A required finding of class {label.replace('-', ' ')} was not found."
-    other = f"The noise of the joints shows a failure of class {label}."
-    return RULES.get(rule) or (wanted if label != rule else other)
 
 
 def markdown(job: Job) -> str:
@@ -359,6 +351,8 @@ def folded(
     found: Iterable[tuple[Path, Finding, Beside | None]], runs: int
 ) -> list[tuple[Finding, Beside | None, str]]:
     """Findings by run: of those that are one the loudest, and how many of so many runs have it."""
+    if runs == 1:  # findings of one run are never one
+        return [(event, beside, "") for _, event, beside in found]
     groups: list[list[tuple[Path, Finding, Beside | None]]] = []
     for each in found:
         run, event, _ = each
@@ -378,7 +372,7 @@ def folded(
         named = [each[1:] for each in group if each[1].label == label]
         worst = max(named, key=lambda each: (each[0].evidence.over_db or 0.0, each[0].score))
         number = len({run for run, *_ in group})
-        result.append((*worst, f"{number} of {counted(runs, 'run')}" if runs > 1 else ""))
+        result.append((*worst, f"{number} of {counted(runs, 'run')}"))
     return result
 
 
@@ -524,12 +518,15 @@ def case_of(verdicts: Sequence[Verdict], name: str = "") -> Case:
     kind = "missing" if worst.missing else worst.status.value
     if worst.failing:
         kind = max(worst.failing, key=lambda event: event.score).label
-    lacks = worst.missing and not worst.failing  # a scenario may be missing or cut
+    became = WORDS[worst.status]
+    if worst.missing and not worst.failing:  # a scenario may be missing or cut
+        lacks = worst.missing[0]
+        became = "MISSING" if lacks.scenario else "CUT" if lacks.label == END else became
     return Case(
         name=name or str(worst.path),
         path=worst.path,
         status=worst.status,
-        words=worst.missing[0].words if lacks else WORDS[worst.status],
+        words=became,
         outcome=SKIPPED if worst.ignored else OUTCOMES[worst.status],
         rank=worst.severity,
         kind=kind,
