@@ -210,11 +210,10 @@ def test_a_single_joint_and_velocities_alone_are_read(tmp_path):
 
 def test_torques_are_not_taken_for_targets(tmp_path):
     _, position, velocity = moved(500)
-    path = savez(tmp_path / "log.npz", qpos=position, qvel=velocity, ctrl=-20 * velocity)
+    path = savez(tmp_path / "log.npz", qpos=position, qvel=velocity, ctrl=-20 * velocity, dt=0.002)
     run, remarks = said(path)
     assert run.velocity_desired is None
-    fitting = "at which positions and velocities fit; --rate sets another"
-    assert remarks[0] == f"there are no stamps: 500 Hz, {fitting}"
+    assert remarks[0] == "there are no stamps: 500 Hz, by dt"
     assert "ctrl not taken as desired positions: qpos[0:7] does not follow" in " ".join(remarks)
 
 
@@ -228,6 +227,15 @@ def test_a_command_is_a_target_if_the_positions_follow_it():
     assert followed(position + 9, late) == 0
     assert followed(np.sign(position), late) == 0
     assert followed(np.zeros((STEPS, 7)), np.zeros((STEPS, 7))) == 0  # nothing moves
+
+
+def test_a_rate_that_contradicts_the_motion_is_not_believed(tmp_path):
+    _, position, velocity = moved(50)
+    path = savez(tmp_path / "log.npz", qpos=position, qvel=velocity, timestep=0.002)
+    run, remarks = said(path)
+    assert run.rate == 50.0
+    expected = "there are no stamps: 50 Hz, at which positions and velocities fit (timestep says"
+    assert remarks[0].startswith(expected)
 
 
 def test_pybullets_joint_states_are_read_by_the_names_of_its_documentation(tmp_path):

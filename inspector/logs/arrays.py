@@ -90,6 +90,9 @@ EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
 CELLS = re.compile(
     r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?", re.IGNORECASE
 )
+RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate", "fs")
+# Names of the number that is the rate in [Hz], or the step in [s].
+STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
 MOTION = {*SIGNALS, QPOS, QVEL} - {"effort"}
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -113,6 +116,7 @@ def log_of(
     arrays: Arrays,
     options: ReadOptions,
     *,
+    stated: tuple[str, float | None] = ("", None),
     joints: Mapping[str, tuple[str, ...]] | None = None,
     stamps: Stamps | None = None,
     not_read: Sequence[str] = (),
@@ -121,6 +125,7 @@ def log_of(
     """Log of the arrays of one episode.
 
     Args:
+        stated: What states the rate, and the rate, in [Hz].
         joints: Names of the columns of arrays, by the arrays' names.
         stamps: Of all arrays; those of one of the arrays unless given.
     """
@@ -149,6 +154,7 @@ def log_of(
         stamps = Stamps.counted(len(arrays[motion[0]]))
         if time:
             stamps = stamps_of(path, time, arrays[time], options.rate)
+        stamps = replace(stamps, stated=stated)
     time, samples = stamps.name, len(stamps.time)
     fields = [
         Field(
@@ -219,6 +225,17 @@ def part_of(arrays: Arrays, episode: str) -> dict[str, NDArray[Any]]:
     return {
         n: each[part] if each.ndim and len(each) == samples else each for n, each in arrays.items()
     }
+
+
+def stated_rate(items: Mapping[str, Any]) -> tuple[str, float | None]:
+    """Name of the number among arrays or attributes that states the rate, and the rate in [Hz]."""
+    for name, item in items.items():
+        last, each = name.rpartition("/")[2].lower(), np.asarray(item)
+        if last in (*RATES, *STEPS) and each.size == 1 and each.dtype.kind in "iuf":
+            number = float(each.item())
+            if number > 0:
+                return name, float(f"{number if last in RATES else 1 / number:.9g}")
+    return "", None
 
 
 def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
@@ -387,7 +404,7 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     part = part_of(arrays, episode)
     numbers = {n: each for n, each in part.items() if each.ndim and each.dtype.kind in "iufM"}
     joints = {n: desired if meaning(n).endswith("_desired") else measured for n in numbers}
-    return log_of(path, numbers, options, joints=joints)
+    return log_of(path, numbers, options, stated=stated_rate(arrays), joints=joints)
 
 
 # MATLAB's files of version 5
@@ -425,7 +442,7 @@ def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log
         name: each.T if each.ndim == 2 and each.shape[1] == samples != each.shape[0] else each
         for name, each in named.items()
     }
-    return log_of(path, turned, options)
+    return log_of(path, turned, options, stated=stated_rate(turned))
 
 
 def _variables(path: Path) -> dict[str, NDArray[Any]]:

@@ -134,14 +134,18 @@ def in_seconds(path: Path, tracks: Sequence[Track], options: ReadOptions) -> lis
 def _timed(path: Path, stamps: Stamps, options: ReadOptions, found: float | None) -> Stamps:
     """Stamps in seconds of samples that are only counted: at a rate that is known or found."""
     what = f"{stamps.name!r} counts samples" if stamps.name else "there are no stamps"
+    name, number = stamps.stated
     if options.rate:
         rate, by = options.rate, "as --rate says"
         if found and abs(found / rate - 1) > DISAGREE and not options.force:
             problem = f"positions and velocities fit a rate of {found:g} Hz, not {rate:g} Hz"
             how = f"type --rate {found:g}, or --force to take {rate:g} Hz all the same"
             raise LogError(path, f"{problem}: {how}")
+    elif number and (found is None or abs(found / number - 1) <= DISAGREE):
+        rate, by = number, f"by {name}"
     elif found:
-        rate, by = found, "at which positions and velocities fit; --rate sets another"
+        but = f" ({name} says {number:g} Hz)" if number else ""
+        rate, by = found, f"at which positions and velocities fit{but}; --rate sets another"
     else:
         how = "" if time_column([stamps.name]) else ", or name their column: --map time=COLUMN"
         raise LogError(path, f"{what}; give the log's rate, in samples per second: --rate HZ{how}")

@@ -6,6 +6,7 @@ MATLAB's files of version 7.3 are HDF5 too: structs are groups, and arrays are t
 import re
 from collections.abc import Collection, Mapping
 from functools import partial
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -66,13 +67,27 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str, *, is_matla
         group = _own(path, file[f"{home}/{episode}"], file) if home else file
         datasets, left_out = _wanted(group, options)
         values = _values(path, file, datasets)
+        attributes = {**_single(file.attrs), **_single(group.attrs)}
     if is_matlab:
         turned = {name: each.T for name, each in values.items()}
         return arrays.log_of_variables(path, turned, options)
     if not home:
         values = arrays.part_of(values, episode)
     numbers = {name: each for name, each in values.items() if each.dtype.kind in "iuf"}
-    return arrays.log_of(path, numbers, options, not_read=left_out)
+    stated = arrays.stated_rate({**attributes, **values})
+    return arrays.log_of(path, numbers, options, stated=stated, not_read=left_out)
+
+
+def _single(attributes: Any) -> dict[str, Any]:
+    """Attributes that state a rate or a step; others may be of any size, and are not read."""
+    names = (*arrays.RATES, *arrays.STEPS)
+    known = [written for name in names for written in (name, name.upper(), name.title())]
+    about = {name: attributes.get_id(name) for name in known if name in attributes}
+    return {
+        name: attributes[name]
+        for name, each in about.items()
+        if each.dtype.kind in "iuf" and each.shape is not None and prod(each.shape) == 1
+    }
 
 
 def _own(path: Path, each: Any, file: Any) -> Any:

@@ -94,6 +94,7 @@ class Stamps:
     remark: str = ""  # on their source, if it is not the expected one
     rate: float | None = None  # that the log is said to have, in [Hz]
     name: str = ""  # of their column
+    stated: tuple[str, float | None] = ("", None)  # what else tells the rate, and that, in [Hz]
 
     @classmethod
     def counted(cls, samples: int) -> "Stamps":
