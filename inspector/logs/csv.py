@@ -153,41 +153,34 @@ def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
         return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
     before = {
         number: _split(line, delimiter)
-        for number, line in enumerate(lines[:first], start=1)
+        for number, line in enumerate(lines[: first or 0], start=1)
         if line.strip()
     }
-
-    def layout(names: Sequence[str], row: int, skip: int, *used: int) -> Layout:
-        others = len(before) - len(used)
-        skipped = f"{counted(others, 'line')} before the rows not read"
-        return Layout(delimiter, tuple(names), row, skip, (skipped,) if others else ())
-
-    if options.columns or first is None:
-        skip = max(before, default=0) if first is not None else 0
-        return layout([name.strip() for name in options.columns], 0, skip)
-    width = len(_split(lines[first], delimiter))
-    names = {number: _clean(cells) for number, cells in before.items()}
-    fitting = [number for number, cells in before.items() if abs(len(cells) - width) <= 1]
-    plain = [number for number in fitting if not before[number][0].startswith(COMMENTS)]
-    known = [n for n, row in names.items() if time_column(row) or any(map(column_signal, row))]
-    candidates = plain or fitting or known
-    if not candidates:
-        count = width - lines[first].rstrip().endswith(delimiter)
-        problem = (
-            f"there is no header; the first row has {count} numbers. Name the columns in order"
-        )
-        raise LogError(path, f"{problem}, {COLUMNS}", max(before, default=0) + 1)
-    row = candidates[-1]
-    # with an open quotation mark, the header takes more lines
-    rows = csv.reader(lines[row - 1 :], delimiter=delimiter, skipinitialspace=True)
-    header = _clean(next(rows))
-    units = [name.strip("[]() ") for name in header]
-    are_units = all(not unit or unit.lower() in {*SIGNAL_UNITS, *TIME_UNITS} for unit in units)
-    if len(candidates) > 1 and any(units) and are_units:
-        above = zip(names[candidates[-2]], units, strict=False)
-        header = tuple(f"{name} [{unit}]" if unit else name for name, unit in above)
-        return layout(header, row, first, row, candidates[-2])
-    return layout(header, row, first, row)
+    header, used = tuple(name.strip() for name in options.columns), list[int]()
+    if first is not None and not header:
+        width = len(_split(lines[first], delimiter))
+        names = {number: _clean(cells) for number, cells in before.items()}
+        fitting = [number for number, cells in before.items() if abs(len(cells) - width) <= 1]
+        plain = [number for number in fitting if not before[number][0].startswith(COMMENTS)]
+        known = [n for n, row in names.items() if time_column(row) or any(map(column_signal, row))]
+        candidates = plain or fitting or known
+        if not candidates:
+            count = width - lines[first].rstrip().endswith(delimiter)
+            problem = f"there is no header; the first row has {count} numbers"
+            raise LogError(path, f"{problem}. Name the columns in order, {COLUMNS}", first + 1)
+        used = candidates[-1:]
+        # with an open quotation mark, the header takes more lines
+        rows = csv.reader(lines[used[0] - 1 :], delimiter=delimiter, skipinitialspace=True)
+        header = _clean(next(rows))
+        units = [name.strip("[]() ") for name in header]
+        are_units = all(not unit or unit.lower() in {*SIGNAL_UNITS, *TIME_UNITS} for unit in units)
+        if len(candidates) > 1 and any(units) and are_units:
+            used = candidates[-2:]
+            above = zip(names[used[0]], units, strict=False)
+            header = tuple(f"{name} [{unit}]" if unit else name for name, unit in above)
+    others = len(before) - len(used)
+    remarks = (f"{counted(others, 'line')} before the rows not read",) if others else ()
+    return Layout(delimiter, header, used[-1] if used else 0, first or 0, remarks)
 
 
 def _first_data(lines: Sequence[str]) -> tuple[str, int | None]:
