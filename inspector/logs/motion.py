@@ -288,7 +288,7 @@ def _reach_to_and_fro(track: Track, kinds: Mapping[str, str]) -> float:
 
 
 def _ratio(position: Track, velocity: Track) -> float:
-    """Median over joints of velocities by the slope of positions; 0 if it is not known."""
+    """Velocities by the slope of positions that may be in degrees; 0 if it is not known."""
     if position.stamps is not velocity.stamps:
         return 0.0
     shared = [joint for joint in position.joints if joint in velocity.joints]
@@ -296,14 +296,10 @@ def _ratio(position: Track, velocity: Track) -> float:
     steps = np.diff(position.stamps.time)[:, None]
     summed = np.vstack((np.zeros(len(shared)), np.cumsum((speed[1:] + speed[:-1]) / 2 * steps, 0)))
     places = np.unique(np.linspace(0, len(angle) - 1, STRETCHES + 1).astype(int))
+    angle = np.unwrap(angle, axis=0, period=360.0)
     ways, expected = np.diff(angle[places], axis=0), np.diff(summed[places], axis=0)
-    jumps = np.maximum.reduceat(np.abs(np.diff(angle, axis=0)), places[:-1], axis=0)
-    ways[jumps > np.ptp(angle, axis=0) / 2] = 0.0  # a wrapped angle, of whatever unit
-    square = np.square(ways).sum(axis=0)
-    known = square > 0
-    if not known.any():
-        return 0.0
-    return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
+    square = float(np.square(ways).sum())
+    return float((expected * ways).sum()) / square if square else 0.0
 
 
 def _refuse_degrees(path: Path, track: Track, kinds: Mapping[str, str]) -> None:
