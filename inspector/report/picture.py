@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 WIDTH, DPI = 9.6, 120
 INK, LINE = "#24292f", "#0072b2"
 POINTS = 4000
+# Labels of curves, and the levels that are shown, in [dB].
+NOISE, FAILURE = "noise p\u0302\n[rad/s]", "probability\nof a failure"
+LEVEL, LIMITS = "level above\n10 Hz [dB re\n1 rad/s]", (levels.FLOOR_DB + 20.0, 20.0)
 ORDERS = 3  # most orders that are written
 ROW = 0.24  # height of a class, a joint or a link, in [inch]
 # Above a panel, for each more line of its title, below and at the right of all, in [inch].
@@ -46,39 +49,41 @@ def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
     """Draw a run; how it compares with a reference takes the place of the probability."""
     run, links, names = analysis.run, analysis.links, classes_of(analysis)
     beside = None if beside is None or beside.empty else beside
-    told = _told(analysis)
+    told, labels, alarm = _told(analysis), analysis.labels, analysis.alarm
+    noise = np.where(run.mask, analysis.noise, np.nan)[:, None]
+    curve = partial(_curve, analysis=analysis)
     panels: list[Panel] = [
         (ROW * len(names), lambda axes: _classes(axes, analysis, names, told)),
-        (1.2, lambda axes: _noise(axes, analysis)),
-        (1.1, lambda axes: _level(axes, analysis, beside)),
+        (1.2, partial(curve, of=extremes(run.time, noise, points=POINTS), label=NOISE)),
     ]
     if beside is not None:
+        panels.append((1.1, partial(_band, beside=beside, analysis=analysis)))
         panels.append((ROW * len(beside.loudest(SHOWN)), partial(_over, beside=beside)))
-    elif analysis.labels is not None and analysis.alarm is not None:
-        panels.append((0.8, lambda axes: _probability(axes, analysis)))
+    else:
+        panels.append((1.1, partial(curve, of=analysis.noise_level, label=LEVEL, limits=LIMITS)))
+    if beside is None and labels is not None and alarm is not None:
+        failure = (labels.start + labels.stop) / 2, 1.0 - labels.scores[:, 0]
+        shown = partial(curve, of=failure, label=FAILURE, limits=(0.0, 1.05), alarm=alarm)
+        panels.append((0.8, shown))
     panels.append((2.0, lambda axes: _spectrum(axes, analysis)))
-    labels = list(names)
+    left = list(names)
     strips = [("joints", levels.JOINTS, *analysis.joint_levels, run.joint_names)]
     if links is not None:
         strips.append(("links", levels.LINKS, *levels.link_levels(links), links.links))
     for what, scale, time, level, every in strips:
         which = chosen(analysis, time, level)  # those that vibrate most
         rows, level = [every[index] for index in which], level[:, which].T
-        shown = partial(_strip, time=time, level=level, rows=rows, what=what, scale=scale)
-        panels.append((ROW * len(rows), shown))
-        labels += rows
-    return _drawn(panels, labels, (run.time[0], run.time[-1]), gaps(run), lines=len(told))
+        strip = partial(_strip, time=time, level=level, rows=rows, what=what, scale=scale)
+        panels.append((ROW * len(rows), strip))
+        left += rows
+    return _drawn(panels, left, (run.time[0], run.time[-1]), gaps(run), lines=len(told))
 
 
 def over_reference(beside: Comparison, title: str) -> bytes:
     """Draw how much louder a run is than its reference, by joint and time."""
-
-    def level(axes: "Axes") -> None:
-        _band(axes, beside)
-        axes.set_title(title, fontsize=9, loc="left", parse_math=False)
-
     joints = [beside.joints[place] for place in beside.loudest(SHOWN)]
-    panels: list[Panel] = [(1.1, level), (ROW * len(joints), partial(_over, beside=beside))]
+    panels: list[Panel] = [(1.1, partial(_band, beside=beside, title=title))]
+    panels.append((ROW * len(joints), partial(_over, beside=beside)))
     return _drawn(panels, joints, (beside.time[0], beside.time[-1]))
 
 
@@ -169,28 +174,28 @@ def _shaded(axes: "Axes", analysis: Analysis) -> None:
     axes.grid(alpha=0.3)
 
 
-def _noise(axes: "Axes", analysis: Analysis) -> None:
-    run = analysis.run
-    noise = np.where(run.mask, analysis.noise, np.nan)[:, None]
-    time, values = extremes(run.time, noise, points=POINTS)
-    axes.plot(time, values[:, 0], color=LINE, linewidth=0.7)
-    axes.set_ylim(bottom=0.0)
-    axes.set_ylabel("noise p\u0302\n[rad/s]")
+def _curve(
+    axes: "Axes",
+    of: tuple[Array, Array],
+    label: str,
+    analysis: Analysis,
+    limits: tuple[float, float | None] = (0.0, None),
+    alarm: float | None = None,
+) -> None:
+    """Draw values over time before the findings, with the threshold above which they alarm."""
+    axes.plot(*of, color=LINE, linewidth=0.8)
+    if alarm is not None:
+        axes.axhline(alarm, color=INK, linewidth=0.8, linestyle="--")
+        right, told = axes.get_yaxis_transform(), f"alarm above {alarm:g} "
+        axes.text(1.0, alarm, told, transform=right, fontsize=8, ha="right", va="top")
+    axes.set_ylim(*limits)
+    axes.set_ylabel(label)
     _shaded(axes, analysis)
 
 
-def _level(axes: "Axes", analysis: Analysis, beside: Comparison | None) -> None:
-    if beside is not None:
-        _band(axes, beside)
-    else:
-        time, level = analysis.noise_level
-        axes.plot(time, level[:, 0], color=LINE, linewidth=0.9)
-        axes.set_ylim(levels.FLOOR_DB + 20.0, 20.0)
-        axes.set_ylabel("level above\n10 Hz [dB re\n1 rad/s]")
-    _shaded(axes, analysis)
-
-
-def _band(axes: "Axes", beside: Comparison) -> None:
+def _band(
+    axes: "Axes", beside: Comparison, analysis: Analysis | None = None, title: str = ""
+) -> None:
     """Draw the level of the noise, and the repetitions' level behind it."""
     low, high = beside.band.T
     axes.fill_between(beside.time, low, high, color=INK, alpha=0.25, linewidth=0)
@@ -200,6 +205,9 @@ def _band(axes: "Axes", beside: Comparison) -> None:
     axes.margins(y=0.15)
     told = "grey: repetitions" if np.isfinite(high).any() else "no repetitions"
     axes.text(1.01, 0.5, told.replace(": ", ":\n"), transform=axes.transAxes, fontsize=8)
+    axes.set_title(title, fontsize=9, loc="left", parse_math=False)
+    if analysis is not None:
+        _shaded(axes, analysis)
 
 
 def _over(axes: "Axes", beside: Comparison) -> None:
@@ -217,21 +225,6 @@ def _over(axes: "Axes", beside: Comparison) -> None:
             axes.plot(evidence.peak, row, "o", color=INK, markersize=4)
     _rows(axes, joints, "joints over the reference")
     _bar(axes, image, "[dB]")
-
-
-def _probability(axes: "Axes", analysis: Analysis) -> None:
-    labels, alarm = analysis.labels, analysis.alarm
-    assert labels is not None
-    assert alarm is not None
-    middles = (labels.start + labels.stop) / 2
-    axes.plot(middles, 1.0 - labels.scores[:, 0], color=LINE, linewidth=0.9)
-    axes.axhline(alarm, color=INK, linewidth=0.8, linestyle="--")
-    right = axes.get_yaxis_transform()
-    told = f"alarm above {alarm:g} "
-    axes.text(1.0, alarm, told, transform=right, fontsize=8, ha="right", va="top")
-    axes.set_ylim(0.0, 1.05)
-    axes.set_ylabel("probability\nof a failure")
-    _shaded(axes, analysis)
 
 
 def _spectrum(axes: "Axes", analysis: Analysis) -> None:
