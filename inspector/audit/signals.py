@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -152,10 +153,8 @@ def differentiator_of(run: Run) -> Differentiator | None:
         FORWARD: (after - here) * run.rate,
         CENTRAL: (after - before) * run.rate / 2,
     }
-    for method, slope in found.items():
-        if np.mean(np.abs(slope - velocity) <= tolerance) >= 0.99:
-            return method
-    return None
+    close = (m for m, s in found.items() if np.mean(np.abs(s - velocity) <= tolerance) >= 0.99)
+    return next(close, None)
 
 
 # Quantisation
@@ -216,7 +215,7 @@ class Bandwidth:
     # Frequency above which the level is below any encoder's noise, in [Hz]; None if it stays above.
     quiet_from: float | None = None
 
-    @property
+    @cached_property
     def limits(self) -> dict[str, float]:
         """Upper limits of the bandwidth by their cause, in [Hz]."""
         rate = 2 * self.nyquist
@@ -454,12 +453,9 @@ def _changes(run: Run) -> bool:
     """Whether the desired position changes."""
     if run.position_desired is None:
         return False
-    wanted = run.position_desired
-    low, high = np.full(wanted.shape[1], np.inf), np.full(wanted.shape[1], -np.inf)
-    for rows in pieces(wanted):
-        part = wanted[rows][run.mask[rows]]
-        low = np.minimum(low, part.min(axis=0, initial=np.inf))
-        high = np.maximum(high, part.max(axis=0, initial=-np.inf))
+    parts = (run.position_desired[rows][run.mask[rows]] for rows in pieces(run.position_desired))
+    found = [(p.min(axis=0, initial=np.inf), p.max(axis=0, initial=-np.inf)) for p in parts]
+    low, high = np.min([low for low, _ in found], 0), np.max([high for _, high in found], 0)
     return bool((high - low).max() > CHANGE)
 
 

@@ -141,12 +141,7 @@ class Findings:
         if self._open is None:
             return tuple(self._closed)
         last = self._open.part(slice(-1, None))
-        quiet = replace(
-            last,
-            label=np.full_like(last.label, "ok"),
-            above_threshold=None if last.above_threshold is None else np.zeros(1, dtype=bool),
-            novel=None if last.novel is None else np.zeros(1, dtype=bool),
-        )
+        quiet = replace(last, label=np.full_like(last.label, "ok"))
         return (*self._closed, *Labels.concatenated((self._open, quiet)).events())
 
     @property

@@ -141,11 +141,7 @@ def reader_of(head: bytes, names: tuple[str, ...]) -> "tuple[CsvReader | JsonRea
 
 
 class CsvReader:
-    """Reads rows under a header such as ``time,elbow.velocity,elbow.position``.
-
-    Args:
-        names: Names of the joints in the order that is wanted; by default the columns' order.
-    """
+    """Reads rows under a header such as ``time,elbow.velocity``; names tell the order of joints."""
 
     def __init__(self, head: bytes, names: tuple[str, ...]) -> None:
         text = head.decode("utf-8-sig", errors="replace").strip().lstrip("# ")
@@ -155,14 +151,13 @@ class CsvReader:
         naming = Naming.of(self._header)
         for place, column in enumerate(self._header):
             meaning = column_signal(column, naming)
-            if meaning is None or meaning[0] not in SIGNALS:
+            if meaning is None or meaning[0] not in SIGNALS or factor_of(column) != 1.0:
                 continue
-            if factor_of(column) == 1.0:
-                kind, joint = meaning
-                if not isinstance(joint, str):
-                    number = joint - naming.first
-                    joint = names[number] if number < len(names) else f"joint{number + 1}"
-                found.setdefault(kind, {})[joint] = place
+            kind, joint = meaning
+            if not isinstance(joint, str):
+                number = joint - naming.first
+                joint = names[number] if number < len(names) else f"joint{number + 1}"
+            found.setdefault(kind, {})[joint] = place
         if "velocity" not in found:
             raise LiveError(
                 "the header names no velocity; expected columns such as elbow.velocity,"

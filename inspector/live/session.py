@@ -162,9 +162,8 @@ class Clock:
     def take(self, stamps: Array, *, ended: bool = False) -> tuple[Mask, Array, Array]:
         """Decide about samples, those that waited before first; if the stream ended, about all.
 
-        Returns:
-            Which of the decided ones are kept; how many are missing before each that is kept; and
-            their times, always increasing, in [s].
+        Tells which of the decided ones are kept; how many are missing before each that is kept; and
+        their times, always increasing, in [s].
         """
         stamps = np.where(np.abs(stamps) < 1e100, stamps, np.nan)  # differences would overflow
         if not self._unit and not self._begin(stamps, ended=ended):
@@ -529,12 +528,11 @@ class LiveSession:
         return SampleBuffer(max(1, round(BATCH * self._rate)), widths, self._warnings)
 
     def _stamps(self, time: ArrayLike | None, samples: int) -> Array:
-        if time is None:
-            stamps = self._latest + np.arange(1, samples + 1) / self._rate
-        else:
+        stamps = self._latest + np.arange(1, samples + 1) / self._rate
+        if time is not None:
             stamps = np.asarray(time, dtype=np.float64).reshape(-1)
-            if stamps.shape != (samples,):
-                raise LiveError(f"time: shape {stamps.shape}, expected ({samples},)")
+        if stamps.shape != (samples,):
+            raise LiveError(f"time: shape {stamps.shape}, expected ({samples},)")
         if samples:
             self._latest = float(stamps[-1])
         return stamps
@@ -586,7 +584,10 @@ class LiveSession:
             if line := next(self._watch.warnings(LONG * self._rate), ""):
                 self.note("joints beyond their limits", line)
                 self._watch = None
-        self._check_viewer(len(time))
+        # Until the viewer is known to be there, it may not have shown what it was sent.
+        self._unconfirmed = 0 if self._sink.check_viewer() else self._unconfirmed + len(time)
+        if self._sink.gone:
+            self._note_unseen()
 
     def _label(self, time: Array, motion: Array, valid: Mask) -> None:
         """Label and draw a stretch without missing samples."""
@@ -602,14 +603,6 @@ class LiveSession:
         self._drawing.labels(labels)
         if self._sink.open:
             self._drawing.findings(end, self._found)
-
-    def _check_viewer(self, samples: int) -> None:
-        """Count samples until the viewer is known to be there; warn if it is gone."""
-        self._unconfirmed += samples
-        if self._sink.check_viewer():
-            self._unconfirmed = 0
-        if self._sink.gone:
-            self._note_unseen()
 
     def _note_unseen(self) -> None:
         """Count the samples since the viewer was last known to be there and to keep up."""

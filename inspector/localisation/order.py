@@ -141,8 +141,7 @@ def _around(
     after = run.mask[part.stop : part.stop + margin]
     sides = [int(np.append(side, False).argmin()) for side in (before, after)]
     inside = signal[part.start - sides[0] : part.stop + sides[1]][:, column].astype(np.float64)
-    missing = [(margin - side, margin - side) for side in sides]
-    pad = ((missing[0][0], missing[1][0]), *[(0, 0)] * (inside.ndim - 1))
+    pad = [(margin - sides[0], margin - sides[1]), *[(0, 0)] * (inside.ndim - 1)]
     return np.pad(inside, pad, mode="reflect", reflect_type="odd")
 
 
