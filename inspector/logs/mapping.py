@@ -421,26 +421,23 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
         target, _, source = text.partition("=")
         signal, dot, joint = target.partition(".")
         known = signal in SIGNALS or target == "time"
-        if not source or not known or (dot and not joint):
-            raise OptionError(
-                f"mapping {text!r}: expected SIGNAL.JOINT=COLUMN, such as velocity.elbow=dq2 or"
-                f" 'velocity.{JOINT}={JOINT}_actual', SIGNAL=ARRAY, such as position=qpos[7:], or"
-                f" time=COLUMN; signals are {', '.join(SIGNALS)}"
-            )
-        if joint and joint not in CONVENTIONS.get(signal, (joint,)):
-            raise OptionError(
-                f"mapping {text!r}: a {signal} is written as {' or '.join(CONVENTIONS[signal])}"
-            )
         patterns = joint.count(JOINT), source.count(JOINT)
-        if any(patterns) and patterns != (1, 1):
-            raise OptionError(
-                f"mapping {text!r}: a pattern has {JOINT} once on either side, such as"
-                f" 'velocity.{JOINT}={JOINT}_actual'"
+        form, problem = f"'velocity.{JOINT}={JOINT}_actual'", ""
+        if not source or not known or (dot and not joint):
+            problem = (
+                f"expected SIGNAL.JOINT=COLUMN, such as velocity.elbow=dq2 or {form}, SIGNAL=ARRAY,"
+                f" such as position=qpos[7:], or time=COLUMN; signals are {', '.join(SIGNALS)}"
             )
-        for entry in parsed:
-            if entry.source == source or (entry.target == target and not entry.is_pattern):
-                twice = source if entry.source == source else target
-                raise OptionError(f"mapping {text!r}: {twice!r} is mapped twice")
+        elif joint and joint not in CONVENTIONS.get(signal, (joint,)):
+            problem = f"a {signal} is written as {' or '.join(CONVENTIONS[signal])}"
+        elif any(patterns) and patterns != (1, 1):
+            problem = f"a pattern has {JOINT} once on either side, such as {form}"
+        elif any(entry.source == source for entry in parsed):
+            problem = f"{source!r} is mapped twice"
+        elif any(entry.target == target and not entry.is_pattern for entry in parsed):
+            problem = f"{target!r} is mapped twice"
+        if problem:
+            raise OptionError(f"mapping {text!r}: {problem}")
         parsed.append(Entry(signal, joint, source))
     return tuple(parsed)
 
