@@ -44,7 +44,6 @@ from inspector.logs.names import (
     column_signal,
     listed,
     says_twice,
-    time_column,
 )
 from noisemodel import Run, RunError, runfile
 from noisemodel.run import check_time
@@ -269,7 +268,7 @@ def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
         values = arrays[name].reshape(len(arrays[name]), -1)[:, part]
         if values.size:
             return source, {**arrays, source: values[:, 0]}
-    return time_column([name for name, each in arrays.items() if each.ndim == 1]), arrays
+    return options.stamps_in([name for name, each in arrays.items() if each.ndim == 1]), arrays
 
 
 def _of_one_length(
@@ -435,7 +434,7 @@ def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log
         plain = last if not field and last in STAMPS else plain
         if each.dtype.kind in "iuf":
             named[plain] = each.ravel() if 1 in each.shape else each
-    time = options.time or time_column([name for name, each in named.items() if each.ndim == 1])
+    time = options.stamps_in([name for name, each in named.items() if each.ndim == 1])
     longest = max((max(each.shape) for each in named.values() if each.ndim), default=0)
     samples = len(named[time]) if time in named else longest
     turned = {

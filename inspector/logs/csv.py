@@ -71,7 +71,7 @@ def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
     with _opened(path) as stream:
         layout = _layout(path, stream, options)
         rows = sum(1 for _ in islice(_lines(path, stream), layout.skip, None))
-    time = options.time or time_column(layout.header)
+    time = options.stamps_in(layout.header)
     naming = Naming.of(layout.header, options.known_joints)
 
     def held(name: str) -> str:
@@ -214,11 +214,7 @@ def _clean(cells: Sequence[str]) -> tuple[str, ...]:
 
 def _times(header: Sequence[str], options: ReadOptions) -> tuple[int | None, int | None]:
     """Places of the stamps, and of the nanoseconds beside whole seconds, as ROS has them."""
-    name = options.time
-    if not name or name not in header:
-        mapped = {entry.source for entry in options.entries}
-        name = time_column([each for each in header if each not in mapped])
-    if not name:
+    if not (name := options.stamps_in(header)):
         return None, None
     rest = None
     if seconds := SECONDS.fullmatch(name):

@@ -28,6 +28,7 @@ from inspector.logs.names import (
     factor_of,
     listed,
     number_of,
+    time_column,
     without_unit,
 )
 from inspector.text import toml_shown
@@ -67,7 +68,7 @@ NEAR = 0.05  # largest relative difference of a nominal rate to the round one th
 UNIFORM = 1e-3  # largest relative deviation of a uniform clock's steps from their median
 GAP = 5.0  # length of a step, in nominal ones, above which it is a gap
 
-PART = re.compile(r"(?P<name>.+)\[(?P<first>\d*)(?P<colon>:?)(?P<last>\d*)\]")
+PART = re.compile(r"(?P<name>.+)\[(?P<columns>\d*:?\d*)\]")
 JOINT = "{joint}"  # what stands for the name of a joint in a pattern of a mapping
 
 
@@ -195,12 +196,11 @@ class Entry(NamedTuple):
     def part(self) -> tuple[str, slice]:
         """Name of the array in the source, and its columns."""
         match = PART.fullmatch(self.source)
-        if match is None or not (match["first"] or match["colon"]):
+        if match is None or not match["columns"]:
             return self.source, slice(None)
-        first = int(match["first"] or 0)
-        if not match["colon"]:
-            return match["name"], slice(first, first + 1)
-        return match["name"], slice(first, int(match["last"]) if match["last"] else None)
+        first, colon, last = match["columns"].partition(":")
+        start = int(first or 0)
+        return match["name"], slice(start, (int(last) if last else None) if colon else start + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,6 +339,12 @@ class ReadOptions:
         """Names of the columns and arrays that are mapped, but for the stamps."""
         known = [entry for entry in self.entries if entry.signal != "time"]
         return {name for entry in known for name in (entry.source, entry.part()[0])}
+
+    def stamps_in(self, names: Sequence[str]) -> str:
+        """Name of the stamps: the one that is mapped, or one of those that are not; or empty."""
+        if self.time and self.time in names:
+            return self.time
+        return time_column([name for name in names if name not in self.mapped])
 
     @property
     def known_joints(self) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from inspector.errors import LogError
 from inspector.logs.arrays import floats, log_of, may_hold
 from inspector.logs.clocks import stamps_of
 from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, errors_of, no_motion
-from inspector.logs.names import Naming, array_signal, listed, time_column
+from inspector.logs.names import Naming, array_signal, listed
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
 from noisemodel.files import beyond, limit
@@ -126,22 +126,21 @@ def _values(path: Path, table: Any, name: str) -> NDArray[Any] | None:
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     schema = _schema(path)
-    time = options.time or time_column(schema.names)
+    time = options.stamps_in(schema.names)
     names = [name for name in schema.names if name not in (time, EPISODE)]
     mapped = options.for_columns(path, names).mapped
     naming = Naming.of(names, options.known_joints)
     wanted = [n for n in names if n in mapped or may_hold(n, naming) or array_signal(n)]
     if not wanted:
         raise no_motion(path, schema.names)
-    if time in schema.names:
-        wanted.append(time)
+    wanted += [time] if time else []
     table = _table([path], wanted, episode)
     arrays = {
         name: values[:, 0] if values.shape[1] == 1 else values
         for name in wanted
         if (values := _values(path, table, name)) is not None
     }
-    if time in schema.names and time not in arrays:
+    if time and time not in arrays:
         raise LogError(path, f"column {time!r} holds no stamps but {table.column(time).type}")
     not_read = [name for name in schema.names if name not in (*arrays, EPISODE)]
     return log_of(path, arrays, options, not_read=not_read)
