@@ -102,7 +102,7 @@ class Missing:
     @property
     def told(self) -> str:
         """What is said of it beside its scenario."""
-        return self.reason if self.scenario else str(self)
+        return self.reason if self.scenario and self.reason else str(self)
 
 
 @dataclass(frozen=True)

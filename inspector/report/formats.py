@@ -699,13 +699,10 @@ def _of_difference(found: Difference) -> Job:
 
 
 def _of_row(found: Difference, of: diff.Row) -> Case:
-    status, place, lines, resolved = (
-        found.status(of),
-        found.rows.index(of),
-        _told(of),
-        _folded(of, RESOLVED),
-    )
+    status, place = found.status(of), found.rows.index(of)
+    lines, resolved = _told(of), _folded(of, RESOLVED)
     fails = status is Status.FINDINGS
+    others = [] if fails else [line for line in lines if line != of.reason]
     worst = [path for path in of.after if of.worst and str(path) == of.worst.run.run]
     broken = of.outcome in (*diff.BROKEN, diff.Outcome.WORSE)
     return Case(
@@ -718,7 +715,7 @@ def _of_row(found: Difference, of: diff.Row) -> Case:
         kind=of.outcome if broken else "new finding",
         sentences=tuple(lines) if fails else (),
         message="" if fails else of.reason,
-        notes=(*(lines[1:] if not fails else ()), *resolved, *of.remarks),
+        notes=(*others, *resolved, *of.remarks),
         cells=tuple((line,) for line in [*lines, *resolved]),
         picture=found.picture if not place else None,
     )
