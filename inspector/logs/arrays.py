@@ -274,10 +274,7 @@ def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
 def _of_one_length(
     path: Path, arrays: Arrays, names: Sequence[str], commands: Sequence[str]
 ) -> Arrays:
-    """Arrays of as many samples as there are stamps.
-
-    Of an episode with one state more than actions the last state is left out.
-    """
+    """Arrays of as many samples as stamps; of one state more than actions the last is left out."""
     lengths = {len(arrays[name]) for name in (*names, *commands)}
     if max(lengths) - min(lengths) == 1:
         longest = max(lengths)
@@ -292,10 +289,7 @@ def _of_one_length(
 
 
 def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
-    """Mapping of MuJoCo's state: a floating base, if there is one, then the robot's joints.
-
-    Objects that float, and what follows them, are left out.
-    """
+    """Mapping of MuJoCo's state: a floating base, then joints, up to an object that floats."""
     names = {what: name for name, what in reversed([*roles.items()]) if what in (QPOS, QVEL, FORCE)}
     flat = {what: arrays[name].reshape(len(arrays[name]), -1) for what, name in names.items()}
     if QPOS not in flat:

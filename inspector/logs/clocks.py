@@ -154,10 +154,7 @@ def _timed(path: Path, stamps: Stamps, options: ReadOptions, found: float | None
 
 
 def rate_of(position: Real, velocity: Real) -> float | None:
-    """Sample rate at which velocities are the steps of positions, in [Hz]; None if they do not fit.
-
-    It is the common rate nearby, or else the rate to three digits.
-    """
+    """Sample rate at which velocities are the steps of positions, in [Hz]; None if none fits."""
     position, velocity = position.astype(np.float64), velocity.astype(np.float64)
     if len(position) < 3:
         return None
@@ -196,10 +193,7 @@ def on_clocks(tracks: Sequence[Track], changed: Mapping[int, Stamps]) -> list[Tr
 
 
 def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], str]:
-    """Tracks without samples whose stamps are not later than all before, and a remark.
-
-    Tracks that share stamps still do afterwards.
-    """
+    """Tracks, which share stamps as before, without samples out of order, and a remark."""
     kept: dict[int, tuple[Stamps, Mask]] = {}
     places: list[float] = []
     for track in {id(track.stamps): track for track in tracks}.values():
@@ -324,10 +318,7 @@ def synchronise(
     rate: float | None = None,
     offset: float | None = None,
 ) -> tuple[list[Track], str, dict[str, float]]:
-    """Tracks on the clock of the measured motion, whose time starts at 0.
-
-    The result has a remark, and by how many seconds the desired clock was shifted, if it was.
-    """
+    """Tracks on the measured motion's clock, which starts at 0; a remark; the offset, if any."""
     start = main.stamps.start
     clocks = {
         id(stamps): replace(
@@ -360,10 +351,7 @@ def synchronise(
 def _estimated(
     path: Path, tracks: Sequence[Track], own: Sequence[Stamps], apart: str
 ) -> tuple[float, str]:
-    """Offset of the desired clock, 0 if it stays, and a remark.
-
-    Clocks that do not overlap (``apart`` says so) have to be moved.
-    """
+    """Offset of the desired clock, 0 if it stays, and a remark; clocks ``apart`` need one."""
     measured = {track.signal: track for track in reversed(tracks) if not track.is_desired}
     desired = {track.quantity: track for track in reversed(tracks) if track.stamps in own}
     pairs = (
@@ -401,10 +389,7 @@ def no_overlap(desired: Stamps, measured: Stamps) -> str:
 
 
 def _estimate(measured: Track, desired: Track) -> tuple[float, float, float] | None:
-    """Offset of the desired clock, in [s], its correlation, and that of the next best offset.
-
-    It is None if no joint moves in both.
-    """
+    """Offset of the desired clock, in [s], its correlation, and the next best; None at rest."""
     rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in (measured, desired)))
     joints = [joint for joint in measured.joints if joint in desired.joints]
     speeds = []
@@ -469,10 +454,7 @@ def hold_length(signal: Real, valid: Mask | None = None) -> float:
 
 
 def updates(signal: Real, valid: Mask | None = None) -> Indices | None:
-    """Samples at which the values of a signal with a zero-order hold were set; None without one.
-
-    The first may be negative: its value was set before the first sample.
-    """
+    """Samples at which a held signal was set, the first perhaps below 0; None without a hold."""
     hold, changed = _hold(signal, valid)
     if hold <= 1:
         return None

@@ -789,10 +789,7 @@ def pose_of(values: Real, convention: str) -> Array:
 
 
 def velocity_of(values: Real, convention: str, pose: Array) -> Array:
-    """Velocity of a base in body axes, linear, then angular, of one in `CONVENTIONS`.
-
-    ``pose`` is that of the same samples, as the run has it, shape (samples, 7).
-    """
+    """Velocity of a base in body axes of one in `CONVENTIONS`, with its pose as the run has it."""
     parts = np.hsplit(np.asarray(values, dtype=np.float64), 2)
     axis, scalar = -pose[:, 3:6], pose[:, 6:]
     for place in {"world": (0, 1), "mujoco": (0,)}.get(convention, ()):  # v' = R(q)^T v

@@ -376,11 +376,7 @@ def _joined(track: Track, values: Array, places: Indices) -> Track:
 
 
 def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
-    """Run of one log, or of one with the measured and one with the desired motion.
-
-    Samples whose stamps are not uniform are resampled to the specified rate, or to the nearest
-    round one. The run is cut to the time that all signals cover.
-    """
+    """Run of one log, or of a measured and a desired one, over the time that all signals cover."""
     _check_mapping(logs, options)
     if len(logs) > 1:
         logs[:] = _with_desired(*logs)
@@ -511,10 +507,7 @@ def _lost(before: float, after: float) -> str:
 def _signals_of(
     parts: dict[str, Track], time: Array, valid: Mask
 ) -> tuple[dict[str, Any], dict[str, str], list[str]]:
-    """Signals of a run by joint, with missing velocities differentiated.
-
-    A signal that some of the joints lack, and that cannot be computed, is left out.
-    """
+    """Signals of all joints, velocities differentiated where needed; what some lack is left out."""
     signals: dict[str, Any] = {}
     differentiated: dict[str, str] = {}
     remarks: list[str] = []

@@ -290,10 +290,7 @@ def number_of(joint: str | int) -> int | None:
 
 
 def says_twice(column: str) -> bool:
-    """Whether a column's name says twice that it is desired, as ``cmd.q_d[0]`` does.
-
-    Such a one is the command beside the desired motion that a controller followed.
-    """
+    """Whether a name says twice that it is desired: ``cmd.q_d[0]``, beside what is followed."""
     match = _match(without_unit(column)[0])
     return match is not None and sum(map(bool, _sides(match))) > 1
 
