@@ -190,6 +190,7 @@ FILE_INTERVAL = 10.0
 
 
 Columns: TypeAlias = Callable[[Any], Iterable[Any]]
+Times: TypeAlias = NDArray[np.timedelta64]
 
 
 class Messages:
@@ -199,18 +200,18 @@ class Messages:
         self.recording, self._watched = recording, watched
         self._interval = SEND_INTERVAL if watched else FILE_INTERVAL
         self._held = 0.0  # time that waits, in [s]
-        self._waiting: dict[str, tuple[Columns, list[tuple[NDArray[np.int64], Any]]]] = {}
+        self._waiting: dict[str, tuple[Columns, list[tuple[Times, Any]]]] = {}
 
     def add(
         self,
         path: str,
-        time: NDArray[np.int64],
+        time: Times,
         values: Any,
         columns: Columns = scalars,
         *,
         urgent: bool = False,
     ) -> None:
-        """Let rows wait, at times in [ns]; `columns` makes rerun's columns of all that waited."""
+        """Let rows wait; `columns` makes rerun's columns of all that waited."""
         if len(time):
             self._waiting.setdefault(path, (columns, []))[1].append((time, values))
         if urgent and self._watched:
@@ -232,13 +233,13 @@ class Messages:
         if path in self._waiting:
             columns, pieces = self._waiting.pop(path)
             time, values = (np.concatenate(each) for each in zip(*pieces, strict=True))
-            index = rr.TimeColumn(TIMELINE, duration=time.astype("timedelta64[ns]"))
+            index = rr.TimeColumn(TIMELINE, duration=time)
             self.recording.send_columns(path, indexes=[index], columns=columns(values))
 
 
-def nanoseconds(time: Array) -> NDArray[np.int64]:
+def nanoseconds(time: Array) -> Times:
     """Times in [s] as rerun counts them."""
-    return np.round(1e9 * time).astype(np.int64)
+    return np.round(1e9 * time).astype("timedelta64[ns]")
 
 
 class SpectrogramStream:
@@ -347,19 +348,16 @@ class Drawing:
         self._sink, self._recording, self._rate = sink, sink.recording, rate
         self._messages = Messages(sink.recording, watched=sink.watched)
         self._spectrogram = SpectrogramStream(rate)
-        self._robot: LiveRobot | None = None
+        moves, self._robot = "base_pose" in widths, None
         if robot is not None:
-            moves = "base_pose" in widths
             self._robot = LiveRobot(self._messages, robot, joint_names, moves=moves)
         self._hop, classes = labeller.hop, labeller.classes
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
-        self._classes = (
-            Panel("class", panels.ROW * len(self._rows) + views.AXIS) if classes else None
-        )
+        height = panels.ROW * len(self._rows) + views.AXIS
+        self._classes = Panel("class", height) if classes else None
         self._told: str | None = None  # findings of the verdict that is drawn
         self._begun = False
-        self._camera: Camera | None = None
         self._plots: dict[str, dict[str, slice]] = {}  # columns of each entity, by signal
         self._titles: dict[str, list[str]] = {}  # entities of each plot
         size = panels.JOINTS_PER_PLOT
@@ -412,10 +410,9 @@ class Drawing:
         if self._begun:
             return
         self._begun = True
-        if self._robot is not None:
-            self._camera = self._robot.camera(signals)
         self.findings(time, ())
-        self._recording.send_blueprint(self._layout())
+        camera = None if self._robot is None else self._robot.camera(signals)
+        self._recording.send_blueprint(self._layout(camera))
 
     def piece(self, time: Array, valid: Mask, velocity: Array, *, after_gap: bool) -> None:
         """Draw the spectrogram of a stretch without missing samples."""
@@ -486,7 +483,7 @@ class Drawing:
             self.findings(time, found)
         self._messages.flush()
 
-    def _layout(self) -> Blueprint:
+    def _layout(self, camera: Camera | None) -> Blueprint:
         """Lay the recording out; every plot shows the last ten seconds."""
         over_time = [
             views.timed(NOISE_PANEL, title="Noise", between=None, last=SHOWN),
@@ -494,12 +491,10 @@ class Drawing:
         ]
         left = [(views.events("Events", "/events"), 2.4)]
         if self._classes is not None:  # otherwise there is no verdict
-            classes = views.timed(self._classes, title="Classes", last=SHOWN)
-            over_time.insert(0, classes)
+            over_time.insert(0, views.timed(self._classes, title="Classes", last=SHOWN))
             left.insert(0, (views.drawing("/verdict"), 0.32))
-        if self._camera is not None:
-            robot = views.robot("Robot", "/robot", self._camera)
-            left.insert(len(left) - 1, (robot, 4.4))
+        if camera is not None:
+            left.insert(-1, (views.robot("Robot", "/robot", camera), 4.4))
         plots = [
             views.timed(
                 SIGNALS_PANEL, "/joints", title=title, name=title, between=None, paths=paths,
