@@ -426,7 +426,15 @@ def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
     """
     read = [each for each in verdicts if each.status not in UNREAD]
     if len(verdicts) == 1 and read and read[0].of_run:
-        lines = _one(read[0])
+        (one,) = read
+        status, facts = WORDS[one.status], ""
+        if one.status is Status.CANNOT_TELL:
+            status += f": {one.message}"
+        elif one.rate:
+            facts = f"{one.duration:.1f} s, {counted(one.joints, 'joint')}, {one.rate:g} Hz"
+        by = one.expectations and f"by {one.expectations}"
+        lines = ["   ".join(filter(None, [str(one.path), status, facts, by]))]
+        lines += [f"  {line}" for line in table(case_of(read).cells)]
     else:
         lines = _rows(case_of(*group) for group in groups(read))
     runs = [each for each in read if each.of_run]
@@ -437,18 +445,6 @@ def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
     if worst is not None and worst.failing:
         lines.append(f"next:    inspector view {shlex.quote(str(worst.path))}")
     return "\n".join([*lines, summary(verdicts)] if len(verdicts) > 1 else lines)
-
-
-def _one(verdict: Verdict) -> list[str]:
-    """A run and its findings."""
-    facts = f"{verdict.duration:.1f} s, {counted(verdict.joints, 'joint')}, {verdict.rate:g} Hz"
-    status = WORDS[verdict.status]
-    if verdict.status is Status.CANNOT_TELL:
-        status, facts = f"{status}: {verdict.message}", ""
-    facts = facts if verdict.rate else ""
-    by = f"by {verdict.expectations}" if verdict.expectations and verdict.of_run else ""
-    head = "   ".join(filter(None, [str(verdict.path), status, facts, by]))
-    return [head, *(f"  {line}" for line in table(case_of([verdict]).cells))]
 
 
 def _rows(cases: Iterable[Case]) -> list[str]:
@@ -580,15 +576,6 @@ def diff_text(found: Difference) -> str:
     return "\n".join(lines).rstrip()
 
 
-def _told(of: diff.Row) -> list[str]:
-    """What is new in a scenario, a line each; without levels there, what became of it first."""
-    found = [*_folded(of, NEW), *_folded(of, LOUDER)]
-    worse = of.outcome is diff.Outcome.WORSE
-    if worse and any(each.event.evidence.over_db is not None for each in of.new):
-        return found
-    return [of.reason, *(str(each) for each in of.changes[:1] if worse), *found]
-
-
 def _folded(of: diff.Row, kind: str) -> list[str]:
     """Findings of a kind, one line for what repetitions share."""
     own = [(each.run, each.event, None) for each in of.findings if each.kind == kind]
@@ -607,7 +594,29 @@ def diff_json(found: Difference) -> str:
         "counts": _diff_counts(found),
         "verdict": found.outcome,
         "margin_db": found.margin,
-        "scenarios": [_row_as_dict(each) for each in found.rows],
+        "scenarios": [
+            {
+                "name": of.name,
+                "verdict": of.outcome,
+                "reason": of.reason,
+                "reference": [str(path) for path in of.before],
+                "candidate": [str(path) for path in of.after],
+                "margin_db": round(of.margin, 3),
+                "over_db": None if of.score is None else round(of.score, 3),
+                "findings": [_finding_as_dict(each) for each in of.findings],
+                "changes": [
+                    {
+                        "kind": "joint and band" if each.signal == "velocity" else "tracking error",
+                        "joint": each.joint,
+                        "band_hz": list(each.band),
+                        **_rounded(each, "change", "low", "high", digits=3),
+                    }
+                    for each in of.changes
+                ],
+                "remarks": list(of.remarks),
+            }
+            for of in found.rows
+        ],
         "picture": None if found.picture is None else str(found.picture),
         "unpaired": [
             {
@@ -621,29 +630,6 @@ def diff_json(found: Difference) -> str:
         "failed": {str(each.path): each.message for each in found.failed},
     }
     return json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def _row_as_dict(of: diff.Row) -> dict[str, Any]:
-    return {
-        "name": of.name,
-        "verdict": of.outcome,
-        "reason": of.reason,
-        "reference": [str(path) for path in of.before],
-        "candidate": [str(path) for path in of.after],
-        "margin_db": round(of.margin, 3),
-        "over_db": None if of.score is None else round(of.score, 3),
-        "findings": [_finding_as_dict(each) for each in of.findings],
-        "changes": [
-            {
-                "kind": "joint and band" if each.signal == "velocity" else "tracking error",
-                "joint": each.joint,
-                "band_hz": list(each.band),
-                **_rounded(each, "change", "low", "high", digits=3),
-            }
-            for each in of.changes
-        ],
-        "remarks": list(of.remarks),
-    }
 
 
 def _finding_as_dict(each: diff.ChangedFinding) -> dict[str, Any]:
@@ -699,12 +685,16 @@ def _of_difference(found: Difference) -> Job:
 
 
 def _of_row(found: Difference, of: diff.Row) -> Case:
+    """A scenario as a case, with a line for each finding that is new, louder or resolved."""
     status, place = found.status(of), found.rows.index(of)
-    lines, resolved = _told(of), _folded(of, RESOLVED)
+    lines, resolved = [*_folded(of, NEW), *_folded(of, LOUDER)], _folded(of, RESOLVED)
+    worse = of.outcome is diff.Outcome.WORSE
+    # Without the levels of what is new, what became of the scenario is told first.
+    if not worse or all(each.event.evidence.over_db is None for each in of.new):
+        lines = [of.reason, *(str(each) for each in of.changes[:1] if worse), *lines]
     fails = status is Status.FINDINGS
     others = [] if fails else [line for line in lines if line != of.reason]
     worst = [path for path in of.after if of.worst and str(path) == of.worst.run.run]
-    broken = of.outcome in (*diff.BROKEN, diff.Outcome.WORSE)
     return Case(
         name=of.name,
         path=(worst or of.after or of.before)[0],
@@ -712,7 +702,7 @@ def _of_row(found: Difference, of: diff.Row) -> Case:
         words=of.outcome.upper() if fails else of.outcome,
         outcome=OUTCOMES[status],
         rank=(list(EXIT).index(status), place),
-        kind=of.outcome if broken else "new finding",
+        kind=of.outcome if worse or of.outcome in diff.BROKEN else "new finding",
         sentences=tuple(lines) if fails else (),
         message="" if fails else of.reason,
         notes=(*others, *resolved, *of.remarks),

@@ -398,7 +398,10 @@ def _error(value: Array) -> float:
 
 
 def history_page(history: History) -> str:
-    """Write series as one HTML page, those with most change first; no joints without a change."""
+    """Write series as one HTML page, those with most change first; no joints without a change.
+
+    Each is drawn as a point for each commit and a line at each step.
+    """
     html, body = document("Noise over commits", POLICY)
     add(body, "h1", "Noise over commits")
     add(body, "p", next(history.lines()), "verdict")
@@ -411,22 +414,17 @@ def history_page(history: History) -> str:
         add(body, "h2", series.name)
         for step in found:
             add(body, "p", step, "step")
-        _draw(body, history, series)
+        value = series.value
+        low, high = min(0.0, float(np.nanmin(value))), max(float(np.nanmax(value)), 1.0)
+        x = (np.arange(len(value)) + 0.5) * WIDTH / len(value)
+        y = HEIGHT - 10 - (value - low) / (high - low) * (HEIGHT - 20)
+        drawn = add(body, "svg", viewBox=f"0 0 {WIDTH} {HEIGHT}", role="img")
+        for commit, _ in changes(series):
+            at = f"{x[commit] - WIDTH / len(value) / 2:.1f}"
+            add(drawn, "line", x1=at, x2=at, y1="0", y2=str(HEIGHT))
+        for place in np.flatnonzero(~np.isnan(value)):
+            point = add(drawn, "circle", cx=f"{x[place]:.1f}", cy=f"{y[place]:.1f}", r="3")
+            add(point, "title", f"{history.commits[place]}: {value[place]:.1f} {series.unit}")
+        unit = "dB over the reference" if series.unit == "dB" else "findings per run"
+        add(body, "p", f"{unit}, {low:.1f} to {high:.1f}", "note")
     return written(html)
-
-
-def _draw(body: ET.Element, history: History, series: Series) -> None:
-    """Draw a series: a point for each commit, a line at each step."""
-    value = series.value
-    low, high = min(0.0, float(np.nanmin(value))), max(float(np.nanmax(value)), 1.0)
-    x = (np.arange(len(value)) + 0.5) * WIDTH / len(value)
-    y = HEIGHT - 10 - (value - low) / (high - low) * (HEIGHT - 20)
-    drawn = add(body, "svg", viewBox=f"0 0 {WIDTH} {HEIGHT}", role="img")
-    for commit, _ in changes(series):
-        at = f"{x[commit] - WIDTH / len(value) / 2:.1f}"
-        add(drawn, "line", x1=at, x2=at, y1="0", y2=str(HEIGHT))
-    for place in np.flatnonzero(~np.isnan(value)):
-        point = add(drawn, "circle", cx=f"{x[place]:.1f}", cy=f"{y[place]:.1f}", r="3")
-        add(point, "title", f"{history.commits[place]}: {value[place]:.1f} {series.unit}")
-    unit = "dB over the reference" if series.unit == "dB" else "findings per run"
-    add(body, "p", f"{unit}, {low:.1f} to {high:.1f}", "note")
