@@ -86,6 +86,7 @@ def test_targets_of_every_sample_or_with_velocities_are_left_as_they_are(tmp_pat
 
 def test_updates_are_where_values_are_set_before_the_first_sample_too():
     values = np.repeat([0.0, 0.0, *np.cumsum(np.arange(1.0, 20.0))], 5)[2:, None]
-    everywhere = np.ones(len(values), dtype=bool)
-    assert updates(values, everywhere).tolist() == list(range(-2, len(values), 5))
-    assert updates(np.zeros((100, 1)), np.ones(100, dtype=bool)) is None
+    hold, places = updates(values)
+    assert hold == 5.0
+    assert places.tolist() == list(range(-2, len(values), 5))
+    assert updates(np.zeros((100, 1)))[0] == 1.0

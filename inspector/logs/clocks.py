@@ -453,19 +453,19 @@ def hold_length(signal: Real, valid: Mask | None = None) -> float:
     return _hold(signal, valid)[0]
 
 
-def updates(signal: Real, valid: Mask | None = None) -> Indices | None:
-    """Samples at which a held signal was set, the first perhaps below 0; None without a hold."""
-    hold, changed = _hold(signal, valid)
-    if hold <= 1:
-        return None
+def updates(signal: Real) -> tuple[float, Indices]:
+    """Length of a hold, and the samples at which the values were set, the first perhaps below 0."""
+    hold, changed = _hold(signal, None)
     jumps = np.flatnonzero(changed)
+    if hold <= 1:
+        return hold, jumps
     first = jumps[0] + 1
     changes = [first - hold * np.ceil(first / hold), *(jumps + 1), len(signal)]
     found = [
         start + hold * np.arange(max(1, round((stop - start) / hold)))
         for start, stop in pairwise(changes)
     ]
-    return np.round(np.concatenate(found)).astype(np.int64)
+    return hold, np.round(np.concatenate(found)).astype(np.int64)
 
 
 def without_hold(run: Run) -> Run:

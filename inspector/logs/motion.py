@@ -329,13 +329,13 @@ def _without_held_targets(tracks: Sequence[Track], remarks: list[str]) -> list[T
     """
     logged = {joint for t in tracks if t.signal == "velocity_desired" for joint in t.joints}
     moving = [track for track in tracks if track.signal in ("position", "velocity")]
-    measured = max((clocks.hold_length(track.values) for track in moving), default=1.0)
     found = []
     for track in tracks:
         if track.signal == "position_desired" and not logged & set(track.joints):
             values = np.asarray(track.values, dtype=np.float64)
-            hold, places = clocks.hold_length(values), clocks.updates(values)
-            if places is not None and hold >= SLOWER * measured:
+            hold, places = clocks.updates(values)
+            lengths = (clocks.hold_length(track.values) for track in moving)
+            if hold > 1 and hold >= SLOWER * max(lengths, default=1.0):
                 track = _joined(track, values, places)
                 nominal = track.stamps.clock.nominal
                 remarks.append(
