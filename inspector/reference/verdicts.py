@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -51,26 +52,24 @@ STOPPED, MOVES, STILL_FOR = 0.1, 0.3, 0.5
 class References:
     """The reference of each run, to be applied where a run is classified."""
 
-    loaded: Mapping[Path, Reference] = field(default_factory=dict)
-    of: Mapping[Path, Path] = field(default_factory=dict)  # of runs that have one
+    of: Mapping[Path, Reference] = field(default_factory=dict)  # of runs that have one
 
     @classmethod
     def found(
         cls, runs: Iterable[Path], given: Path | None = None, reading: Reading | None = None
     ) -> "References":
         """Load the given reference, or the nearest store of each run."""
-        of = {run: path for run in runs if (path := given or find(run)) is not None}
-        return cls({path: Reference.load(path, reading) for path in dict.fromkeys(of.values())}, of)
+        load = cache(partial(Reference.load, reading=reading))
+        return cls({run: load(path) for run in runs if (path := given or find(run)) is not None})
 
     def __call__(self, analysis: Analysis, verdict: Verdict) -> tuple[Verdict, Comparison | None]:
         """Add the evidence of the reference to the verdict on a run, and compare them."""
-        path = self.of.get(verdict.path)
-        if path is None:
+        reference = self.of.get(verdict.path)
+        if reference is None:
             return verdict, None
-        reference = self.loaded[path]
         name = scenario_of(analysis.run, verdict.path)
         if reference.named(name) is None:
-            name = scenario_of(analysis.run, verdict.path, _root(verdict.path, path))
+            name = scenario_of(analysis.run, verdict.path, _root(verdict.path, reference.path))
         run = levels(analysis.run, name=name, file=str(verdict.path))
         comparison = compare(run, reference.scenarios)
         return beside(verdict, comparison, reference, analysis.labels), comparison
@@ -79,7 +78,7 @@ class References:
         """What a batch that resumes must find unchanged: the levels of each reference."""
         text = " ".join(
             f"{each.name} {each.sha256}"
-            for reference in self.loaded.values()
+            for reference in dict.fromkeys(self.of.values())
             for scenario in reference.scenarios
             for each in scenario.repetitions
         )
@@ -87,17 +86,16 @@ class References:
 
     def judge(self, verdict: Verdict, gate: "Gate | None", today: date) -> Verdict:
         """Decide what becomes of the findings of a run; see `judge`."""
-        path = self.of.get(verdict.path)
-        return judge(verdict, None if path is None else self.loaded[path], gate=gate, today=today)
+        return judge(verdict, self.of.get(verdict.path), gate=gate, today=today)
 
     def absent(self, verdicts: Sequence[Verdict], folders: Iterable[Path]) -> list[Verdict]:
         """Verdicts on stores whose required scenarios have too few logs."""
         found, given = [], [folder.resolve() for folder in folders]
-        for path, reference in self.loaded.items():
-            top, store = path.resolve().parent, path / NAME
+        for reference in dict.fromkeys(self.of.values()):
+            top, store = reference.path.resolve().parent, reference.path / NAME
             known: Counter[str] = Counter()
             for each in verdicts:
-                if self.of.get(each.path) == path:
+                if self.of.get(each.path) is reference:
                     known.update(each.beside.scenarios if each.beside else (each.scenario,))
             missing = []
             for one in reference.scenarios if reference.stored else ():
