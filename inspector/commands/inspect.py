@@ -282,15 +282,14 @@ def noise(
     """
     kinds = [name for each in kind or () for name in each.split(",")]
     if not compare and not robots:
-        if len(runs or ()) != 1:
+        if not runs or len(runs) > 1:
             raise typer.BadParameter("name one run; --compare takes several")
-        (run,) = runs or ()
-        recorded = opened(run, ctx.obj).run
+        recorded = opened(runs[0], ctx.obj).run
         shared.say_warnings(recorded)
         estimates = tuple(estimate(recorded, each) for each in kinds or default_kinds(recorded))
         if csv:
             write_csv(recorded, estimates, csv, overwrite=overwrite)
-        typer.echo(f"{run}: {recorded.duration:.2f} s at {recorded.rate:g} Hz")
+        typer.echo(f"{runs[0]}: {recorded.duration:.2f} s at {recorded.rate:g} Hz")
         for each in estimates:
             typer.echo(noise_level(recorded, each))
         return
