@@ -486,17 +486,15 @@ def read_results(path: Path) -> list[Verdict]:
     try:
         content = from_json(text_of(path))
         form = content.get("format") if isinstance(content, dict) else None
-        if form != RESULTS:
-            raise InspectorError(f"{path}: of format {form!r}, expected {RESULTS!r}")
-        return list(read_as(tuple[Verdict, ...], content["runs"]))
+        if form == RESULTS:
+            return list(read_as(tuple[Verdict, ...], content["runs"]))
     except OSError as error:
         raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
-    except InspectorError:
-        raise
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         version = content.get("version") if isinstance(content, dict) else None
         by = f" by version {version}, this is {program_version()}" if version else ""
         raise InspectorError(f"{path}: no results of classify{by} ({error})") from error
+    raise InspectorError(f"{path}: of format {form!r}, expected {RESULTS!r}")
 
 
 @contextmanager

@@ -25,7 +25,7 @@ from inspector.reference.difference import LOUDER, NEW, RESOLVED, Difference
 from inspector.reference.store import REPETITION
 from inspector.report import WORDS, words
 from inspector.text import counted, program_version
-from inspector.verdict import END, UNREAD, Beside, Finding, Verdict, counts, exit_status
+from inspector.verdict import END, RESULTS, UNREAD, Beside, Finding, Verdict, counts, exit_status
 from noiseclassifier.labels import interval
 
 ANNOTATIONS = 10  # GitHub silently drops what goes beyond ten of a kind per step
@@ -33,7 +33,7 @@ COMMENT = 60_000  # most characters of the Markdown: GitHub refuses comments of 
 # First line of the Markdown, by which a script finds its own comment to replace it: a job may have
 # one of verdicts and one of a difference.
 MARKER, DIFF_MARKER = "<!-- noise-inspector -->", "<!-- noise-inspector diff -->"
-RESULTS = 5000  # GitHub shows no more results of one SARIF file
+MOST_RESULTS = 5000  # GitHub shows no more results of one SARIF file
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 # Findings of a scenario that are listed, and of a difference those of each kind.
 MOST, MOST_OF_KIND = 20, 5
@@ -192,7 +192,7 @@ def sarif(job: Job) -> str:
     A result lies in the first line of its case's file: GitHub shows no result without a location.
     Files that cannot be read and what cannot be told are notifications of the tool.
     """
-    results = [result for case in job.ranked for result in _results(case)][:RESULTS]
+    results = [result for case in job.ranked for result in _results(case)][:MOST_RESULTS]
     rules = [
         {
             "id": rule,
@@ -490,7 +490,7 @@ def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
 def as_json(verdicts: Sequence[Verdict]) -> str:
     """Verdicts as JSON, ``noise-verdict/3``; its schema is docs/noise-verdict-3.schema.json."""
     whole = {
-        "format": "noise-verdict/3",
+        "format": RESULTS,
         "version": program_version(),
         "exit_status": exit_status(verdicts),
         "counts": counts(verdicts),
