@@ -9,6 +9,7 @@ import pytest
 from inspector.errors import Status, Unknown
 from inspector.localisation import Localisation
 from inspector.report.formats import ANNOTATIONS, COMMENT, FORMATS, MARKER, as_json, text
+from inspector.report.html import index_page
 from inspector.verdict import Evidence, Finding, Missing, Ruling, Verdict, exit_status
 
 github, junit, markdown, sarif = (
@@ -360,3 +361,15 @@ def test_markdown_fits_into_a_comment():
     written = markdown(many + [replace(EXPECTED, path=each.path) for each in many])
     assert len(written) < COMMENT
     assert re.search(r"^\d+ more are left out here\.$", written, re.MULTILINE)
+
+
+def test_scenarios_without_logs_are_told_alike_in_every_format():
+    store, why = Path("reference/reference.toml"), {"pick": "no log; it had 3", "place": "1 of 2"}
+    missing = tuple(Missing(f"log of {name}", reason=reason) for name, reason in why.items())
+    lacking = replace(LACKING, path=store, missing=missing, expectations=str(store))
+    for write in (text, junit, github, sarif, markdown, index_page):
+        written = write([lacking])
+        for name, reason in why.items():
+            assert name in written
+            assert reason in written
+            assert f"missing: log of {name} (" not in written
