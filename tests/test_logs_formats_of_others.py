@@ -379,6 +379,19 @@ def test_numbered_columns_are_the_robots_joints_in_order(tmp_path, columns, join
     assert found == tuple(f"panda_joint{number}" for number in joints)
 
 
+@pytest.mark.parametrize(("signal", "what"), [(P, "positions"), (V, "velocities")])
+def test_degrees_of_positions_or_of_velocities_alone_are_converted(tmp_path, signal, what):
+    logs = {}
+    for scale in ({}, {signal: DEG}):
+        path = tmp_path / "log.csv"
+        path.write_text(table(f"time,{QDQ}", (P, V), scale=scale))
+        logs[len(scale)] = read_log(path)
+    assert f"log.csv: {what} {FOUND}" in logs[1].remarks
+    for name in ("position", "velocity"):
+        plain, found = (getattr(each.run, name) for each in logs.values())
+        np.testing.assert_allclose(found, plain, atol=1e-6)
+
+
 def test_the_desired_log_of_one_in_degrees_is_in_degrees(tmp_path):
     degrees = dict.fromkeys((P, V), DEG)
     measured, desired = tmp_path / "measured.csv", tmp_path / "desired.csv"

@@ -217,7 +217,7 @@ class Log:
     time: str = ""  # name of the column or array with the stamps
     tracks: tuple[Track, ...] = ()  # its signals, in SI units, with increasing stamps
     names: tuple[str, ...] = ()  # of columns and arrays, which a mapping may refer to
-    in_degrees: bool = False  # whether its angles were found to be in degrees
+    in_degrees: tuple[str, ...] = ()  # "position" and "velocity" if found to be in degrees
 
 
 class LogReader(NamedTuple):

@@ -206,7 +206,9 @@ TURN = 2 * np.pi  # positions beyond, of half of the joints that move, are in de
 FARTHEST = 720.0  # largest position of an arm's joint, in [deg]; wheels turn farther
 NORMALISED = 100.0  # largest position that may be a share of a joint's range as well
 STRAIGHT = 0.9  # share of its way that a joint is away from its start: wheels go on and on
-CLOSE = 0.1  # largest relative deviation of velocities from the slope of positions in degrees
+# What is in degrees, by the ratio of logged velocities to the slope of positions.
+MATCHES = {1.0: ("position", "velocity"), np.pi / 180: ("position",), 180 / np.pi: ("velocity",)}
+CLOSE = 0.1  # largest relative deviation from such a ratio
 STRETCHES = 50  # of a log, whose ways are compared
 TURNING = ("revolute", "continuous")
 
@@ -218,14 +220,15 @@ HINT = (
 
 def _in_si(
     log: Log, tracks: Sequence[Track], units: str, robot: Robot | None, remarks: list[str]
-) -> tuple[list[Track], bool]:
-    """Tracks in radians that know which columns are angles, and if they look like degrees."""
+) -> tuple[list[Track], tuple[str, ...]]:
+    """Tracks in radians that know which columns are angles, and what was found to be in degrees."""
     kinds = {joint.name: joint.kind for joint in robot.joints} if robot else {}
-    in_degrees = not units and _in_degrees(tracks, kinds)
+    in_degrees = () if units else _in_degrees(tracks, kinds)
     if in_degrees:
+        plural = {"position": "positions", "velocity": "velocities"}
         remarks.append(
-            "positions and velocities look like degrees: converted to radians (if they are not,"
-            " --units radians)"
+            f"{' and '.join(plural[each] for each in in_degrees)} look like degrees: converted to"
+            " radians (if they are not, --units radians)"
         )
     found: list[Track] = []
     for track in tracks:
@@ -240,7 +243,7 @@ def _in_si(
                 continue
             track = _columns(track, angles)
         angular = _angular(track, kinds)
-        if angular.any() and (units == "degrees" or in_degrees):
+        if angular.any() and (units == "degrees" or track.quantity in in_degrees):
             values = np.where(angular, np.deg2rad(track.values), track.values)
             track = replace(track, values=values)
         if not units:
@@ -257,20 +260,25 @@ def _angular(track: Track, kinds: Mapping[str, str]) -> Mask:
     return np.array(turning, dtype=bool)
 
 
-def _in_degrees(tracks: Sequence[Track], kinds: Mapping[str, str]) -> bool:
-    """Whether positions of half of the joints that move reach beyond a turn, to and fro.
+def _in_degrees(tracks: Sequence[Track], kinds: Mapping[str, str]) -> tuple[str, ...]:
+    """What is in degrees, as positions and velocities tell.
 
-    Velocities have to match them; without velocities, they have to reach beyond ``NORMALISED``.
+    Positions are if half of the joints that move reach beyond a turn, to and fro; velocities if
+    they match them. Without velocities, positions have to reach beyond ``NORMALISED``.
     """
     by_signal = {track.signal: track for track in reversed(tracks)}
     suffix = "" if "position" in by_signal else "_desired"
     position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
     if position is None:
-        return False
+        return ()
     reach = _reach_to_and_fro(position, kinds)
     if velocity is None:
-        return reach > NORMALISED
-    return reach > 0 and abs(_ratio(position, velocity) - 1) <= CLOSE
+        return ("position", "velocity") if reach > NORMALISED else ()
+    ratio = _ratio(position, velocity)
+    for known, quantities in MATCHES.items():
+        if abs(ratio / known - 1) <= CLOSE and (reach or "position" not in quantities):
+            return quantities
+    return ()
 
 
 def _reach_to_and_fro(track: Track, kinds: Mapping[str, str]) -> float:
@@ -288,7 +296,7 @@ def _reach_to_and_fro(track: Track, kinds: Mapping[str, str]) -> float:
 
 
 def _ratio(position: Track, velocity: Track) -> float:
-    """Velocities by the slope of positions that may be in degrees; 0 if it is not known."""
+    """Median over joints of velocities by the slope of positions; 0 if it is not known."""
     if position.stamps is not velocity.stamps:
         return 0.0
     shared = [joint for joint in position.joints if joint in velocity.joints]
@@ -296,10 +304,14 @@ def _ratio(position: Track, velocity: Track) -> float:
     steps = np.diff(position.stamps.time)[:, None]
     summed = np.vstack((np.zeros(len(shared)), np.cumsum((speed[1:] + speed[:-1]) / 2 * steps, 0)))
     places = np.unique(np.linspace(0, len(angle) - 1, STRETCHES + 1).astype(int))
-    angle = np.unwrap(angle, axis=0, period=360.0)
     ways, expected = np.diff(angle[places], axis=0), np.diff(summed[places], axis=0)
-    square = float(np.square(ways).sum())
-    return float((expected * ways).sum()) / square if square else 0.0
+    jumps = np.maximum.reduceat(np.abs(np.diff(angle, axis=0)), places[:-1], axis=0)
+    ways[jumps > np.ptp(angle, axis=0) / 2] = 0.0  # a wrapped angle, of whatever unit
+    square = np.square(ways).sum(axis=0)
+    known = square > 0
+    if not known.any():
+        return 0.0
+    return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
 
 
 def _refuse_degrees(path: Path, track: Track, kinds: Mapping[str, str]) -> None:

@@ -184,7 +184,7 @@ def readers_of(path: Path, reading: Reading) -> dict[str, Callable[[], Imported]
         logs, how = [prepared(opened.read(episode), options, robot)], options
         if other:
             same = episode if episode in other.episodes else other.episodes[0]
-            if logs[0].in_degrees:  # of one robot, in one unit
+            if len(logs[0].in_degrees) == 2:  # of one robot, in one unit
                 how = replace(options, units="degrees")
             logs.append(prepared(other.read(same), how, robot))
         return run_of(logs, how, name)
