@@ -36,6 +36,7 @@ AUDIBLE = "Audible are the joints' velocities above 20 Hz; their powers are adde
 # Policies for browsers: nothing is fetched, whatever a run's names are; of many runs, the pictures
 # beside the page, also from a disk.
 POLICY = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'"
+HISTORY_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 INDEX_POLICY = "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'"
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --dim: #57606a; --line: #d0d7de; --back: #fff;
@@ -402,7 +403,7 @@ def history_page(history: History) -> str:
 
     Each is drawn as a point for each commit and a line at each step.
     """
-    html, body = document("Noise over commits", POLICY)
+    html, body = document("Noise over commits", HISTORY_POLICY)
     add(body, "h1", "Noise over commits")
     add(body, "p", next(history.lines()), "verdict")
     for problem in (*history.problems, *history.notes):
