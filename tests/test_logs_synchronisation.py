@@ -14,15 +14,16 @@ def csv(path, time, velocity, suffix=""):
     return write(path, {"time": [repr(float(each)) for each in time]} | columns)
 
 
-def pair(tmp_path, *, offset, lag=0.0, seconds=60, rate=250, desired_rate=100):
+def pair(tmp_path, *, offset, drift=0.0, lag=0.0, seconds=60, rate=250, desired_rate=100):
     """A measured log, and a desired one whose clock differs; they overlap from 5 s on."""
     time = np.arange(seconds * rate) / rate
     measured = motion(time - lag)[1]
     measured += 0.02 * np.random.default_rng(1).standard_normal(measured.shape)
     meant = 5 + np.arange((seconds - 10) * desired_rate) / desired_rate
+    stamps = 5 - offset + (meant - 5) / (1 + drift)
     return (
         csv(tmp_path / "measured.csv", time, measured),
-        csv(tmp_path / "desired.csv", meant - offset, motion(meant)[1]),
+        csv(tmp_path / "desired.csv", stamps, motion(meant)[1]),
     )
 
 
@@ -34,7 +35,17 @@ def test_the_offset_is_estimated_and_removed(tmp_path, offset):
     difference = imported.run.velocity - imported.run.velocity_desired
     assert np.sqrt(np.mean(difference**2)) < 0.03  # the measured one's noise is 0.02
     assert any(remark.startswith("desired.csv: offset ") for remark in imported.remarks)
+    assert not any("drift" in remark for remark in imported.remarks)
     assert imported.run.duration == pytest.approx(50, abs=0.1)
+
+
+@pytest.mark.parametrize(("drift", "change"), [(2e-4, 0.005), (-1e-4, -0.0025)])
+def test_a_drift_of_the_clocks_is_said(tmp_path, drift, change):
+    measured, desired = pair(tmp_path, offset=12.0, drift=drift)
+    (said,) = (each for each in read_log(measured, desired=desired).remarks if "drift" in each)
+    begin, _, rest = said.partition("; the clocks drift: it is ")
+    assert begin.endswith("its stamps are shifted by that")
+    assert float(rest.split()[0]) == pytest.approx(change, rel=0.1)
 
 
 def test_a_controllers_lag_is_reported_and_not_corrected(tmp_path):

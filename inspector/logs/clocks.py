@@ -305,6 +305,7 @@ NEXT_BEST = 0.95  # largest correlation of the next best offset, as a share of t
 SHARE = 0.5  # least share of the shorter log that overlaps the longer one
 # Largest delay of measured behind desired motion that is attributed to a controller, in [s].
 LAG = 0.1
+DRIFT = 1e-3  # least change of the offset between the halves of a log that is said, in [s]
 HIGHEST_RATE = 250.0  # highest rate at which motions are compared, in [Hz]
 
 HOW = "specify --offset SECONDS, which is added to the desired stamps"
@@ -365,12 +366,14 @@ def _estimated(
     if not found and not apart:
         return 0.0, ""
     if found:
-        seconds, correlation, next_best = found
+        seconds, correlation, next_best, change = found
         said = f"offset {seconds:+.4f} s (correlation {correlation:.2f}, next best {next_best:.2f})"
         if correlation >= CORRELATION and next_best <= NEXT_BEST * correlation:
+            drifts = f"; the clocks drift: it is {change:+.4f} s larger in the second half"
+            drifts = drifts if abs(change) >= DRIFT else ""
             if abs(seconds) <= LAG:
-                return 0.0, f"{said}: a controller's lag, the stamps are not changed"
-            return seconds, f"{said}: its stamps are shifted by that"
+                return 0.0, f"{said}: a controller's lag, the stamps are not changed{drifts}"
+            return seconds, f"{said}: its stamps are shifted by that{drifts}"
         unknown = f"the offset cannot be estimated ({said})"
     if apart:
         raise LogError(path, f"{apart}{unknown}; {HOW}")
@@ -388,8 +391,11 @@ def no_overlap(desired: Stamps, measured: Stamps) -> str:
     return f"{span(desired)} do not overlap with {span(measured)}"
 
 
-def _estimate(measured: Track, desired: Track) -> tuple[float, float, float] | None:
-    """Offset of the desired clock, in [s], its correlation, and the next best; None at rest."""
+def _estimate(measured: Track, desired: Track) -> tuple[float, float, float, float] | None:
+    """Offset of the desired clock, its correlation, the next best, and its change; None at rest.
+
+    The change is from half to half; offset and change in [s].
+    """
     rate = min(HIGHEST_RATE, *(track.stamps.clock.nominal for track in (measured, desired)))
     joints = [joint for joint in measured.joints if joint in desired.joints]
     speeds = []
@@ -408,17 +414,28 @@ def _estimate(measured: Track, desired: Track) -> tuple[float, float, float] | N
     if not scale.any():
         return None
     weight = np.sqrt(1 / np.where(scale > 0, scale, np.inf))  # of joints, fast or slow
-    correlations = _correlation(one * weight, other * weight)
-    best = int(np.argmax(correlations))
+    one, other = one * weight, other * weight
+    correlations = _correlation(one, other)
+    best, top = _peak(correlations)
     distance, correlation = np.abs(np.arange(len(correlations)) - best), correlations[best]
     # The peak reaches to where the correlation falls below half of it.
     edge = distance[correlations < 0.5 * correlation].min(initial=len(correlations))
     next_best = float(correlations[distance > edge].max(initial=-1.0))
-    before, after = correlations[max(best - 1, 0)], correlations[min(best + 1, len(distance) - 1)]
-    bend = 2 * correlation - before - after
-    top = best + (after - before) / (2 * bend) if bend > 0 else best  # of a parabola
+    half = one.shape[1] // 2
+    halves = [_correlation(part, other) for part in (one[:, :half], one[:, half:])]
+    (_, early), (_, late) = map(_peak, halves)
+    sure = min(each.max(initial=-1.0) for each in halves) >= CORRELATION
+    change = (late + half - early) / rate if sure else 0.0
     start = float(measured.stamps.time[0] - desired.stamps.time[0])
-    return start + (float(top) - other.shape[1] + 1) / rate, float(correlation), next_best
+    return start + (top - other.shape[1] + 1) / rate, float(correlation), next_best, change
+
+
+def _peak(correlations: Array) -> tuple[int, float]:
+    """Lag of the largest correlation, and that of the top of a parabola through its neighbours."""
+    best = int(np.argmax(correlations))
+    before, after = correlations[[max(best - 1, 0), min(best + 1, len(correlations) - 1)]]
+    bend = 2 * correlations[best] - before - after
+    return best, float(best + (after - before) / (2 * bend)) if bend > 0 else float(best)
 
 
 def _correlation(one: Array, other: Array) -> Array:
