@@ -1,7 +1,8 @@
-"""The command line, called from tests in this process."""
+"""The command line, called from tests in this process, and Python in another one."""
 
 import contextlib
 import io
+import subprocess
 import sys
 from unittest import mock
 
@@ -22,3 +23,9 @@ def call(*arguments):
         except SystemExit as end:
             status = end.code or 0
     return status, out.getvalue(), err.getvalue()
+
+
+def python(*arguments, **options):
+    """Run Python in a process of its own; its status, what it printed and complained, as text."""
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)

@@ -1,11 +1,10 @@
 import ast
-import subprocess
-import sys
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+from commandline import python
 
 ROOT = Path(__file__).parents[1]
 # Our packages, scenarios apart from the classifier that they are in.
@@ -95,9 +94,7 @@ def test_nothing_is_pickled():
 )
 def test_importing_a_package_imports_no_more_than_it_should(package, never):
     script = f"import sys, {package}; print([name for name in {never} if name in sys.modules])"
-    loaded = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    loaded = python("-c", script, cwd=ROOT)
     assert loaded.stdout.strip() == "[]"
 
 

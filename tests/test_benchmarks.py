@@ -1,11 +1,10 @@
 """The tables of the benchmarks."""
 
 import importlib
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from commandline import python
 
 ROOT = Path(__file__).parents[1]
 
@@ -51,8 +50,7 @@ def test_sides_take_turns_and_the_median_counts(bench):
 
 
 def test_an_unknown_benchmark_is_refused():
-    command = [sys.executable, "-m", "benchmarks", "nothing"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = python("-m", "benchmarks", "nothing", cwd=ROOT)
     assert done.returncode == 2
     assert "no benchmark nothing; there are extended, stream" in done.stderr
 

@@ -7,18 +7,19 @@ import io
 import json
 import shutil
 import subprocess
-import sys
 import tarfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import python
 from generalmodel import fixed, trained
 
 from benchmarks import checkouts
 from noisemodel import Run
 
 ROOT = Path(__file__).parents[1]
+SCRIPT = ROOT / "benchmarks" / "checkouts.py"
 PACKAGES = ("noisemodel", "models", "inspector")
 FIRST = "293fa6a"  # the last commit of 0.6.0
 OLD = ("noisemodel", "models", "scenarios", "inspector", "assets/models/general.npz")
@@ -81,13 +82,7 @@ def short(tmp_path_factory):
 
 def compared(before, run, output):
     """Exit status and lines of the script, that compares this checkout with an older one."""
-    command = [sys.executable, ROOT / "benchmarks" / "checkouts.py", "--before", before]
-    done = subprocess.run(
-        [*command, "--runs", run, "--output", output],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python(SCRIPT, "--before", before, "--runs", run, "--output", output)
     assert not done.stderr
     return done.returncode, done.stdout.splitlines()
 
@@ -156,13 +151,8 @@ def test_a_result_or_an_array_that_one_checkout_lacks_is_a_difference(tmp_path):
 def test_code_of_another_checkout_than_the_one_that_was_named_is_refused(tmp_path):
     job = tmp_path / "job.json"
     job.write_text(json.dumps({"checkout": str(tmp_path)}))
-    done = subprocess.run(
-        [sys.executable, "-P", ROOT / "benchmarks" / "checkouts.py", "--compute", job],
-        capture_output=True,
-        text=True,
-        env={"PYTHONPATH": f"{ROOT}:{ROOT / 'models'}", "PYTHONDONTWRITEBYTECODE": "1"},
-        check=False,
-    )
+    env = {"PYTHONPATH": f"{ROOT}:{ROOT / 'models'}", "PYTHONDONTWRITEBYTECODE": "1"}
+    done = python("-P", SCRIPT, "--compute", job, env=env)
     assert done.returncode == 1
     assert f"not of {tmp_path}" in done.stderr
 
@@ -178,14 +168,8 @@ def listed():
 
 def called(script, folder):
     """What a script prints that imports a checkout."""
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", script],
-        cwd=folder,
-        env={"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    env = {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = python("-P", "-c", script, cwd=folder, env=env)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

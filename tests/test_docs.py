@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import python
 
 from noisemodel import Run, decimated, runfile
 
@@ -144,13 +145,7 @@ def scratch(files, tmp_path, request):
 
 def run_python(code: str, folder: Path, environment) -> None:
     """Run Python in a process of its own, warnings as errors."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-    )
+    done = python("-W", "error", "-c", code, cwd=folder, env=environment)
     assert done.returncode == 0, done.stderr
 
 
@@ -267,10 +262,8 @@ def test_the_formats_have_every_array_of_a_run_file():
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning_and_requests_nothing(tmp_path):
     pytest.importorskip("sphinx", reason="needs the extra docs")
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-E", DOCS, tmp_path]
-    done = subprocess.run(
-        command, capture_output=True, text=True, env=os.environ | {"no_proxy": "*"}
-    )
+    options = ("-W", "--keep-going", "-q", "-E", DOCS, tmp_path)
+    done = python("-m", "sphinx", *options, env=os.environ | {"no_proxy": "*"})
     assert done.returncode == 0, done.stderr
     requested = re.compile(
         r"""<(?:script|img|iframe|source|video|audio|embed|object)\b[^>]*?(?:src|data)=["']?(?:https?:)?//"""

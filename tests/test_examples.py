@@ -2,12 +2,12 @@
 
 import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import python
 from samplelogs import JOINTS, TIMES, Talk, motion, write_bag, write_lerobot
 
 from noisemodel import Run
@@ -19,13 +19,8 @@ PANDA = tuple(f"panda_joint{number}" for number in range(1, 8))
 
 def example(name, folder, *arguments):
     """What an example prints, run in a folder."""
-    done = subprocess.run(
-        [sys.executable, EXAMPLES / name, *map(str, arguments)],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
-        capture_output=True,
-        text=True,
-    )
+    env = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
+    done = python(EXAMPLES / name, *arguments, cwd=folder, env=env)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -2,13 +2,13 @@
 
 import os
 import re
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 
 import pytest
+from commandline import python
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -81,27 +81,15 @@ def test_damage_is_of_every_kind_and_reproducible():
 def test_commands_handle_malformed_files(tmp_path):
     names = ("labels, NoisyTest", "CSV", "live rows, JSON")
     chosen = [each for name in names for each in ("--only", name)]
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.fuzz.malformed", "--count", "1", *chosen],
-        cwd=ROOT,
-        capture_output=True,
-        check=False,
-        text=True,
-    )
+    done = python("-m", "benchmarks.fuzz.malformed", "--count", "1", *chosen, cwd=ROOT)
     assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("atheris") is None, reason="needs atheris (the extra `fuzz`)")
 def test_fuzzing_finds_nothing():
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.fuzz.run", "--executions", "2000"],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONHASHSEED": "0"},
-        capture_output=True,
-        check=False,
-        text=True,
-    )
+    env = {**os.environ, "PYTHONHASHSEED": "0"}
+    done = python("-m", "benchmarks.fuzz.run", "--executions", "2000", cwd=ROOT, env=env)
     assert done.returncode == 0, done.stdout + done.stderr[-2000:]
     counts = dict(re.findall(r"^(.+): (\d+) executions$", done.stdout, re.M))
     assert set(counts) == set(READERS)

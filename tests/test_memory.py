@@ -1,11 +1,11 @@
 """Memory does not grow with the length of a run: peaks of whole processes."""
 
-import subprocess
 import sys
 import zipfile
 
 import numpy as np
 import pytest
+from commandline import python
 from numpy.lib import format as npy
 
 # Durations in [s] of runs of 60 joints at 1 kHz: signals of 77 MB and of 230 MB each.
@@ -57,9 +57,7 @@ def write(path, seconds):
 
 def peak(command):
     """Peak of the resident set of a command that gives a verdict, in [B]."""
-    done = subprocess.run(
-        [sys.executable, "-c", MEASURE, *command], stdout=subprocess.PIPE, check=True, text=True
-    )
+    done = python("-c", MEASURE, *command)
     found, status, *_ = done.stdout.split()
     assert status in "014", done.stdout
     return float(found)
@@ -108,12 +106,8 @@ with LiveSession(1000.0, joint_names=("a", "b", "c"), save=sys.argv[1]) as sessi
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_a_live_recording_keeps_little_of_what_it_wrote(tmp_path):
     """In twenty minutes it grew by 30 MB when each tenth of a second was a message."""
-    done = subprocess.run(
-        [sys.executable, "-c", LIVE, str(tmp_path / "live.rrd")],
-        stdout=subprocess.PIPE,
-        check=True,
-        text=True,
-    )
+    done = python("-c", LIVE, tmp_path / "live.rrd")
+    assert done.returncode == 0, done.stderr
     after_ten, after_thirty = map(float, done.stdout.split())
     assert after_thirty - after_ten < 12.0
     assert after_thirty < 250.0

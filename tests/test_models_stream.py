@@ -1,5 +1,4 @@
 import pickle
-import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
@@ -8,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import python
 from generalmodel import relative
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -270,6 +270,5 @@ def test_streaming_needs_neither_scikit_learn_nor_scipy(tmp_path):
         "print(len(stream.push(numpy.zeros(2000))))\n"
         "print(sorted({'sklearn', 'scipy', 'noisemodel', 'joblib'} & set(sys.modules)))\n"
     )
-    command = [sys.executable, "-c", code, tmp_path / "model.npz"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    done = python("-c", code, tmp_path / "model.npz")
     assert done.stdout.split("\n")[:2] == ["17", "[]"]

@@ -1,13 +1,12 @@
 """No file reads what lies outside of its own folders."""
 
 import os
-import subprocess
-import sys
 import tracemalloc
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from commandline import call
 
 from noisemodel import Robot, RobotError, robot
 from noisemodel.surface import triangles
@@ -111,15 +110,11 @@ def test_the_commands_take_a_package_root(tmp_path):
     path = urdf(tmp_path / "ws" / "arm" / "urdf", "package://hand/a.obj")
     rows = "".join(f"{i / 1000},{i % 7 / 10},{i % 5 / 10}\n" for i in range(1000))
     (tmp_path / "log.csv").write_text("time,j.position,j.velocity\n" + rows)
-    command = [sys.executable, "-m", "inspector", "noise", tmp_path / "log.csv", "--robot", path]
-    env = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
-    failed, done = (
-        subprocess.run([*command, *more], capture_output=True, text=True, check=False, env=env)
-        for more in ((), ("--package-root", tmp_path / "ws"))
-    )
-    assert failed.returncode == 3
-    assert "--package-root" in failed.stderr
-    assert done.returncode == 0, done.stderr
+    command = ("noise", tmp_path / "log.csv", "--robot", path)
+    status, _, err = call(*command)
+    assert (status, "--package-root" in err) == (3, True)
+    status, _, err = call(*command, "--package-root", tmp_path / "ws")
+    assert status == 0, err
 
 
 @pytest.mark.parametrize(

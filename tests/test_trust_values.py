@@ -1,14 +1,12 @@
 """Values that no robot has are one line that names them, and never a result."""
 
 import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import call, python
 
 from inspector import read_log
 from inspector.errors import LogError
@@ -120,13 +118,8 @@ def test_no_row_ends_a_live_session(tmp_path):
         "\x00\x1b]0;title\x07",
     ]
     path = tmp_path / "a.rrd"
-    done = subprocess.run(
-        [sys.executable, "-m", "inspector", "live", "--rate", "1000", "--save", path],
-        input="\n".join([*LIVE[:300], *odd, *LIVE[300:]]),
-        text=True,
-        capture_output=True,
-        check=False,
-    )
+    rows = "\n".join([*LIVE[:300], *odd, *LIVE[300:]])
+    done = python("-m", "inspector", "live", "--rate", "1000", "--save", path, input=rows)
     assert done.returncode == 4, done.stderr  # no stretch is long enough for a label
     assert done.stdout.startswith("606 samples")
     assert "2 samples out of order" in done.stdout
@@ -136,8 +129,6 @@ def test_no_row_ends_a_live_session(tmp_path):
 def test_a_file_whose_name_is_not_utf_8_is_printed_escaped(tmp_path):
     name = os.fsencode(tmp_path) + b"/\xff\xfe.csv"
     csv(Path(os.fsdecode(name)), np.arange(600) / 1000)
-    done = subprocess.run(
-        [sys.executable, "-m", "inspector", "noise", name], capture_output=True, check=False
-    )
+    done = python("-m", "inspector", "noise", os.fsdecode(name))
     assert done.returncode == 0, done.stderr
-    assert rb"\udcff\udcfe.csv: 0.60 s" in done.stdout
+    assert r"\udcff\udcfe.csv: 0.60 s" in done.stdout
