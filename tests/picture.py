@@ -1,9 +1,6 @@
-"""Take a picture of a recording without a display: python tests/picture.py run.rrd 2.0 out.png."""
+"""Take a picture of a recording without a display."""
 
-import sys
-from pathlib import Path
-
-from inspector.recording.viewer import has_driver, headless_viewer, picture, shoot, until
+from inspector.recording.viewer import has_driver, headless_viewer, picture, until
 
 __all__ = ["DRIVERS", "MISSING", "final_state", "headless_viewer", "picture"]
 
@@ -15,8 +12,3 @@ def final_state(client):
     """The viewer's state once its views report nothing, or after 20 s what they report then."""
     until(lambda: not any(view.reports for view in client.get_state().views), 20.0, 0.5)
     return client.get_state()
-
-
-if __name__ == "__main__":
-    recording, seconds, output = sys.argv[1:4]
-    shoot(Path(recording), Path(output), float(seconds), overwrite=True)

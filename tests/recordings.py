@@ -15,7 +15,6 @@ rr.set_strict_mode(True)  # wrong arguments are errors
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 LINE = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
 LINE |= {"SeriesLines:aggregation_policy"}
-ROW = LINE
 POINTS = {"Scalars:scalars"} | {
     f"SeriesPoints:{part}" for part in ("names", "colors", "markers", "marker_sizes")
 }

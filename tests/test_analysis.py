@@ -11,6 +11,7 @@ import pytest
 from generalmodel import fixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_models_labels import labels as by_letters
 
 from inspector import report
 from inspector.analysis import (
@@ -41,13 +42,12 @@ from inspector.logs.read import Source
 from inspector.report import WORDS, html
 from inspector.report.formats import FORMATS
 from inspector.verdict import Verdict, classify_file, exit_status, work_of
-from noiseclassifier import Event, Labels
+from noiseclassifier import Event
 from noisemodel import Block, NoiseModelError, Robot, Run
 from noisemodel.run import METHOD, joint_velocity
 
 LIBRARY = load_library(model_files())
 RATE = 1000.0
-CLASSES = ("ok", "impact", "oscillations")
 
 
 def moving(*, desired=True, seconds=5.0, rate=RATE, tone=0.0, **changes):
@@ -63,16 +63,7 @@ def moving(*, desired=True, seconds=5.0, rate=RATE, tone=0.0, **changes):
 
 def analysed(text, **changes):
     """An analysis with labels by their first letters, upper case above the threshold."""
-    names = {".": "ok", "i": "impact", "o": "oscillations", "u": "unknown"}
-    start = 0.1 * np.arange(len(text))
-    labels = Labels(
-        start,
-        start + 0.4,
-        np.array([names[letter.lower()] for letter in text], dtype=str),
-        np.zeros((len(text), 3)),
-        CLASSES,
-        np.array([letter.isupper() for letter in text], dtype=bool),
-    )
+    labels = by_letters(text)
     spans = labels.events()
     status = Status.FINDINGS if spans else Status.OK
     fields = {"labels": labels, "spans": spans, "findings": spans, "status": status}

@@ -81,12 +81,6 @@ def test_a_chatter_does_not_become_ok_by_being_louder_coarser_slower_or_held(sha
         assert [each.label for each in found] == ["oscillations"]
 
 
-def test_what_ok_relies_on_is_said():
-    assert analyse(run_of("arm"), LIBRARY).message.startswith(
-        "Nothing stands out, within the run or for any robot."
-    )
-
-
 def test_the_first_motion_after_standing_is_compared_with_the_motion_that_follows():
     run = run_of("leg")
     still = Run(

@@ -6,10 +6,8 @@ quieter there: how faint a fault a model finds is measured elsewhere (docs/accur
 finds a loud one is a law.
 """
 
-import tempfile
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +19,7 @@ from simulated import simulated
 import noisemodel as nm
 from inspector.analysis import analyse
 from inspector.errors import Status, Unknown
-from inspector.library import demo_run, load_library, signals_of
+from inspector.library import load_library, signals_of
 
 # Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling
 # rule of the scenarios takes for felt.
@@ -138,11 +136,3 @@ def test_to_ignore_unknown_frames_never_adds_a_finding():
         spans = {(span.start, span.stop) for span in reported.spans}
         for span in ignoring.spans:
             assert any(start <= span.start and span.stop <= stop for start, stop in spans)
-
-
-def test_the_demo_is_a_finding_whatever_file_it_is_read_from():
-    run = nm.Run.load(demo_run())
-    with tempfile.TemporaryDirectory() as folder:
-        run.save(Path(folder) / "copy.npz")
-        copy = nm.Run.load(Path(folder) / "copy.npz")
-    assert analyse(copy, LIBRARY).findings == analyse(run, LIBRARY).findings

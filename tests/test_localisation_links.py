@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from test_noisemodel_noise import arm_run
 
 from inspector.localisation import Localisation, fault_links
 from noiseclassifier import Event
-from noisemodel import Robot, Run
 from noisemodel.noise import LinkNoise, link_noise
 
 LINKS = ("body", "thigh", "foot", "other_foot")
 MOVERS = (set(), {"hip"}, {"hip", "knee"}, {"other_knee"})
-BLOW = Event("impact", 1.0, 1.4, 1.0)
+BLOW, RATTLE = Event("impact", 1.0, 1.4, 1.0), Event("oscillations", 2.0, 2.5, 1.0)
 
 
 def noise(**excess):
@@ -28,20 +28,9 @@ def blow(*joints, onset=1.0):
     return Localisation("measured", joints=tuple((joint, 0.5) for joint in joints), onset=onset)
 
 
-def rattling(joint):
-    """A UR5 that moves slowly; one joint rattles at 100 Hz from 1 s to 1.4 s."""
-    time = np.arange(3000) / 1000
-    velocity = 0.5 * np.cos(np.outer(time, np.linspace(0.5, 1.5, 6)))
-    position = np.sin(np.outer(time, np.linspace(0.5, 1.5, 6)))
-    during = (time >= 1.0) & (time < 1.4)
-    velocity[during, joint] += 0.2 * np.sin(2 * np.pi * 100 * time[during])
-    names = Robot.load("ur5").joint_names
-    return Run(time=time, velocity=velocity, position=position, joint_names=names, robot="ur5")
-
-
 def test_a_rattling_joint_is_named_by_its_link():
     for joint, link in ((5, "wrist_3_link"), (4, "wrist_2_link")):
-        named = dict(fault_links(link_noise(rattling(joint)), BLOW, [BLOW]))
+        named = dict(fault_links(link_noise(arm_run(joint)), RATTLE, [RATTLE]))
         assert link in named
         assert "shoulder_link" not in named
         assert sum(named.values()) <= 1.0 + 1e-12

@@ -205,8 +205,6 @@ def test_a_model_that_was_saved_decides_as_before(path):
 def test_a_model_saved_twice_has_the_same_bytes(path, tmp_path):
     nc.load(path).save(tmp_path / "again.npz")
     assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
-    with pytest.raises(nc.OutputError, match="exists already"):
-        trained().save(path)
 
 
 @pytest.mark.slow
@@ -230,12 +228,10 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
             for value in values
         ),
         ({"per_octave": 0.0}, "a setting of the recipe is wrong"),
-        ({"window": 0.0}, "a setting of the recipe is wrong"),
         ({"lowest": 30.0}, "a rate of 80 Hz leaves 1 bands"),
         ({"hop": 0.001}, "hop is 0, expected more than 0"),
         ({"classes": ["ok"]}, "classes are ok, expected"),
         ({"rounds": 9}, "array 'feature' has shape"),
-        ({"leaves": 8}, "array 'feature' has shape"),
         ({"highest": 1000.0}, "array 'known' has shape"),
         ({"estimator": "svm"}, "a recipe for any rate has trees and a reference"),
         ({"reference": False}, "joint by joint takes 'log' and one of both"),
@@ -251,12 +247,8 @@ def test_a_wrong_recipe_is_refused(path, changes, reason):
 @pytest.mark.parametrize(
     ("name", "change", "reason"),
     [
-        ("mean", lambda array: array[1:], r"array 'mean' has shape \(\d+,\), its profile asks"),
         ("known", lambda array: array[:-1], "array 'known' has shape"),
         ("missing", lambda array: array + 1.0, "array 'missing' holds values beyond 0 to 1"),
-        ("missing", lambda array: array[1:], "array 'missing' has shape"),
-        ("threshold", lambda array: np.nan * array, "'threshold' holds values that are not fin"),
-        ("leaf", lambda _: None, "is no model file: holds"),
     ],
 )
 def test_a_damaged_file_is_refused(path, name, change, reason):

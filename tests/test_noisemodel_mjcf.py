@@ -495,7 +495,6 @@ def test_a_file_that_is_missing_or_whose_path_is_not_utf_8_is_named(tmp_path):
     [
         ('material="m"', 1),
         ('material="m" rgba="1 1 0 1"', 1),
-        ('rgba="0 0 0 1"', 1),
         ('rgba="0 0 1 .5"', 1),
         ('rgba="1 1 1 0"', 0),
         ('material="clear"', 0),

@@ -2,6 +2,7 @@ import re
 
 import numpy as np
 import pytest
+from chains import chain
 
 import noisemodel as nm
 from noisemodel import OutputError, RunError, UnknownJointError
@@ -74,7 +75,6 @@ def test_values_by_name_are_put_in_the_recorders_order():
         ({"effort": np.zeros(2)}, "velocity: missing, and position too; the sample has effort"),
         ({}, "velocity: missing, and position too; the sample has nothing"),
         (BOTH | {"time": np.nan}, "time: nan s in sample 1, after -inf s"),
-        (BOTH | {"time": np.inf}, "time: inf s in sample 1, after -inf s"),
     ],
 )
 def test_a_wrong_sample_is_an_error_that_names_the_signal(sample, message):
@@ -146,14 +146,10 @@ def test_a_loaded_robot_is_named_as_it_was_loaded(tmp_path):
         for _ in range(2):
             recorder.push(velocity=np.zeros(9))
         assert recorder.run().robot == "panda"
-    own = tmp_path / "own.urdf"
-    own.write_text(
-        '<robot name="own"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>'
-    )
+    own = chain(tmp_path, "continuous").path
     recorder = nm.Recorder(own, 100)
     for _ in range(2):
-        recorder.push(velocity={"j": 1.0})
+        recorder.push(velocity={"joint1": 1.0})
     recorder.save(tmp_path / "run.npz")
     assert nm.Run.load(tmp_path / "run.npz").robot == str(own)
 

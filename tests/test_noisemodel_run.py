@@ -74,7 +74,6 @@ def test_a_run_sorts_its_blocks_and_cannot_be_changed_in_place():
         ({"valid": np.ones(99, dtype=bool)}, r"valid: shape \(99,\) of bool, expected \(100,\)"),
         ({"valid": np.ones(100)}, r"valid: shape \(100,\) of float64"),
         ({"valid": np.zeros(100, dtype=bool)}, "valid: false in every sample"),
-        ({"joint_names": ("a", "a")}, "joint_names: a named twice"),
         ({"joint_names": ("a", "")}, "joint_names: '' is no name"),
         ({"desired_joint_names": ("c", "c")}, "desired_joint_names: c named twice"),
     ],

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 from chains import chain, surface_speed
+from test_noisemodel_meshes import area, obj
 
 from noisemodel import ROBOTS, GeometryError, MeshError, Robot, Surface, urdf
 from noisemodel.surface import (
@@ -54,15 +55,8 @@ def collision(geometry):
 
 
 def mesh_of(surface, folder, name="part.obj"):
-    points = "".join("v {} {} {}\n".format(*point) for point in surface.reshape(-1, 3))
-    faces = "".join(f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}\n" for i in range(len(surface)))
-    (folder / name).write_text(points + faces)
+    (folder / name).write_bytes(obj(surface))
     return name
-
-
-def area(surface):
-    a, b, c = np.moveaxis(surface, 1, 0)
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 
 
 def areas(links):
