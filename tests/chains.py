@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from noisemodel import Robot
+from noisemodel import Robot, Run
 from noisemodel.noise import chunk_speeds
 
 BAR = '<visual><origin xyz="0.1 0 0.3"/><geometry><box size="0.2 0.1 0.6"/></geometry></visual>'
@@ -35,6 +35,21 @@ def motion(robot, samples=40, seed=1):
     steps = 2 * random.standard_normal((samples, robot.nv))
     q = np.array([pin.integrate(robot.model, neutral, step) for step in steps])
     return q, random.standard_normal((samples, robot.nv))
+
+
+def as_run(robot, q, v, rate=1000.0, /, **changes):
+    """A run of these configurations and velocities."""
+    base = 6 * robot.floating_base
+    fields = {
+        "time": np.arange(len(q)) / rate,
+        "velocity": v[:, base:],
+        "position": q[:, base + robot.floating_base :],
+        "base_pose": q[:, :7] if base else None,
+        "base_velocity": v[:, :6] if base else None,
+        "joint_names": robot.joint_names,
+        "robot": "panda" if robot.name == "panda" else str(robot.path),
+    }
+    return Run(**(fields | changes))
 
 
 def surface_speed(robot, surface, q, v, kind):

@@ -1,4 +1,4 @@
-"""The command line, called from tests in this process, and Python in another one."""
+"""The command line, called from tests in this process, and programs in others."""
 
 import contextlib
 import io
@@ -25,7 +25,12 @@ def call(*arguments):
     return status, out.getvalue(), err.getvalue()
 
 
+def ran(*command, **options):
+    """Run a program in a process of its own; its status, output and complaints, as text."""
+    words = list(map(str, command))
+    return subprocess.run(words, capture_output=True, text=True, check=False, **options)
+
+
 def python(*arguments, **options):
-    """Run Python in a process of its own; its status, what it printed and complained, as text."""
-    command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+    """Run Python in a process of its own, as `ran` does."""
+    return ran(sys.executable, *arguments, **options)

@@ -1,5 +1,7 @@
 """The law of cutting: a verdict does not depend on what came before, and good pieces stay ok."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,30 +67,20 @@ def test_a_piece_that_is_too_short_to_tell_what_lasts_is_not_ok():
 def test_a_chatter_does_not_become_ok_by_being_louder_coarser_slower_or_held(shake):
     run = run_of("arm", shake=shake, frequency=40.0, during=(-np.inf, np.inf))
     velocity = run.velocity
-    copies = [
-        run,
-        Run(time=run.time, velocity=velocity, joint_names=run.joint_names),
-        Run(time=run.time, velocity=np.round(velocity / 0.05) * 0.05, joint_names=run.joint_names),
-        Run(
-            time=run.time,
-            velocity=velocity[np.arange(len(velocity)) // 4 * 4],
-            joint_names=run.joint_names,
-        ),
-        decimated(run, 125.0),
-    ]
-    for copy in copies:
+    held = velocity[np.arange(len(velocity)) // 4 * 4]
+    alone = (velocity, np.round(velocity / 0.05) * 0.05, held)
+    copies = [replace(run, velocity=each, velocity_desired=None) for each in alone]
+    for copy in (run, *copies, decimated(run, 125.0)):
         found = analyse(copy, LIBRARY).findings
         assert [each.label for each in found] == ["oscillations"]
 
 
 def test_the_first_motion_after_standing_is_compared_with_the_motion_that_follows():
     run = run_of("leg")
-    still = Run(
-        time=run.time,
-        velocity=np.where(run.time[:, None] < 1.9, 1e-3 * run.velocity, run.velocity),
-        velocity_desired=np.where(run.time[:, None] < 1.9, 0.0, run.velocity_desired),
-        joint_names=run.joint_names,
-    )
+    early = run.time[:, None] < 1.9
+    velocity = np.where(early, 1e-3 * run.velocity, run.velocity)
+    desired = np.where(early, 0.0, run.velocity_desired)
+    still = replace(run, velocity=velocity, velocity_desired=desired)
     assert analyse(still, LIBRARY).status is Status.OK
 
 

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import python
+from commandline import python, ran
 
 from noisemodel import Run, decimated, runfile
 
@@ -165,14 +165,8 @@ def test_the_commands_of_a_page_run(page, scratch):
         calls = [line for line in block.calls if not block.left_out(line)]
         # After each: its status is kept for `echo $?`, and a mark ends its output.
         script = "".join(f"{line}\ns=$?; printf '\\036%s\\037' $s; (exit $s)\n" for line in calls)
-        done = subprocess.run(
-            ["bash", "-c", script],
-            cwd=folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-        )
+        alone = {"cwd": folder, "env": environment, "stdin": subprocess.DEVNULL}
+        done = ran("bash", "-c", script, **alone)
         ended = re.findall(r"(.*?)\x1e(\d+)\x1f", done.stdout, re.S)
         assert len(ended) == len(calls), done.stderr
         for line, (_, status) in zip(calls, ended, strict=True):

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
-from simulated import PLAIN, simulated
+from simulated import PLAIN, simulated, stub
 
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios.dataset import (
@@ -30,7 +30,7 @@ from noiseclassifier.scenarios.simulation import (
     _refuse_rattling,
     faults_of,
 )
-from noisemodel import Block, Run
+from noisemodel import Run
 
 GO2 = WIDE["go2"]
 
@@ -120,19 +120,8 @@ def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypat
     def fall(robot, fault, seed, **_):
         if fault == GOOD and seed == 10_001:
             raise SimulationError(1.0, "it fell")
-        time = np.arange(4000) / 2000
-        still = np.zeros((4000, 1), dtype=np.float32)
-        return Run(
-            time=time,
-            joint_names=("shoulder_pan_joint",),
-            velocity=still,
-            velocity_desired=still,
-            position=still,
-            stages={"planned": still},
-            robot="ur5",
-            blocks=(Block(0.0, 2.0, "ok"),),
-            meta={"domain": drawn(control="pd").as_dict(), "events": []},
-        )
+        made, meta = stub(robot, fault, seed), {"domain": drawn(control="pd").as_dict()}
+        return replace(made, stages={"planned": made.velocity}, meta={**meta, "events": []})
 
     monkeypatch.setattr("noiseclassifier.scenarios.dataset.simulate", fall)
     folder = Folder.opened(tmp_path / "data", wide=True)

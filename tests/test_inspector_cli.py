@@ -1,12 +1,12 @@
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from commandline import call as inspector
+from commandline import python
 from generalmodel import fixed
 
 from inspector.library import demo_run, model_files
@@ -212,13 +212,9 @@ def imported_by(*arguments):
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         "print('imported:', *sorted(sys.modules))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'models'}"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    env = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'models'}"}
+    done = python("-c", code, env=env)
+    assert done.returncode == 0, done.stderr
     return set(done.stdout.rpartition("imported:")[2].split())
 
 

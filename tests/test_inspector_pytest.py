@@ -2,12 +2,11 @@
 
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from commandline import python
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -37,16 +36,10 @@ def project(tmp_path):
 
     def call(tests, *options):
         (tmp_path / "test_robot.py").write_text(RUNS + tests)
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "inspector.pytest_plugin"]
-        command += ["-p", "no:cacheprovider", "--rootdir", tmp_path, "-c", "/dev/null"]
-        done = subprocess.run(
-            [*map(str, command), *map(str, options), str(tmp_path / "test_robot.py")],
-            cwd=ROOT,
-            env=os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},  # it may be installed, too
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = ["-m", "pytest", "-q", "-p", "inspector.pytest_plugin", "-p", "no:cacheprovider"]
+        command += ["--rootdir", tmp_path, "-c", "/dev/null", *options, tmp_path / "test_robot.py"]
+        env = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # it may be installed, too
+        done = python(*command, cwd=ROOT, env=env)
         return done.returncode, done.stdout + done.stderr
 
     return call

@@ -109,8 +109,7 @@ def toml(ranges, labels):
     return f"[data]\nchunk_ranges = {ranges}\nchunk_labels = {labels}\n"
 
 
-TIME = np.arange(1000) / 100
-RUN = Run(time=TIME, velocity=np.zeros((1000, 1)), joint_names=("elbow",))
+RUN = run_with()
 
 
 def reading(tmp_path, name, content):

@@ -12,8 +12,6 @@ from noiseclassifier.profile import HIGHEST, INPUTS, LOWEST, columns
 from noiseclassifier.signals import JOINTS, MOTION
 
 GENERAL = Path(__file__).parents[1] / "models" / "general.npz"
-
-
 FAST = nc.LogBands(quick=0.02, speed=True)
 LOG = {"bands": "log", "edges": (15.0, 30.0), "reference": True}
 AT_THE_END = "effort_joints at the end a reference"

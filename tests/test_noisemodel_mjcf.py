@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
+from test_noisemodel_meshes import stl
 
 import noisemodel as nm
 from noisemodel import MeshError, Robot, RobotError, Run, UnknownRobotError, mjcf
@@ -239,10 +240,8 @@ STL = np.random.default_rng(0).normal(size=(20, 3, 3)).astype("<f4")
 
 
 def write_stl(path):
-    facets = np.zeros(len(STL), [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")])
-    facets["c"] = STL
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(bytes(80) + len(STL).to_bytes(4, "little") + facets.tobytes())
+    path.write_bytes(stl(STL))
 
 
 def test_a_mesh_is_scaled_and_placed_as_mujoco_does(tmp_path):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from chains import BAR, chain, motion, surface_speed
+from chains import BAR, as_run, chain, motion, surface_speed
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -194,12 +194,6 @@ def test_distances_that_are_not_positive_are_refused(distance):
 EVERY = ("revolute", "continuous", "prismatic", "planar", "floating", "revolute")
 
 
-@pytest.fixture(scope="module")
-def panda():
-    robot = Robot.load("panda")
-    return robot, Surface.of(robot)
-
-
 @pytest.fixture(params=["0 0 1", "1 2 3"])
 def every(request, tmp_path):
     """A robot that has every kind of joint, and a moving base."""
@@ -260,9 +254,8 @@ def test_a_mimic_joint_drives_its_link_by_its_multiple_of_the_leader(tmp_path):
     assert b[:, 1].all()
 
 
-def test_a_floating_base_is_carried_by_nothing():
-    robot = Robot.load("solo12")
-    surface = Surface.of(robot)
+def test_a_floating_base_is_carried_by_nothing(solo):
+    robot, surface = solo
     q, v = motion(robot)
     a, b, c = terms(robot, surface, q, v)
     assert not a[:, 0].any()
@@ -274,10 +267,9 @@ def test_a_floating_base_is_carried_by_nothing():
     assert (c[:, 0] > only).all()
 
 
-def test_mean_squares_are_the_kinetic_energy_of_bodies_with_the_surfaces_for_masses():
+def test_mean_squares_are_the_kinetic_energy_of_bodies_with_the_surfaces_for_masses(solo):
     """2 T = sum of S <v²> for inertias of mass S, centroid r and S times the surface's own."""
-    robot = Robot.load("solo12")
-    surface = Surface.of(robot)
+    robot, surface = solo
     q, v = motion(robot)
     model = robot.model.copy()
     for index, link in zip(surface.joint, surface.links, strict=True):
@@ -291,15 +283,15 @@ def test_mean_squares_are_the_kinetic_energy_of_bodies_with_the_surfaces_for_mas
     assert np.allclose(squares, energy, rtol=1e-12)
 
 
-def test_an_unknown_kind_is_refused_with_those_that_there_are(panda):
+def test_an_unknown_kind_is_refused_with_those_that_there_are(solo):
     with pytest.raises(UnknownKindError, match=r"no kind 'loud' of noise; there are paper, A, B"):
-        extended(*panda, *motion(panda[0]), "loud")
+        extended(*solo, *motion(solo[0]), "loud")
 
 
-def test_the_surface_of_another_robot_is_refused(panda, tmp_path):
+def test_the_surface_of_another_robot_is_refused(solo, tmp_path):
     robot = chain(tmp_path, "revolute")
-    with pytest.raises(GeometryError, match="a surface of 9 links for 'chain', which has 1"):
-        extended(robot, panda[1], *motion(robot))
+    with pytest.raises(GeometryError, match="a surface of 13 links for 'chain', which has 1"):
+        extended(robot, solo[1], *motion(robot))
 
 
 @pytest.mark.parametrize("kind", ["paper", "normal"])
@@ -364,8 +356,7 @@ def test_vibration_has_no_running_mean_of_a_tenth_of_a_second():
 def test_what_is_missing_is_said_in_a_sentence_each(tmp_path):
     robot = chain(tmp_path, "revolute", "revolute", shapes=[BAR, ""], floating_base=True)
     time = np.arange(200) / 1000
-    pose = np.zeros((200, 7))
-    pose[:, 6] = 1.0
+    pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (200, 1))
     run = Run(
         time=time,
         velocity=np.ones((200, 1)),
@@ -411,18 +402,9 @@ def test_the_noise_of_a_floating_robot_is_the_extended_one(solo, kind, offset):
     robot, surface = solo
     q, v = vibration(robot, 400, moving=True)
     q[:, :3] = [0.3, -0.2, 0.5]
-    run = Run(
-        time=np.arange(400) / 1000,
-        velocity=v[:, 6:],
-        position=q[:, 7:],
-        velocity_desired=v[:, :5:-1],
-        position_desired=q[:, :6:-1] + offset,
-        joint_names=robot.joint_names,
-        desired_joint_names=robot.joint_names[::-1],
-        base_pose=q[:, :7],
-        base_velocity=v[:, :6],
-        robot="solo12",
-    )
+    desired = {"velocity_desired": v[:, :5:-1], "position_desired": q[:, :6:-1] + offset}
+    names = robot.joint_names[::-1]
+    run = as_run(robot, q, v, robot="solo12", desired_joint_names=names, **desired)
     found = link_noise(run, kind)
     desired = dict(zip(("q_desired", "v_desired"), robot.desired(run), strict=True))
     noise = extended(robot, surface, *robot.configuration(run), kind, **desired).power
@@ -455,13 +437,7 @@ def test_power_of_samples_is_averaged_in_bins_whatever_the_chunks(tmp_path, monk
     q, v = motion(robot, samples=95)
     valid = np.ones(95, dtype=bool)
     valid[[*range(20, 30), 33, 41, 42]] = False
-    run = Run(
-        time=np.arange(95) / 1000,
-        velocity=v * valid[:, None],
-        position=q * valid[:, None],
-        joint_names=robot.joint_names,
-        valid=valid,
-    )
+    run = as_run(robot, q * valid[:, None], v * valid[:, None], valid=valid)
     surface = Surface.of(robot)
     power = extended(robot, surface, *robot.configuration(run), "paper").power * valid[:, None]
     parts = [slice(first, first + 10) for first in range(0, 95, 10)]

@@ -91,8 +91,7 @@ def filled():
     valid = np.ones(100, dtype=bool)
     valid[40:45] = False
     signals = {name: random.standard_normal((100, 2)) * valid[:, None] for name in names}
-    pose = np.zeros((100, 7))
-    pose[:, 6] = 1.0
+    pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (100, 1))
     return run(
         velocity=random.standard_normal((100, 2)) * valid[:, None],
         stages={"motor": random.standard_normal((100, 2))},
@@ -167,7 +166,6 @@ def test_blocks_are_clipped_to_a_cut():
             (0.05, 0.05),
             "0 samples from 0.05 s to 0.05 s, expected 2 at least; the run has 0 s to 0",
         ),
-        ((0.05, 0.01), "0 samples from 0.05 s to 0.01 s"),
         ((0.05, 0.0505), "1 samples from"),
         ((7.0, 8.0), "0 samples from 7 s to 8 s, .* the run has 0 s to 0.099 s"),
         ((np.nan, np.nan), "0 samples from nan s"),

@@ -314,10 +314,14 @@ def content(array, version=(1, 0)):
     return stream.getvalue()
 
 
-def stated(shape, kind="<f8", data=b"", version=b"\x01\x00"):
+def headed(text, data=b""):
     """An array's header, as it may be written by anybody, and its bytes."""
-    header = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
-    return b"\x93NUMPY" + version + struct.pack("<H", len(header)) + header.encode() + data
+    header = text.ljust(117) + "\n"
+    return b"\x93NUMPY\1\0" + struct.pack("<H", len(header)) + header.encode() + data
+
+
+def stated(shape, kind="<f8", data=b""):
+    return headed(f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}", data)
 
 
 def packed(path, method=STORED, **members):

@@ -83,8 +83,6 @@ def test_what_is_fixed_to_a_link_belongs_to_it_and_links_without_geometry_have_n
 @pytest.mark.parametrize(
     ("scale", "expected"),
     [
-        ("1 1 1", 22.0),
-        ("-1 1 1", 22.0),
         ("0.001 -0.001 0.001", 22e-6),
         ("2 1 1", 2 * (2 * 2 + 2 * 3 + 2 * 3)),
         ("1 1 -3", 2 * (1 * 2 + 1 * 9 + 2 * 9)),
@@ -179,7 +177,6 @@ def test_an_unknown_geometry_is_named(tmp_path):
     ("geometry", "message"),
     [
         ('<sphere radius="1 2"/>', "radius of <sphere> is '1 2', expected 1 finite number$"),
-        ("<sphere/>", "radius of <sphere> is '', expected 1 finite number$"),
         ('<capsule radius="1"/>', "and length of <capsule> is '1 ', expected 2 finite numbers$"),
         ('<box size="a b c"/>', "size of <box> is 'a b c', expected 3 finite numbers$"),
         ("<cone/>", f"<cone> is not known, {EXPECTED}"),
@@ -189,7 +186,6 @@ def test_an_unknown_geometry_is_named(tmp_path):
         ('<cylinder radius="inf" length="1"/>', "radius and length of <cylinder> is 'inf 1'"),
         ('<mesh filename="package://a.stl" scale="1 0 1"/>', "scale '1 0 1' flattens the mesh"),
         ('<mesh filename="package://a.stl" scale="nan 1 1"/>', "scale of <mesh> is 'nan 1 1'"),
-        ('<mesh scale="1 1"/>', "scale of <mesh> is '1 1', expected 3 finite numbers$"),
     ],
 )
 def test_a_shape_of_impossible_size_is_named_with_its_link(tmp_path, geometry, message):
@@ -202,9 +198,6 @@ def test_a_shape_of_impossible_size_is_named_with_its_link(tmp_path, geometry, m
     ("content", "scale", "message"),
     [
         (None, "1 1 1", r"mesh package://a.obj: not found in .*names a folder of meshes elsewhere"),
-        ("", "1 1 1", r"mesh .*/a.obj: is empty"),
-        ("v 0 0 0\n", "1 1 1", r"mesh .*/a.obj: has no triangles"),
-        (TRIANGLE.replace("0 1 0", "0 1 nan"), "1 1 1", "a.obj: has corners that are not finite"),
         (TRIANGLE.replace("0 1 0", "2 0 0"), "1 1 1", "a.obj: has an area of 0 m² with its scale"),
         (TRIANGLE, "1e-170 1e-170 1", "a.obj: has an area of 0 m²"),
         (TRIANGLE, "1e200 1e200 1", "a.obj: has an area of inf m²"),

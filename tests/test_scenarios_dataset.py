@@ -54,7 +54,6 @@ def test_robots_skip_scenarios_that_they_do_not_have_or_that_are_not_asked_for()
     [
         (["panda", "baxter"], [], "robot 'baxter' cannot be simulated"),
         (["panda"], ["7", "tow"], "no scenario 'tow'.*obstacle-toe"),
-        (["panda"], ["77"], "no scenario '77'"),
         (["talos", "panda"], ["torque-jump"], "no scenario is left for 'panda'; it has straight"),
         ([], [], "no robot is named; there are talos"),
     ],

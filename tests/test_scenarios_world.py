@@ -93,8 +93,7 @@ def _lifted(robot, foot, height):
 def test_one_step_follows_a_slow_motion(robot):
     body = stand(robot)
     for tick in range(50):
-        places, turns, centre, base = _targets(robot, 1e-3 * tick)
-        body.follow(places, turns, centre, base)
+        body.follow(*_targets(robot, 1e-3 * tick))
     (left, _), _, _ = reached(robot, body.configuration)
     assert left.translation[2] == pytest.approx(0.049, abs=1e-5)
 

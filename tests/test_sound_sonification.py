@@ -4,11 +4,11 @@ import wave
 import numpy as np
 import pytest
 from commandline import call as inspector
+from test_audit_bandwidth import run_of as of_velocities
 
 import noisemodel as nm
 from inspector.errors import InspectorError
 from inspector.export.sound import clip, common_gain, remarks, sonify
-from noisemodel import Run
 
 RATE = 10_000.0
 
@@ -19,10 +19,7 @@ def times(seconds=2.0, rate=RATE):
 
 def run_of(*columns, rate=RATE, **fields):
     """A run whose joints have the given velocities."""
-    velocity = np.column_stack(columns)
-    names = tuple(f"joint{i}" for i in range(velocity.shape[1]))
-    time = times(len(velocity) / rate, rate)
-    return Run(**({"time": time, "velocity": velocity, "joint_names": names} | fields))
+    return of_velocities(np.column_stack(columns), rate, **fields)
 
 
 def tone(hertz, seconds=2.0, rate=RATE):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_noisemodel_runfile import headed, packed
 
 import noiseclassifier as nc
 from inspector.errors import LogError
@@ -20,17 +21,6 @@ from noisemodel.types import MeshError
 READERS = ((Run.load, RunFileError), (read_log, LogError))
 MODELS = (lambda path: load_library([path]), nc.FileError)
 LAUGHS = "".join(f'<!ENTITY l{n + 1} "{f"&l{n};" * 10}">' for n in range(9))
-
-
-def npz(path: Path, **headers: str) -> Path:
-    """An archive with arrays that their headers describe, and zeros in them."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, header in headers.items():
-            text = header.ljust(117).encode() + b"\n"
-            archive.writestr(
-                f"{name}.npy", b"\x93NUMPY\1\0" + len(text).to_bytes(2, "little") + text
-            )
-    return path
 
 
 def test_a_scene_whose_instances_double_is_refused(tmp_path):
@@ -183,7 +173,8 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):
     ],
 )
 def test_a_broken_header_of_an_array_is_one_line(tmp_path, header):
-    path = npz(tmp_path / "run.npz", time=header, velocity=header)
+    array = headed(header)
+    path = packed(tmp_path / "run.npz", zipfile.ZIP_DEFLATED, time=array, velocity=array)
     for read, error in READERS:
         with pytest.raises(error, match="time") as caught:
             read(path)

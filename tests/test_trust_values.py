@@ -31,8 +31,7 @@ def test_a_stamp_that_is_no_time_is_named(tmp_path, stamp):
 
 @pytest.mark.parametrize("command", ["classify", "audit", "noise", "view"])
 def test_a_base_that_moves_without_joints_gives_a_result_or_one_line(tmp_path, command):
-    pose = np.zeros((4000, 7))
-    pose[:, 6] = 1.0
+    pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (4000, 1))
     stamps = np.arange(4000) / 1000
     twist = np.sin(5.0 * stamps)[:, None] * np.ones(6)
     base = {"base_pose": pose, "base_velocity": twist}

@@ -7,6 +7,7 @@ import sysconfig
 from pathlib import Path
 
 import pytest
+from commandline import ran
 
 ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.slow
@@ -45,18 +46,8 @@ def called(installed, tmp_path):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("raise ImportError('a neighbour was imported')\n")
     variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-
-    def call(program, *arguments):
-        return subprocess.run(
-            [installed / "bin" / program, *arguments],
-            cwd=tmp_path,
-            env=variables | {"DISPLAY": ""},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
-    return call
+    alone = {"cwd": tmp_path, "env": variables | {"DISPLAY": ""}}
+    return lambda program, *arguments: ran(installed / "bin" / program, *arguments, **alone)
 
 
 def test_the_wheel_carries_what_the_commands_use(installed):
