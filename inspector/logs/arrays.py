@@ -123,17 +123,9 @@ def log_of(
 ) -> Log:
     """Log of the arrays of one episode.
 
-    Args:
-        stated: What states the rate, and the rate, in [Hz].
-        joints: Names of the columns of arrays, by the arrays' names.
-        stamps: Of all arrays; those of one of the arrays unless given.
+    ``stated`` is what states the rate, and that in [Hz]; ``joints`` names the columns of arrays.
     """
-    every = arrays
-    arrays = {  # that may be of samples; times as columns of one dimension
-        n: each[:, 0] if each.shape[1:] == (1,) and n.rpartition("/")[2].lower() in TIMES else each
-        for n, each in arrays.items()
-        if each.ndim in (1, 2) and len(each) > 1
-    }
+    every, arrays = arrays, _of_samples(arrays)
     options = options.for_columns(path, [*arrays])
     mapped = options.mapped
     naming = Naming.of((n for n, e in arrays.items() if e.ndim == 1), options.known_joints)
@@ -147,12 +139,11 @@ def log_of(
     if not motion:
         raise _nothing(path, every, not_read)
     if not stamps:
-        time, arrays = _time(arrays, options)
-        commands = [name for name, what in roles.items() if what == COMMAND]
-        arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], commands)
+        name, arrays = _time(arrays, options)
+        commands = [each for each, what in roles.items() if what == COMMAND]
+        arrays = _of_one_length(path, arrays, [*([name] if name else []), *motion], commands)
         stamps = Stamps.counted(len(arrays[motion[0]]))
-        if time:
-            stamps = stamps_of(path, time, arrays[time], options.rate)
+        stamps = stamps_of(path, name, arrays[name], options.rate) if name else stamps
         stamps = replace(stamps, stated=stated)
     time, samples = stamps.name, len(stamps.time)
     fields = [
@@ -179,6 +170,15 @@ def log_of(
         time=time,
     )
     return gathered(log, options)
+
+
+def _of_samples(arrays: Arrays) -> Arrays:
+    """Arrays that may be of samples; times as columns of one dimension."""
+    return {
+        n: each[:, 0] if each.shape[1:] == (1,) and n.rpartition("/")[2].lower() in TIMES else each
+        for n, each in arrays.items()
+        if each.ndim in (1, 2) and len(each) > 1
+    }
 
 
 def gathered(log: Log, options: ReadOptions) -> Log:
