@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from generalmodel import fixed
@@ -143,6 +145,12 @@ def test_a_frame_requires_a_stretch_without_a_gap():
     assert "no stretch of 0.4 s without a gap" in summary(audit(broken, LIBRARY))[0]
     with pytest.raises(CannotTellError, match="no stretch of 0.6 s without a gap"):
         label_run(broken, LIBRARY)
+
+
+def test_warnings_end_with_a_full_stop_or_the_mark_of_their_question():
+    found = audit(noisy_run(1000.0), LIBRARY)
+    for warnings, line in ((("a", "b"), "Warnings: a; b."), (("a", "b?"), "Warnings: a; b?")):
+        assert summary(replace(found, warnings=warnings), classes=False) == (line,)
 
 
 def test_a_run_without_findings_in_which_nothing_is_observable_is_not_ok(tmp_path):

@@ -304,8 +304,11 @@ def text(name: str, audit: Audit, assumed: str = "") -> str:
 
 def summary(audit: Audit, *, classes: bool = True) -> tuple[str, ...]:
     """Write the one or two lines that a report has for an audit: classes, then warnings."""
-    warnings = f"Warnings: {'; '.join(audit.warnings)}." if audit.warnings else ""
-    return tuple(line for line in (_sentence(audit) if classes else "", warnings) if line)
+    warnings = "; ".join(audit.warnings)
+    lines = [_sentence(audit)] if classes else []
+    if warnings:
+        lines.append(f"Warnings: {warnings}{'' if warnings.endswith('?') else '.'}")
+    return tuple(filter(None, lines))
 
 
 def shortcomings(audit: Audit) -> tuple[str, ...]:
