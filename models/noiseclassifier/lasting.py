@@ -160,7 +160,7 @@ class Windows(ABC):
 class Lasting(Windows):
     """Finds lines that last in signals that come in chunks of any size."""
 
-    LEAST = 8
+    LEAST = 8  # one at a time takes a third longer
 
     def __init__(self, rate: float, *, start: float = 0.0) -> None:
         super().__init__(rate, WINDOW, HOP, start)
