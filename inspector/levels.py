@@ -139,15 +139,13 @@ def in_bands(frequency: Array, amplitude: Array, edges: Array) -> Array:
 
     Frequencies of shape (bins,) and edges of shape (bands + 1,) are in order.
     """
-    firsts = np.searchsorted(frequency, edges[:-1])
-    lasts = np.searchsorted(frequency, edges[1:])
-    middles = np.sqrt(edges[:-1] * edges[1:])
-    nearest = np.abs(frequency[:, None] - middles).argmin(axis=0)
-    rows = [
-        amplitude[first:last].max(axis=0) if last > first else amplitude[near]
-        for first, last, near in zip(firsts, lasts, nearest, strict=True)
-    ]
-    return np.stack(rows)
+    firsts = np.searchsorted(frequency, edges)
+    empty = firsts[:-1] == firsts[1:]
+    middles = np.sqrt(edges[:-1] * edges[1:])[empty]
+    found = np.empty((len(empty), *amplitude.shape[1:]))
+    found[empty] = amplitude[np.abs(frequency[:, None] - middles).argmin(axis=0)]
+    found[~empty] = np.maximum.reduceat(amplitude[: firsts[-1]], firsts[:-1][~empty])
+    return found
 
 
 def window_length(rate: float) -> int:

@@ -574,7 +574,9 @@ class FrameFeatures:
         self, wanted: Index, samples: Array, known: Frames, resolution: Resolution
     ) -> Frames:
         """Known windows and those that start at wanted samples, in order, and their energies."""
-        fresh = np.setdiff1d(wanted, known[0])
+        # Of few windows at a time, as a stream has them, sets are faster than arrays.
+        unknown = set(wanted.ravel().tolist()) - set(known[0].tolist())
+        fresh = np.array(sorted(unknown), dtype=np.intp)
         windows = np.lib.stride_tricks.sliding_window_view(samples, resolution.window, -1)
         at_once = max(1, AT_ONCE // (self._rows * resolution.window))
         parts = [known[1]]

@@ -102,9 +102,12 @@ class Windows(ABC):
             return
         names = [name for name in self.SIGNALS if name in signals]
         fresh = np.stack([np.asarray(signals[name], np.float64) for name in names])
-        gaps = [] if valid is None else np.flatnonzero(np.diff(valid, prepend=True)).tolist()
+        if valid is None or valid.all():
+            self._take(fresh)
+            return
+        gaps = np.flatnonzero(np.diff(valid, prepend=True)).tolist()
         for first, stop in pairwise([0, *gaps, fresh.shape[2]]):
-            if valid is None or first == stop or valid[first]:
+            if first == stop or valid[first]:
                 self._take(fresh[..., first:stop])
             else:
                 self.skip(stop - first)
