@@ -20,7 +20,6 @@ from inspector.reference import store
 from inspector.reference.difference import Difference, difference
 from inspector.reference.difference import Gate as DifferenceGate
 from inspector.reference.verdicts import Gate, References, classes_found
-from inspector.report import html
 from inspector.report.formats import DIFF_FORMATS, FORMATS, text
 from inspector.report.picture import over_reference, require
 from inspector.text import progress
@@ -90,16 +89,16 @@ def classify(
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
     formats = FORMATS | {"text": partial(text, verbose=verbose)}
     outputs = shared.outputs_of(write, formats, overwrite=overwrite)
+    draw = None
     if report:
         require("a report")
-        shared.prepare(report, html.PAGE, overwrite=overwrite)
-        outputs[report] = partial(html.write_index, folder=report)
+        draw = partial(_index_in(report, outputs, overwrite=overwrite).draw, folder=report)
     classified = classify_files(
         found,
         library,
         reading=ctx.obj,
         unknown=unknown,
-        draw=None if report is None else partial(html.draw, folder=report),
+        draw=draw,
         reference=references if references.of else None,
         jobs=shared.jobs_or_dask(jobs, dask),
         resume=resume,
@@ -116,6 +115,15 @@ def classify(
     if remark := left_out(others):
         typer.echo(f"inspector: {remark}", err=True)
     _end(verdicts, shared.written(verdicts, formats[format], outputs))
+
+
+def _index_in(folder: Path, outputs: dict[Path, Any], *, overwrite: bool) -> Any:
+    """The module of pages, which takes long to import; the index becomes one of the outputs."""
+    from inspector.report import html
+
+    shared.prepare(folder, html.PAGE, overwrite=overwrite)
+    outputs[folder] = partial(html.write_index, folder=folder)
+    return html
 
 
 def _classes(given: Sequence[str], library: Library) -> tuple[str, ...]:
@@ -373,9 +381,8 @@ def merge(
             found[verdict.path] = verdict, path
     merged = [verdict for verdict, _ in found.values()]
     if report is not None:
-        shared.prepare(report, html.PAGE, overwrite=overwrite)
+        html = _index_in(report, outputs, overwrite=overwrite)
         merged = [html.with_picture(each, report) for each in merged]
-        outputs[report] = partial(html.write_index, folder=report)
     _end(merged, shared.written(merged, FORMATS[format], outputs))
 
 
@@ -393,6 +400,8 @@ def history(
     Files are in order of their names, and named after their commit behind the last dash:
     0061-3f2a1c9.json. The exit status is 3 if one cannot be read; the others are shown.
     """
+    from inspector.report import html
+
     if output:
         refuse_existing(output, overwrite=overwrite)
     found = html.read_history(results)

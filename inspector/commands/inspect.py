@@ -30,7 +30,7 @@ from inspector.logs.read import Opened, Reading
 from inspector.reference.judging import Comparison
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import References, seen
-from inspector.report import html, sentence
+from inspector.report import sentence
 from inspector.report.formats import case_of
 from inspector.report.picture import require
 from inspector.text import cell, progress
@@ -154,6 +154,8 @@ def _picture(run: Path, output: Path, request: Request) -> None:
 
 def _page(run: Path, output: Path, request: Request) -> None:
     """Write one HTML page about a run: findings, picture, sound."""
+    from inspector.report import html
+
     require("a report")
     found, verdict, beside = _analysed(opened(run, request.reading), request)
     html.write(
