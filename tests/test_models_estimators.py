@@ -232,7 +232,7 @@ def test_trees_are_calibrated_by_trees_that_left_a_third_of_the_groups_out():
         logits.append(other.logits(features[test]))
         truth.append(targets[test])
     ours = Detector.fit(features, targets, groups, profile)
-    expected = calibrate(np.concatenate(logits), np.concatenate(truth))
+    expected = calibrate(np.concatenate(logits), np.concatenate(truth), np.ones(300))
     np.testing.assert_allclose(ours.calibration, expected)
     alone = Detector.fit(features, targets, ONE.repeat(300), profile)
     assert alone.calibration.tolist() == [1.0, 0.0, 0.0, 0.0]
@@ -275,9 +275,16 @@ def test_calibration_finds_the_scale_of_overconfident_logits():
     true = generator.normal(size=(20_000, 3)) * 1.5
     log_true = true - np.log(np.exp(true).sum(axis=1, keepdims=True))
     drawn = np.array([generator.choice(3, p=np.exp(row)) for row in log_true])
-    calibration = calibrate(2.5 * log_true, drawn)
+    calibration = calibrate(2.5 * log_true, drawn, np.ones(len(drawn)))
     assert calibration[0] == pytest.approx(1 / 2.5, rel=0.05)
     np.testing.assert_allclose(calibrated(2.5 * log_true, calibration), log_true, atol=0.2)
+
+
+def test_a_frame_that_counts_thrice_calibrates_as_three_of_it():
+    logits, targets = RANDOM.normal(size=(200, 3)), RANDOM.integers(3, size=200)
+    count = RANDOM.integers(1, 4, size=200)
+    expected = calibrate(logits.repeat(count, axis=0), targets.repeat(count), np.ones(count.sum()))
+    np.testing.assert_allclose(calibrate(logits, targets, count), expected, rtol=1e-3, atol=1e-3)
 
 
 @pytest.mark.parametrize(

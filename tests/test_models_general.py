@@ -144,7 +144,7 @@ def test_frames_are_evaluated_as_the_model_bound_to_their_log_decides_them(label
     assert trained().evaluate(part).as_dict() == expected.as_dict()
 
 
-def test_every_so_many_ok_frames_are_kept_and_all_others():
+def test_every_so_many_quiet_ok_frames_are_kept_and_all_others():
     ok, bad = recording(500.0, "ok", 0), recording(500.0, "impact", 0)
     for one, share in ((ok, 4), (bad, 1)):
         (whole, *_), (thin, *_) = (
@@ -155,12 +155,33 @@ def test_every_so_many_ok_frames_are_kept_and_all_others():
     assert bare.features.shape == (0, len(RECIPE.columns))
 
 
-def test_odds_are_corrected_for_frames_of_good_motion_that_were_left_out(monkeypatch):
-    plain = trained()
-    monkeypatch.setattr(Detector, "fit", lambda *_: plain.estimator)
-    thin = nc.General.train(frames(), RECIPE, thin=4)
-    shift = thin.estimator.calibration - plain.estimator.calibration
-    np.testing.assert_allclose(shift, [0.0, np.log(4), 0.0, 0.0], atol=1e-12)
+def test_an_ok_frame_that_is_louder_than_its_run_is_always_kept():
+    ok = recording(500.0, "ok", 0)
+    landing = len(ok.valid) * 3 // 4 if ok.valid is not None else 1500
+    louder = {name: np.array(each) for name, each in ok.signal.items()}
+    for each in louder.values():
+        each[..., landing : landing + 10] *= 30.0
+    (plain, *_), (loud, *_) = (
+        list(nc.frames_of([replace(ok, signal=signal)], RECIPE, thin=100))
+        for signal in (ok.signal, louder)
+    )
+    assert len(plain.labels) == 0
+    assert len(loud.labels) >= 4  # each instant is in four frames
+
+
+def test_quiet_ok_frames_count_for_those_that_were_left_out(monkeypatch):
+    counted, plain = [], trained()
+
+    def fit(*given):
+        counted.append(given[-1])
+        return plain.estimator
+
+    monkeypatch.setattr(Detector, "fit", fit)
+    some = frames()
+    nc.General.train(some, RECIPE, thin=4)
+    (weight,) = counted
+    assert set(weight[some.labels != "ok"]) == {1.0}
+    assert (weight[some.labels == "ok"] == 4.0).mean() > 0.9
 
 
 def test_features_relative_to_a_reference_are_never_novel():

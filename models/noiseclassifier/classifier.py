@@ -58,6 +58,7 @@ from noiseclassifier.signals import (
 
 # Of the inputs, those that training takes of each log: the others lack features of the first.
 TAKEN = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
+LOUD = 1.0  # mean of the features relative to the run from which a frame is loud
 UNBOUNDED = 1e9  # highest value of features relative to the run: they say nothing of novelty
 
 
@@ -337,7 +338,7 @@ class General:
 
         Args:
             frames: Of logs of any rates and signals, see `frames_of`.
-            thin: They hold every ``thin``-th `ok` frame, for which the odds are corrected.
+            thin: As `frames_of` had it; `ok` frames count for those that it left out.
 
         Raises:
             DatasetError: If the frames are of fewer than two classes.
@@ -349,16 +350,11 @@ class General:
         profile = recipe.at(HIGHEST, INPUTS[0])
         mean, scale = standard(features, profile)
         scaled = (features - mean) / scale
-        trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising)
-        relative = np.array([name.startswith(RELATIVE) for name in recipe.columns])
-        shift = np.zeros(1 + len(classes))
-        shift[1] = np.log(thin)  # of the odds of `ok`
-        trees = replace(
-            trees,
-            known=np.where(relative | unknown, UNBOUNDED, trees.known),
-            calibration=trees.calibration + shift,
-        )
-        model = cls(recipe, classes, trees, mean, scale, dict(frames.hashes))
+        few = (frames.labels == OK) & ~loud(frames.features, recipe)
+        weight = np.where(few, float(thin), 1.0)
+        trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising, weight)
+        known = np.where(relative(recipe) | unknown, UNBOUNDED, trees.known)
+        model = cls(recipe, classes, replace(trees, known=known), mean, scale, dict(frames.hashes))
         metrics = {"training": model.evaluate(frames).as_dict()}
         return replace(model, metrics=metrics, versions=modelfile.versions())
 
@@ -411,7 +407,7 @@ def frames_of(
     every other frame is enough.
 
     Args:
-        thin: Keep every ``thin``-th `ok` frame.
+        thin: Keep every ``thin``-th `ok` frame, and all that are loud: those are like failures.
 
     Yields:
         Frames of a recording in all features that there are, NaN where one is missing.
@@ -424,14 +420,26 @@ def frames_of(
             starts, features = frame_features(recording.signal, profile, recording.valid)
             begin, step = recording.start + starts / recording.rate, 1.0 / recording.rate
             truth = truth_of(begin, begin + profile.duration, within(recording), step=step)
-            ok = truth == OK
-            kept = np.flatnonzero((truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0)))
-            kept = kept[::2] if number else kept
-            full = np.full((len(kept), len(efforts)), np.nan, dtype=np.float32)
-            full[:, recipe.places(profile)] = features[kept]
+            full = np.full((len(starts), len(efforts)), np.nan, dtype=np.float32)
+            full[:, recipe.places(profile)] = features
             full[:, efforts] = np.nan  # their unit is not known, but relative to the run it is none
-            runs = np.full(len(full), recording.name)
-            yield Dataset(full, truth[kept], runs, {recording.name: recording.sha256})
+            ok = truth == OK
+            few = ok & ~loud(full, recipe)
+            kept = np.flatnonzero((truth != UNCLEAR) & (~few | (np.cumsum(few) % thin == 0)))
+            kept = kept[::2] if number else kept
+            runs = np.full(len(kept), recording.name)
+            yield Dataset(full[kept], truth[kept], runs, {recording.name: recording.sha256})
+
+
+def loud(features: Real, recipe: LogBands) -> Mask:
+    """Frames that are louder than their run so far, by features of shape (frames, features)."""
+    found: Mask = np.nanmean(features[:, relative(recipe)], axis=1) > LOUD
+    return found
+
+
+def relative(recipe: LogBands) -> Mask:
+    """Which features are relative to the run."""
+    return np.array([name.startswith(RELATIVE) for name in recipe.columns])
 
 
 # --- files, and the choice of a model

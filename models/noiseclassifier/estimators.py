@@ -272,20 +272,21 @@ def calibrated(logits: Array, calibration: Array) -> Array:
     return found
 
 
-def calibrate(logits: Array, targets: Index) -> Array:
+def calibrate(logits: Array, targets: Index, weight: Array) -> Array:
     """Calibration of the least log-loss; a class without frames is not shifted."""
     from scipy.optimize import minimize
 
     there, truth = np.unique(targets, return_inverse=True)
     classes, rows = logits.shape[1], np.arange(len(targets))
-    logits = logits.take(there, axis=1)
+    logits, share = logits.take(there, axis=1), weight / weight.sum()
 
     def loss(calibration: Array) -> tuple[float, Array]:
         found = calibrated(logits, calibration)
         excess = np.exp(found)
         excess[rows, truth] -= 1.0
-        slope = np.append((excess * logits).sum(), excess.sum(axis=0)) / len(targets)
-        return float(-found[rows, truth].mean()), slope
+        excess *= share[:, None]
+        slope = np.append((excess * logits).sum(), excess.sum(axis=0))
+        return float(-found[rows, truth] @ share), slope
 
     calibration = _identity(classes)
     best = minimize(loss, _identity(len(there)), jac=True, method="L-BFGS-B").x
@@ -459,15 +460,17 @@ class Detector(Trees):
         groups: Words,
         profile: Profile,
         rising: Index | None = None,
+        weight: Array | None = None,
     ) -> Self:
-        """Train trees on all frames, and calibrate them by trees that left a part out."""
+        """Train trees on weighted frames, and calibrate them by trees that left a part out."""
         from joblib import Parallel, delayed
 
+        weight = np.ones(len(targets)) if weight is None else weight
         parts = _parts(targets, groups)
         everything = np.arange(len(targets))
         parallel = Parallel(n_jobs=-1 if len(targets) > MANY else 1)
         fitted: list[Self] = parallel(
-            delayed(cls.uncalibrated)(features, targets, train, profile, rising)
+            delayed(cls.uncalibrated)(features, targets, train, profile, rising, weight)
             for train in (everything, *(train for train, _ in parts))
         )
         trees, *others = fitted
@@ -476,8 +479,9 @@ class Detector(Trees):
         if not sum(map(len, seen)):
             return trees
         logits = [one.logits(features[own]) for one, own in zip(others, seen, strict=True)]
-        truth = targets[np.concatenate(seen)]
-        return replace(trees, calibration=calibrate(np.concatenate(logits), truth))
+        own = np.concatenate(seen)
+        calibration = calibrate(np.concatenate(logits), targets[own], weight[own])
+        return replace(trees, calibration=calibration)
 
     @classmethod
     def uncalibrated(
@@ -487,6 +491,7 @@ class Detector(Trees):
         train: Index,
         profile: Profile,
         rising: Index | None = None,
+        weight: Array | None = None,
     ) -> Self:
         """Train trees on some of the frames, without calibration."""
         classes = int(targets.max()) + 1
@@ -494,7 +499,9 @@ class Detector(Trees):
         named = max(1, profile.rounds // NAMING)
         splits, leaf, prior = _boosted(features, targets, failing, classes, profile, named)
         detected = (targets > 0).astype(np.intp)
-        split, fall, odds = _boosted(features, detected, train, 2, profile, profile.rounds, rising)
+        split, fall, odds = _boosted(
+            features, detected, train, 2, profile, profile.rounds, rising, weight
+        )
         splits[:, :, 0], leaf[:, 0], prior[0] = split[:, :, 1], -fall[:, 1], odds[0] - odds[1]
         feature, threshold, missing, *left = splits.reshape(5, -1, profile.leaves - 1)
         return cls(
@@ -541,6 +548,7 @@ def _boosted(
     profile: Profile,
     rounds: int,
     rising: Index | None = None,
+    weight: Array | None = None,
 ) -> tuple[Array, Array, Array]:
     """Boosted trees of some of the frames; none in rounds of the profile beyond these."""
     from sklearn.ensemble import HistGradientBoostingClassifier
@@ -563,7 +571,8 @@ def _boosted(
         random_state=0,
     )
     with threadpool_limits(1):  # a thread that waits for a core keeps all others waiting
-        boosting.fit(_known(features[train]), targets[train])
+        own = None if weight is None else weight[train]
+        boosting.fit(_known(features[train]), targets[train], sample_weight=own)
     # Its trees are private attributes; a test compares ours with them. It has none for a class
     # without frames, and of two classes for the second alone.
     learnt = there if len(there) > 2 else there[1:]
