@@ -51,7 +51,8 @@ Read = tuple[nc.Recording | nc.Unanswered, nm.Run | None]
 Located = tuple[tuple[nc.Event, ...], tuple[nc.Event, ...]]
 ANY_RATE = "general"  # the profile of a model for any rate
 RATE = 10_000.0  # rate of a model of one rate unless another is given, in [Hz]
-THIN = 8  # a general model learns from every so many `ok` frames of a log
+# A general model learns from every so many quiet `ok` frames, but from all of a few logs.
+THIN, FEW = 8, 500
 # Profiles by name, at a rate in [Hz].
 PROFILES: dict[str, Callable[[float], nc.Profile]] = {
     "logbands": nc.LogBands().at,
@@ -244,16 +245,18 @@ def train(
     chosen = nc.ANY.at(LOWEST, (nc.NOISE,)) if rate is None else profile_at(profile, rate)
     refuse_existing(output, overwrite=overwrite)
     left_out = LeftOut()
-    read = progress(classified(inputs, rate, part, bare_too=True), "read", total=count(inputs))
+    files = count(inputs)
+    thin = THIN if files > FEW else 1
+    read = progress(classified(inputs, rate, part, bare_too=True), "read", total=files)
     usable = left_out.without((recording for recording, _ in read), chosen)
     model: nc.Classifier | nc.General
     try:
         if general:
-            parts = list(nc.frames_of(usable, nc.ANY, thin=THIN))
+            parts = list(nc.frames_of(usable, nc.ANY, thin=thin))
             if not parts:
                 raise nc.NoFrameError(0, nc.ANY.classes)
             frames = nc.Dataset.joined(parts)
-            model = nc.General.train(frames, nc.ANY, thin=THIN)
+            model = nc.General.train(frames, nc.ANY, thin=thin)
         else:
             frames = nc.Dataset.of(usable, chosen)
             model = nc.Classifier.train(frames, chosen)

@@ -350,8 +350,10 @@ class General:
         profile = recipe.at(HIGHEST, INPUTS[0])
         mean, scale = standard(features, profile)
         scaled = (features - mean) / scale
-        few = (frames.labels == OK) & ~loud(frames.features, recipe)
-        weight = np.where(few, float(thin), 1.0)
+        weight = None  # scikit-learn takes minutes for thresholds of few frames that have weights
+        if thin > 1:
+            few = (frames.labels == OK) & ~loud(frames.features, recipe)
+            weight = np.where(few, float(thin), 1.0)
         trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising, weight)
         known = np.where(relative(recipe) | unknown, UNBOUNDED, trees.known)
         model = cls(recipe, classes, replace(trees, known=known), mean, scale, dict(frames.hashes))

@@ -465,7 +465,6 @@ class Detector(Trees):
         """Train trees on weighted frames, and calibrate them by trees that left a part out."""
         from joblib import Parallel, delayed
 
-        weight = np.ones(len(targets)) if weight is None else weight
         parts = _parts(targets, groups)
         everything = np.arange(len(targets))
         parallel = Parallel(n_jobs=-1 if len(targets) > MANY else 1)
@@ -480,7 +479,8 @@ class Detector(Trees):
             return trees
         logits = [one.logits(features[own]) for one, own in zip(others, seen, strict=True)]
         own = np.concatenate(seen)
-        calibration = calibrate(np.concatenate(logits), targets[own], weight[own])
+        counts = np.ones(len(own)) if weight is None else weight[own]
+        calibration = calibrate(np.concatenate(logits), targets[own], counts)
         return replace(trees, calibration=calibration)
 
     @classmethod
