@@ -51,8 +51,8 @@ Read = tuple[nc.Recording | nc.Unanswered, nm.Run | None]
 Located = tuple[tuple[nc.Event, ...], tuple[nc.Event, ...]]
 ANY_RATE = "general"  # the profile of a model for any rate
 RATE = 10_000.0  # rate of a model of one rate unless another is given, in [Hz]
-# A general model learns from every so many quiet `ok` frames, but from all of a few logs.
-THIN, FEW = 8, 500
+MANY = 500  # logs above which a general model learns from a part of the quiet `ok` frames,
+THIN = 8  # which is every so many
 # Profiles by name, at a rate in [Hz].
 PROFILES: dict[str, Callable[[float], nc.Profile]] = {
     "logbands": nc.LogBands().at,
@@ -246,7 +246,7 @@ def train(
     refuse_existing(output, overwrite=overwrite)
     left_out = LeftOut()
     files = count(inputs)
-    thin = THIN if files > FEW else 1
+    thin = THIN if files > MANY else 1
     read = progress(classified(inputs, rate, part, bare_too=True), "read", total=files)
     usable = left_out.without((recording for recording, _ in read), chosen)
     model: nc.Classifier | nc.General

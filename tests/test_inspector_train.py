@@ -75,6 +75,8 @@ def test_a_model_for_any_rate_is_trained_and_evaluated_on_logs_of_several_rates(
     status, out, _ = call("train", logs, "-o", model)
     assert (status, "left out: 1 run below 80 Hz, e.g. log50" in out) == (0, True)
     assert set(nc.load(model).runs) == {"log100", "log125", "log500", "missing"}
+    counts = np.sum(nc.load(model).metrics["training"]["confusion"], axis=1)
+    assert counts[0] > 0.7 * counts[-1]  # of a few logs, all `ok` frames, as many as failures
     log(tmp_path / "new.npz", rate=200.0, seed=20)
     status, out, _ = call("evaluate", model, tmp_path / "new.npz", "--json")
     assert (status, json.loads(out)["runs"]) == (0, 1)

@@ -280,6 +280,16 @@ def test_calibration_finds_the_scale_of_overconfident_logits():
     np.testing.assert_allclose(calibrated(2.5 * log_true, calibration), log_true, atol=0.2)
 
 
+def test_trees_begin_with_the_odds_of_what_frames_count():
+    features, targets = RANDOM.normal(size=(300, 3)), np.repeat([0, 0, 1], 100)
+    weight = np.where(targets == 0, 8.0, 1.0)
+    profile = replace(PROFILE, rounds=8)
+    every = np.arange(300)
+    for own, odds in ((None, 2.0), (weight, 16.0)):
+        found = Detector.uncalibrated(features, targets, every, profile, None, own)
+        assert found.prior[0] == pytest.approx(np.log(odds))
+
+
 def test_a_frame_that_counts_thrice_calibrates_as_three_of_it():
     logits, targets = RANDOM.normal(size=(200, 3)), RANDOM.integers(3, size=200)
     count = RANDOM.integers(1, 4, size=200)

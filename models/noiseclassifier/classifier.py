@@ -58,7 +58,7 @@ from noiseclassifier.signals import (
 
 # Of the inputs, those that training takes of each log: the others lack features of the first.
 TAKEN = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
-LOUD = 1.0  # mean of the features relative to the run from which a frame is loud
+LOUD = 1.0  # mean of the features relative to the run above which a frame is loud
 UNBOUNDED = 1e9  # highest value of features relative to the run: they say nothing of novelty
 
 
@@ -338,7 +338,7 @@ class General:
 
         Args:
             frames: Of logs of any rates and signals, see `frames_of`.
-            thin: As `frames_of` had it; `ok` frames count for those that it left out.
+            thin: What `frames_of` was given: each quiet `ok` frame counts for so many.
 
         Raises:
             DatasetError: If the frames are of fewer than two classes.
@@ -352,8 +352,8 @@ class General:
         scaled = (features - mean) / scale
         weight = None  # scikit-learn takes minutes for thresholds of few frames that have weights
         if thin > 1:
-            few = (frames.labels == OK) & ~loud(frames.features, recipe)
-            weight = np.where(few, float(thin), 1.0)
+            quiet = (frames.labels == OK) & ~loud(frames.features, recipe)
+            weight = np.where(quiet, float(thin), 1.0)
         trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising, weight)
         known = np.where(relative(recipe) | unknown, UNBOUNDED, trees.known)
         model = cls(recipe, classes, replace(trees, known=known), mean, scale, dict(frames.hashes))
@@ -409,7 +409,8 @@ def frames_of(
     every other frame is enough.
 
     Args:
-        thin: Keep every ``thin``-th `ok` frame, and all that are loud: those are like failures.
+        thin: Keep every ``thin``-th of the quiet `ok` frames. Loud ones, which are most like
+            failures, are all kept.
 
     Yields:
         Frames of a recording in all features that there are, NaN where one is missing.
@@ -426,8 +427,8 @@ def frames_of(
             full[:, recipe.places(profile)] = features
             full[:, efforts] = np.nan  # their unit is not known, but relative to the run it is none
             ok = truth == OK
-            few = ok & ~loud(full, recipe)
-            kept = np.flatnonzero((truth != UNCLEAR) & (~few | (np.cumsum(few) % thin == 0)))
+            quiet = ok & ~loud(full, recipe)
+            kept = np.flatnonzero((truth != UNCLEAR) & (~quiet | (np.cumsum(quiet) % thin == 0)))
             kept = kept[::2] if number else kept
             runs = np.full(len(kept), recording.name)
             yield Dataset(full[kept], truth[kept], runs, {recording.name: recording.sha256})
