@@ -66,7 +66,7 @@ def test_a_run_and_a_data_set_name_the_software_that_they_depend_on(good, tmp_pa
     manifest = Folder.opened(tmp_path / "set", wide=True).path / "dataset.json"
     made = json.loads(manifest.read_text())
     assert made["versions"] == versions
-    manifest.write_text(json.dumps({**made, "versions": {"mujoco": "1"}, "recipe": 2}))
+    manifest.write_text(json.dumps({**made, "versions": {"mujoco": "1"}}))
     assert Folder.opened(tmp_path / "set", wide=True).path == tmp_path / "set"  # it is continued
 
 

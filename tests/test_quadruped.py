@@ -8,7 +8,7 @@ import pytest
 from simulated import simulated
 
 from noiseclassifier.scenarios import simulation
-from noiseclassifier.scenarios.domains import LIMITS, quadruped_motion, steady
+from noiseclassifier.scenarios.domains import LANDING, LIMITS, quadruped_motion, steady
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import Faults, Imperfections, no_defect
 from noiseclassifier.scenarios.labels import annotate
@@ -17,7 +17,6 @@ from noiseclassifier.scenarios.quadruped import (
     ACROSS,
     CHANGE,
     GAITS,
-    LANDING,
     NEAR,
     SHIFT,
     TILT,
@@ -35,7 +34,7 @@ from noiseclassifier.scenarios.quadruped import (
 )
 from noiseclassifier.scenarios.quadruped import plan as planned
 from noiseclassifier.scenarios.robots import WIDE
-from noiseclassifier.scenarios.simulation import SCENARIOS, Start, _trial
+from noiseclassifier.scenarios.simulation import FAULTS, SCENARIOS, Start, _trial, suited
 from noiseclassifier.scenarios.world import GRAVITY, reduced_model, sensors_of
 
 A1 = WIDE["a1"]
@@ -162,6 +161,10 @@ def test_motions_of_the_domain_are_wider_the_wilder():
         assert np.ptp(narrow) < 0.21 < 0.5 < np.ptp(wide)
     periods = [GO2.period * motion.period[0] for motion in wild]
     assert min(periods) < 0.35
+    for motions in (mild, wild):  # controllers differ at any wildness
+        landings = [motion.landing for motion in motions]
+        assert LANDING[0] <= min(landings) < 0.12 < 2.0 < max(landings) <= LANDING[1]
+        assert 60 < sum(motion.blind for motion in motions) < 140
 
 
 def test_steps_on_soft_drives_are_quick_trots_or_walks():
@@ -235,21 +238,45 @@ def test_weight_goes_from_pair_to_pair_and_does_not_jump(timing):
     np.testing.assert_array_equal(load[:, 0], load[:, TROT.groups.index(0, 1)])
 
 
-def test_a_foot_goes_up_and_comes_down_softly():
+@pytest.mark.parametrize("landing", [*LANDING, 1.0])
+def test_a_foot_goes_up_and_comes_down_and_lands_at_the_wanted_speed(landing):
     share = np.linspace(0, 1, 10001)
-    height = height_of(share)
+    height = height_of(share, landing)
     slope = np.gradient(height, share)
     assert height[[0, -1]] == pytest.approx([0, 0], abs=1e-12)
     assert height.max() == pytest.approx(1, abs=1e-12)
     assert np.argmax(height) == pytest.approx(TOP * 10000, abs=1)
-    assert slope[-1] == pytest.approx(-LANDING / (1 - TOP), rel=1e-2)
-    assert slope.min() < 10 * slope[-1]
+    assert slope[-1] == pytest.approx(-landing / (1 - TOP), rel=1e-2)
+    assert (np.diff(height) * np.sign(TOP - share[:-1]) > -1e-6).all()
     assert np.abs(np.diff(slope)).max() < 0.01
 
 
 def test_a_foot_is_over_its_place_before_it_may_touch():
     assert progress_of(np.array([0.0, ACROSS, 1.0])) == pytest.approx([0, 1, 1])
-    assert height_of(np.array([NEAR]))[0] < 0.35
+    assert height_of(np.array([NEAR]), LANDING[0])[0] < 0.35
+
+
+@pytest.mark.slow
+def test_feet_that_land_faster_are_louder():
+    levels = []
+    for landing in (0.1, 0.5, 2.0):
+        trial = run(GO2, Trot(landing=landing))
+        assert upright(trial)
+        fast = np.diff(trial.motion.velocity[::10], 2, axis=0)
+        levels.append(float(np.sqrt(np.mean(np.square(fast)))))
+    assert levels[0] < levels[1] < levels[2]
+
+
+@pytest.mark.parametrize("blind", [False, True])
+def test_blind_control_trots_upright_and_no_force_sensor_changes_it(blind):
+    motion = Trot(blind=blind)
+    deaf = FAULTS["quadruped"]["force-jump"]
+    good, wrong = (_trial(Start("go2", 1, motion), defect, 3.0) for defect in (no_defect, deaf))
+    assert upright(good)
+    assert wrong.events
+    assert (np.abs(good.motion.velocity - wrong.motion.velocity).max() == 0) == blind
+    assert ("force-jump" in suited("quadruped", motion)) != blind
+    assert ("limit-cycle" in suited("quadruped", motion)) != blind
 
 
 def test_feet_come_down_at_the_neutral_point(timing):

@@ -141,9 +141,6 @@ class Folder:
         try:
             if (path / MANIFEST).exists():
                 made = _made(path / MANIFEST)
-                # The latest recipe of wide domains only adds to those before.
-                if wide and made.get("recipe") in range(2, recipe):
-                    settings["recipe"] = made.get("recipe")
                 for key, wanted in settings.items():
                     if (found := made.get(key)) != wanted:
                         raise DatasetError(

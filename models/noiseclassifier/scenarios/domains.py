@@ -233,6 +233,8 @@ FASTEST = (0.5, 2.5)  # highest peak speed, mild and wild, in [rad/s]
 STANDS = 0.3  # share of motions in the air that begin with standing for a while
 STANDING = (1.5, 4.0)  # how long they stand, in [s]
 STANDS_STILL = 0.3  # share of the runs in which a humanoid only stands
+BLIND = 0.5  # share of the quadrupeds whose control knows no contact forces
+LANDING = (0.1, 2.5)  # speed at which their feet land, see `Trot`; that of a half sine is 2
 WAYS = ("straight", "curve", "directions", "spot")
 
 
@@ -298,13 +300,19 @@ def quadruped_motion(rng: Rng, wildness: float, robot: Simulated) -> Trot:
     period, height, posing = draw("period"), draw("height"), draw("posing")
     moves_body = gait == "stand" or float(rng.uniform()) < 0.4 * wildness
     pauses = int(rng.binomial(2, 0.4 * wildness)) if gait != "stand" else 0
+    way, speed, jitter = str(rng.choice(WAYS)), draw("speed"), draw("jitter")
+    # Controllers differ at any wildness.
+    landing = LANDING[0] * (LANDING[1] / LANDING[0]) ** float(rng.uniform())
+    blind = bool(rng.uniform() < BLIND)
     return Trot(
         gait=gait,
-        way=str(rng.choice(WAYS)),
+        way=way,
         period=(period, period),
         height=(height, height),
-        speed=draw("speed"),
-        jitter=draw("jitter"),
+        speed=speed,
+        jitter=jitter,
+        landing=landing,
+        blind=blind,
         posing=(posing, posing) if moves_body else (0.0, 0.0),
         pauses=pauses,
         duration=5.0 + 1.5 * pauses,

@@ -248,6 +248,8 @@ class Trot:
     pauses: int = 0
     pause: Range = (0.5, 1.0)  # how long it stands each time, in [s]
     posing: Range = (0.0, 0.0)
+    landing: float = 0.1  # speed at which feet land, in heights of a swing per time of descent
+    blind: bool = False  # whether the control knows no contact forces
 
 
 Motion: TypeAlias = Picks | Reach | Walk | Trot  # A motion of any family

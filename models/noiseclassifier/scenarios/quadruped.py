@@ -124,8 +124,6 @@ Foothold: TypeAlias = tuple[float, float, float]
 TOP = 0.4  # share of a swing after which the foot is highest
 ACROSS = 0.8  # share of a swing after which the foot is over its next foothold
 NEAR = 0.8  # share of a swing after which a contact is planned
-# Speed at which a foot is to touch the ground, in heights of its swing per time of its descent.
-LANDING = 0.1
 
 
 def progress_of(share: Array) -> Array:
@@ -133,12 +131,15 @@ def progress_of(share: Array) -> Array:
     return minimum_jerk(np.minimum(1, share / ACROSS))
 
 
-def height_of(share: Array) -> Array:
-    """Height of a foot after a share of its swing, 1 at the top."""
+def height_of(share: Array, landing: float) -> Array:
+    """Height of a foot after a share of its swing, 1 at the top; it lands at a speed.
+
+    The speed is in heights of the swing per time of the descent.
+    """
     up = minimum_jerk(np.minimum(1, share / TOP))
     left = np.clip((1 - share) / (1 - TOP), 0, 1)
     # From rest to the ground at the landing speed, without acceleration at either end.
-    down = minimum_jerk(left) + LANDING * left * (1 - left) ** 3 * (1 + 3 * left)
+    down = minimum_jerk(left) + landing * left * (1 - left) ** 3 * (1 + 3 * left)
     return np.where(share < TOP, up, down)
 
 
@@ -301,6 +302,7 @@ class GaitPlan(Plan):
     swing: Mask  # whether each foot is in the air, shape (ticks, feet)
     progress: Array  # completed share of the path of each foot; 1 in stance, shape (ticks, feet)
     load: Array  # planned share of the weight on each foot, shape (ticks, feet)
+    blind: bool  # whether the control knows no contact forces
 
 
 def plan(robot: Quadruped, motion: Trot, rng: Rng, duration: float) -> GaitPlan:
@@ -325,7 +327,7 @@ def plan(robot: Quadruped, motion: Trot, rng: Rng, duration: float) -> GaitPlan:
     share = swings(time, timing, gait)
     progress = progress_of(share)
     feet = np.zeros((len(time), len(robot.effectors), 3))
-    feet[..., 2] = standing.feet[:, 2] + height * height_of(share)
+    feet[..., 2] = standing.feet[:, 2] + height * height_of(share, motion.landing)
     contacts = []
     for foot, group in enumerate(gait.groups):
         own = [beat for beat in timing if beat.group == group]
@@ -353,6 +355,7 @@ def plan(robot: Quadruped, motion: Trot, rng: Rng, duration: float) -> GaitPlan:
         swing=share < 1,
         progress=progress,
         load=load,
+        blind=motion.blind,
         contacts=tuple(sorted(contacts, key=lambda contact: contact.start)),
         effectors=robot.effectors,
         torques=robot.drives.torque,
@@ -451,7 +454,7 @@ class Feet:
         feet = len(robot.effectors)
         self._plan, self._lever = plan, standing.feet
         self._lean = 1 + robot.attitude_gain  # from the commanded tilt to the measured one
-        self._gain = robot.force_gain * gain
+        self._gain = robot.force_gain * gain * (not plan.blind)
         self._load = plan.units.force * plan.load
         # A body at velocity v stops over a foot that stands v sqrt(h/g) ahead: the capture point.
         self._balance = BALANCE * np.sqrt(plan.units.length / GRAVITY)
@@ -492,6 +495,7 @@ class Feet:
         in_contact = (plan.progress[number] > DESCENDING) & (
             estimate.force > CONTACT * plan.units.force
         )
+        in_contact &= not plan.blind
         self._early = swing & (self._early | in_contact)
         tilt = estimate.pitch * self._lever[:, 0] - estimate.roll * self._lever[:, 1]
         levelling = LEVELLING * (self._lean * tilt - self._rise)
