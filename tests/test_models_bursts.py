@@ -70,6 +70,17 @@ def test_a_tone_that_comes_again_and_again_is_no_burst():
     assert found(velocity) == ()
 
 
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_line_that_rises_with_the_speed_of_its_joint_is_no_burst(whole):
+    time = np.arange(4000) / RATE
+    during = np.exp(-(((time - 5.0) / 0.3) ** 2))
+    speed = (0.3 + 6.0 * during) * np.sin(2 * np.pi * 2.0 * time)
+    line = 0.02 * (0.3 + 6.0 * during) * np.sin(2 * np.pi * 90.0 * time)
+    own = (np.arange(3) == 1)[:, None]
+    assert found(motion() + own * (speed + line), whole=whole) == ()
+    assert len(found(motion() + own * line, whole=whole)) == 1  # without the speed
+
+
 def test_an_octave_of_noise_is_no_burst():
     velocity = motion()
     waves = np.fft.rfft(np.random.default_rng(5).standard_normal(250))

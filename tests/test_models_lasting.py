@@ -68,6 +68,29 @@ def test_a_ripple_that_follows_the_speed_of_its_joint_is_no_finding():
     assert found(velocity + 0.05 * np.sin(60.0 * angle * 2.0 * np.pi)) == ()
 
 
+def stairs(speed, *, hold=0.01, seconds=4.0):
+    """Velocity of a drive, a spring and a damper, whose targets are held for a while."""
+    time, (velocity, position), out = motion(seconds)[0], (speed, 0.0), []
+    stiffness, damping = (2 * np.pi * 12.0) ** 2, 1.4 * 2 * np.pi * 12.0
+    target = speed / 12.0 * np.sin(12.0 * (time - time % hold))
+    for each in target.tolist():
+        velocity += (stiffness * (each - position) - damping * velocity) / RATE
+        position += velocity / RATE
+        out.append(velocity)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("speed", [1.0, 5.0, 25.0])
+def test_targets_that_are_held_leave_no_finding_however_fast_the_joint_is(speed):
+    time, slow = motion()
+    held = stairs(speed)
+    power, frequency = spectrum(np.diff(held[1000:2000]), RATE)
+    line = power[np.abs(frequency - 100.0) < 5.0].max()
+    assert found(slow + held) == ()
+    tone = np.sqrt(2.0 * line) * np.sin(2 * np.pi * 100.0 * time)
+    assert bool(found(slow + tone)) == (speed > 1.0)  # as loud, in joints that are slow
+
+
 def test_a_line_of_the_desired_motion_alone_is_no_finding():
     time, velocity = motion()
     steps = 0.3 * np.sin(2 * np.pi * 50.0 * time)

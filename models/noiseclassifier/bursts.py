@@ -18,7 +18,17 @@ from typing import Any
 import numpy as np
 
 from noiseclassifier.labels import Event
-from noiseclassifier.lasting import AROUND, MEASURED, STRONG, Windows, loud, merged, spectrum
+from noiseclassifier.lasting import (
+    AROUND,
+    MEASURED,
+    STRONG,
+    TINY,
+    Windows,
+    loud,
+    merged,
+    slow,
+    spectrum,
+)
 from noiseclassifier.signals import Array, Index
 
 WINDOW, HOP = 0.5, 0.125  # duration of a window, and time from one to the next, in [s]
@@ -29,17 +39,18 @@ LOWEST = 13.0  # lowest frequency, in [Hz]
 WIDTH = 5  # frequencies of a window that are one line
 NEAR = 5  # windows on either side that are no rest
 REST, PAST = 8, 16  # least windows of the rest of a file, and of the past of a stream
-# Thresholds: of 457 good runs of 24 simulated robots (0.76 h) at 1000 and 250 Hz, 8 have a burst,
-# of which 6 have a finding anyway. Of tones of half a second, 17, 51, 73 and 91 % are found at 10,
-# 15, 20 and 30 dB above the level of their joint and octave.
+# Thresholds: of 528 good runs of 24 simulated robots (0.88 h) at 1000 and 250 Hz, 6 have a burst.
+# Of tones of half a second, 31, 63, 81 and 88 % are found at 10, 15, 20 and 30 dB above the level
+# of their joint and octave.
 LEVEL = -50.0  # least level of a line, in [dB re 1 rad/s]
-PROMINENT = 25.0  # least level of a line over the median of the frequencies around it, in [dB]
+PROMINENT = 22.0  # least level of a line over the median of the frequencies around it, in [dB]
 # Score of a burst: that of a line of this strength that lasts. How much less the rest of the run
 # has is not known of a stream.
 SCORE = 1.0 - 0.5 * 10.0 ** (-(PROMINENT - STRONG) / 10.0)
 PURE = 0.7  # least share of a line in its octave
-# Least level of a line over the mean of the rest of the run at its frequencies, in [dB].
-ABOVE = 20.0
+# Least level of a line over the mean of the rest of the run at its frequencies, in [dB]. Where the
+# joint moves faster than in the rest, it is that much more: what a drive does rises with its speed.
+ABOVE = 18.0
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,8 @@ class Lines:
     place: Index  # the middle one of the frequencies
     power: Array  # the mean square
     near: Array  # sum of these over the windows nearby, and the own one
+    motion: Array  # mean square of the slow motion of its joint
+    moving: Array  # sum of these, as of ``near``
     windows: int  # how many these are
     first: int  # number of the first sample
 
@@ -69,6 +82,7 @@ class Bursts(Windows):
         super().__init__(rate, WINDOW + 1.0 / rate, HOP, start)
         self._whole = whole
         self._sum: Array = np.zeros(())  # of the spectra of all windows
+        self._frequency: Array = np.zeros(0)  # of a spectrum, in [Hz]
         self._windows = 0
         # The same before each of the latest windows, those that are nearby.
         self._recent: deque[Array] = deque(maxlen=NEAR + 1)
@@ -87,6 +101,7 @@ class Bursts(Windows):
 
     def _found(self, slopes: Array) -> Iterable[tuple[Array, Index, Index]]:
         power, frequency = spectrum(slopes[0], self.rate)
+        self._frequency = frequency
         row, window, place = prominent(power, frequency, self.rate)
         for number in range(power.shape[1]):
             own = window == number
@@ -103,16 +118,22 @@ class Bursts(Windows):
             return
         # Of the windows nearby, what is before them is subtracted until they have come.
         own, before = summed(power, row, place), summed(self._recent[0], row, place)
-        lines = Lines(row, place, own, -before, len(self._recent) - self._windows, self._first)
+        motion, moved = self._motion(power, row), self._motion(self._recent[0], row)
+        count = len(self._recent) - self._windows
+        lines = Lines(row, place, own, -before, motion, -moved, count, self._first)
         if self._whole:
             self._open.append(lines)
         elif event := self._event(self._closed(lines), PAST):
             self._events = [*merged(*self._events, event)]
 
+    def _motion(self, power: Array, row: Index) -> Array:
+        return slow(power[row], self._frequency)
+
     def _closed(self, lines: Lines) -> Lines:
         """Lines of which the latest window is the last one nearby."""
         near = lines.near + summed(self._sum, lines.row, lines.place)
-        return replace(lines, near=near, windows=lines.windows + self._windows)
+        moving = lines.moving + self._motion(self._sum, lines.row)
+        return replace(lines, near=near, moving=moving, windows=lines.windows + self._windows)
 
     def _end(self, rest: Array) -> None:
         """Nothing ends: windows before a gap may have the same line as those after it."""
@@ -123,6 +144,8 @@ class Bursts(Windows):
         if windows < least:
             return None
         rest = (summed(self._sum, lines.row, lines.place) - lines.near) / windows
+        motion = (self._motion(self._sum, lines.row) - lines.moving) / windows
+        rest *= np.maximum(lines.motion / np.maximum(motion, TINY), 1.0)
         if not (lines.power >= 10.0 ** (ABOVE / 10.0) * rest).any():
             return None
         first = self.start + lines.first / self.rate

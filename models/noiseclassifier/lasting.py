@@ -45,6 +45,11 @@ FLOOR = -50.0  # level of a line whose strength is 0 at most, in [dB re 1 rad/s]
 STRONG = 18.0  # strength of a line in each of ``WINDOWS`` windows that makes it a finding, in [dB]
 WINDOWS = 3  # windows in a row; in a stretch that has fewer, all of them
 SHARP = 25.0  # strength in one window that makes a finding of a strong line of any length, in [dB]
+# Least level of a line over the motion of its joint, the level below ``LOWEST``, in [dB]. Targets
+# that a policy holds for a while leave lines in proportion to the motion. Of 352 good runs, 11 have
+# strong ones, all 28.6 dB or more below it; of 159 runs with oscillations, 143 have a strong line
+# less than 25.9 dB below it.
+MOVING = -27.0
 DRIFT = 2.0  # how far a line moves from one window to the next, in [Hz]
 # Level by which a line may be lower in each half of a window than in the window, in [dB].
 HALVES = 10.0
@@ -268,6 +273,8 @@ def strong(slopes: Array, rate: float, heard: Mask) -> list[list[Peak]]:
     rows, windows = np.nonzero(heard)
     line, frequency = spectrum(slopes[0, rows, windows], rate)
     pair, place = loud(line, frequency, STRONG + FLOOR, LOWEST, rate)
+    audible = line[pair, place] >= 10.0 ** (MOVING / 10.0) * slow(line, frequency)[pair]
+    pair, place = pair[audible], place[audible]
     if not len(place):
         return found
     pairs, pair = np.unique(pair, return_inverse=True)
@@ -308,6 +315,12 @@ def loud(
     own = power[*spectra, place]
     top = (own >= power[*spectra, place - 1]) & (own >= power[*spectra, place + 1])
     return tuple(each[top] for each in (*spectra, place))
+
+
+def slow(power: Array, frequency: Array) -> Array:
+    """Mean square of the motion, below `LOWEST`, of spectra of shape (..., frequencies)."""
+    total: Array = power[..., 1 : int(np.searchsorted(frequency, LOWEST))].sum(axis=-1)
+    return total
 
 
 def spectrum(slopes: Array, rate: float) -> tuple[Array, Array]:
