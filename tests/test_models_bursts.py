@@ -81,6 +81,16 @@ def test_a_line_that_rises_with_the_speed_of_its_joint_is_no_burst(whole):
     assert len(found(motion() + own * line, whole=whole)) == 1  # without the speed
 
 
+def test_a_line_that_the_rest_nearly_has_is_no_burst_even_of_a_joint_that_rests():
+    time = np.arange(4000) / RATE
+    during = (time >= 4.0) & (time < 4.5)
+    velocity = motion()
+    velocity[1] *= 1.0 - np.exp(-(((time - 4.25) / 0.5) ** 4))
+    for above, count in ((15.0, 0), (24.0, 1)):
+        tone = 0.02 * 10.0 ** (during * above / 20.0) * np.sin(2 * np.pi * 90.0 * time)
+        assert len(found(velocity + (np.arange(3) == 1)[:, None] * tone)) == count
+
+
 def test_an_octave_of_noise_is_no_burst():
     velocity = motion()
     waves = np.fft.rfft(np.random.default_rng(5).standard_normal(250))

@@ -91,6 +91,15 @@ def test_targets_that_are_held_leave_no_finding_however_fast_the_joint_is(speed)
     assert bool(found(slow + tone)) == (speed > 1.0)  # as loud, in joints that are slow
 
 
+@pytest.mark.parametrize("speed", [2.0, 20.0])
+def test_a_line_counts_from_27_db_below_the_motion_of_its_joint_on(speed):
+    time, velocity = motion()
+    velocity[1] += speed * np.sin(2 * np.pi * 3.0 * time)
+    for below, count in ((31.0, 0), (24.0, 1)):
+        line = 10.0 ** (-below / 20.0) * speed * np.sin(2 * np.pi * 60.0 * time)
+        assert len(found(velocity + np.outer([0, 1], line))) == count
+
+
 def test_a_line_of_the_desired_motion_alone_is_no_finding():
     time, velocity = motion()
     steps = 0.3 * np.sin(2 * np.pi * 50.0 * time)
