@@ -20,8 +20,8 @@ motion of a real robot was available.
 """
 OTHERS = """
 Robots and controllers of PyBullet and Drake (`python -m benchmarks.elsewhere`), never used in
-training. Legged robots have all of the false alarms. The model and its thresholds were fixed before
-this look."""
+training. Legged robots have all of the false alarms. The model and its alarm threshold were fixed
+before this look."""
 LASTING = """
 Other seeds of robots in wide domains: good runs, faults, tones over whole runs, and faults that are
 cut out of their runs. Then real logs of good motion, with tones of half a second added."""

@@ -81,6 +81,14 @@ def test_a_line_that_rises_with_the_speed_of_its_joint_is_no_burst(whole):
     assert len(found(motion() + own * line, whole=whole)) == 1  # without the speed
 
 
+@pytest.mark.parametrize("rms", [0.5, 1.0, 100.0])
+def test_a_loud_tone_in_the_only_motion_of_a_run_is_a_burst(rms):
+    velocity = 1e-3 * np.random.default_rng(4).standard_normal((3, 4000))
+    velocity[1, 1950:2300] += np.hanning(350)
+    assert found(velocity) == ()
+    assert len(found(with_tone(velocity, 90.0, rms, 4.0, 4.5))) == 1
+
+
 def test_a_line_that_the_rest_nearly_has_is_no_burst_even_of_a_joint_that_rests():
     time = np.arange(4000) / RATE
     during = (time >= 4.0) & (time < 4.5)

@@ -39,8 +39,8 @@ LOWEST = 13.0  # lowest frequency, in [Hz]
 WIDTH = 5  # frequencies of a window that are one line
 NEAR = 5  # windows on either side that are no rest
 REST, PAST = 8, 16  # least windows of the rest of a file, and of the past of a stream
-# Thresholds: of 528 good runs of 24 simulated robots (0.88 h) at 1000 and 250 Hz, 6 have a burst.
-# Of tones of half a second, 31, 63, 81 and 88 % are found at 10, 15, 20 and 30 dB above the level
+# Thresholds: of 528 good runs of 24 simulated robots (0.88 h) at 1000 and 250 Hz, 8 have a burst.
+# Of tones of half a second, 32, 65, 82 and 88 % are found at 10, 15, 20 and 30 dB above the level
 # of their joint and octave.
 LEVEL = -50.0  # least level of a line, in [dB re 1 rad/s]
 PROMINENT = 22.0  # least level of a line over the median of the frequencies around it, in [dB]
@@ -51,6 +51,9 @@ PURE = 0.7  # least share of a line in its octave
 # Least level of a line over the mean of the rest of the run at its frequencies, in [dB]. Where the
 # joint moves faster than in the rest, it is that much more: what a drive does rises with its speed.
 ABOVE = 18.0
+# Level of a line over the motion of its joint from which it is no ripple of that motion, in [dB]:
+# in good runs it has up to -16 dB.
+RIPPLE = -12.0
 
 
 @dataclass(frozen=True)
@@ -145,8 +148,10 @@ class Bursts(Windows):
             return None
         rest = (summed(self._sum, lines.row, lines.place) - lines.near) / windows
         motion = (self._motion(self._sum, lines.row) - lines.moving) / windows
-        rest *= np.maximum(lines.motion / np.maximum(motion, TINY), 1.0)
-        if not (lines.power >= 10.0 ** (ABOVE / 10.0) * rest).any():
+        least = 10.0 ** (ABOVE / 10.0) * rest
+        faster = least * np.maximum(lines.motion / np.maximum(motion, TINY), 1.0)
+        ripple = np.maximum(10.0 ** (RIPPLE / 10.0) * lines.motion, least)
+        if not (lines.power >= np.minimum(faster, ripple)).any():
             return None
         first = self.start + lines.first / self.rate
         return Event("oscillations", first + MARGIN, first + WINDOW - MARGIN, SCORE)
