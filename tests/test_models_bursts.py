@@ -52,6 +52,7 @@ def test_a_tone_is_one_burst_however_long_it_lasts(duration, rate):
         velocity = with_tone(motion(rate=rate), 90.0, 0.1, start, start + duration, rate=rate)
         (event,) = found(velocity, rate=rate)
         assert event.start < start + duration / 2 < event.stop
+        assert event.score == pytest.approx(0.8, abs=0.005)  # of a line of 22 dB
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -79,6 +80,8 @@ def test_a_line_that_rises_with_the_speed_of_its_joint_is_no_burst(whole):
     own = (np.arange(3) == 1)[:, None]
     assert found(motion() + own * (speed + line), whole=whole) == ()
     assert len(found(motion() + own * line, whole=whole)) == 1  # without the speed
+    fast = motion() + own * 0.8 * np.sin(2 * np.pi * 3.0 * time)
+    assert len(found(with_tone(fast, 90.0, 0.1, 5.0, 5.5), whole=whole)) == 1
 
 
 @pytest.mark.parametrize("rms", [0.5, 1.0, 100.0])
