@@ -130,7 +130,8 @@ class Bursts(Windows):
             self._events = [*merged(*self._events, event)]
 
     def _motion(self, power: Array, row: Index) -> Array:
-        return slow(power[row], self._frequency)
+        """Mean square of the slow motion of some joints, from the spectra of all."""
+        return slow(power, self._frequency)[row]
 
     def _closed(self, lines: Lines) -> Lines:
         """Lines of which the latest window is the last one nearby."""
@@ -148,9 +149,9 @@ class Bursts(Windows):
             return None
         rest = (summed(self._sum, lines.row, lines.place) - lines.near) / windows
         motion = (self._motion(self._sum, lines.row) - lines.moving) / windows
-        least = 10.0 ** (ABOVE / 10.0) * rest
-        faster = least * np.maximum(lines.motion / np.maximum(motion, TINY), 1.0)
-        ripple = np.maximum(10.0 ** (RIPPLE / 10.0) * lines.motion, least)
+        needed = 10.0 ** (ABOVE / 10.0) * rest
+        faster = needed * np.maximum(lines.motion / np.maximum(motion, TINY), 1.0)
+        ripple = np.maximum(10.0 ** (RIPPLE / 10.0) * lines.motion, needed)
         if not (lines.power >= np.minimum(faster, ripple)).any():
             return None
         first = self.start + lines.first / self.rate

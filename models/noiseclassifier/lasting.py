@@ -273,8 +273,8 @@ def strong(slopes: Array, rate: float, heard: Mask) -> list[list[Peak]]:
     rows, windows = np.nonzero(heard)
     line, frequency = spectrum(slopes[0, rows, windows], rate)
     pair, place = loud(line, frequency, STRONG + FLOOR, LOWEST, rate)
-    audible = line[pair, place] >= 10.0 ** (MOVING / 10.0) * slow(line, frequency)[pair]
-    pair, place = pair[audible], place[audible]
+    counts = line[pair, place] >= 10.0 ** (MOVING / 10.0) * slow(line, frequency)[pair]
+    pair, place = pair[counts], place[counts]
     if not len(place):
         return found
     pairs, pair = np.unique(pair, return_inverse=True)
