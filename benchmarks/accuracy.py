@@ -24,7 +24,8 @@ training. Legged robots have all of the false alarms. The model and its alarm th
 before this look."""
 LASTING = """
 Other seeds of robots in wide domains: good runs, faults, tones over whole runs, and faults that are
-cut out of their runs. Then real logs of good motion, with tones of half a second added."""
+cut out of their runs. The thresholds of lines and bursts were chosen on runs of the same robots,
+these among them. Then real logs of good motion, with tones of half a second added."""
 REPEATED = """
 Runs of robots against good repetitions of the same motion, with other sensor noise, friction and
 gains ([statistics](statistics.md)): first of Panda, Go2 and TALOS, on which margins were chosen,
