@@ -68,6 +68,14 @@ def test_a_run_and_a_data_set_name_the_software_that_they_depend_on(good, tmp_pa
     assert made["versions"] == versions
     manifest.write_text(json.dumps({**made, "versions": {"mujoco": "1"}}))
     assert Folder.opened(tmp_path / "set", wide=True).path == tmp_path / "set"  # it is continued
+    manifest.write_text(json.dumps({**made, "recipe": 3}))  # with other quadrupeds
+    with pytest.raises(scenarios.DatasetError, match="made with recipe 3, now it is 4"):
+        Folder.opened(tmp_path / "set", wide=True)
+
+
+def test_a_run_names_the_recipe_that_last_changed_its_family(good):
+    legged = simulated("go2", GOOD, 10_000, duration=0.5, wide=True)
+    assert (legged.meta["recipe"], good.meta["recipe"]) == ("domains 4", "domains 2")
 
 
 def test_a_run_equals_its_twin_until_its_fault_begins(good):
