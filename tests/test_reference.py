@@ -207,6 +207,19 @@ def test_two_scenarios_with_one_motion_are_told_apart_by_name_or_both_count(own,
         assert ("of grab, pick, and its name is of none: all count" in out) == (name == "other")
 
 
+def test_two_motions_of_one_name_are_two_scenarios_from_then_on(own, simulate):
+    simulate.run("place", 9, "impact").save(own / "runs" / "pick-9.npz")
+    out = call("accept", own / "runs", "--reason", "another motion")[1]
+    assert "pick-9: new, 1 repetition" in out
+    known = Reference.load(own / "reference")
+    assert (known.named("pick").wanted, len(known.named("pick-9").wanted)) == ((), 1)
+    status, runs, err = classified(own / "runs")
+    assert (status, runs["pick-9"]["reference"]["scenarios"]) == (0, ["pick-9"]), err
+    again = ("accept", own / "runs" / "pick-9.npz", "--only", "pick-9", "--reason", "again")
+    assert "pick-9: unchanged" in call(*again)[1]
+    assert len(Reference.load(own / "reference").named("pick").repetitions) == 3
+
+
 def test_a_reference_of_another_robot_is_told_and_the_general_model_decides(own, simulate):
     names = tuple(f"joint{number}" for number in range(4))
     run = replace(simulate.run("pick", 9), joint_names=names, desired_joint_names=names)

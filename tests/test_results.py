@@ -172,6 +172,18 @@ def test_whatever_stands_in_a_result_is_shown_or_refused_in_one_line(tmp_path):
     assert all("no results of classify" in each for each in refused)
 
 
+@pytest.mark.parametrize(("least", "status"), [("no log; it had 1", 0), ("1 of 3 logs", 1)])
+def test_scenarios_lack_only_what_no_job_has(tmp_path, least, status):
+    store, jobs = Path("reference/reference.toml"), []
+    for name, other in (("pick", "wave"), ("wave", "pick")):
+        lost = (Missing(f"log of {other}", reason=least),)
+        absent = Verdict(store, Status.FINDINGS, missing=lost, expectations=str(store))
+        run = Verdict(Path(f"{name}-1.npz"), Status.OK, beside=Beside(str(store), (name,)))
+        jobs.append(results(tmp_path / f"{name}.json", run, absent))
+    found, out, _ = call("merge", *jobs)
+    assert (found, "MISSING   1 of 3 logs" in out) == (status, status == 1)
+
+
 def test_a_run_of_two_jobs_is_refused(tmp_path):
     one, two = (results(tmp_path / n, Verdict(Path("r"), Status.OK)) for n in ("a.json", "b.json"))
     status, _, err = call("merge", one, two)

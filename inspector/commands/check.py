@@ -19,7 +19,7 @@ from inspector.logs.read import left_out, sources
 from inspector.reference import store
 from inspector.reference.difference import Difference, difference
 from inspector.reference.difference import Gate as DifferenceGate
-from inspector.reference.verdicts import Gate, References, classes_found
+from inspector.reference.verdicts import Gate, References, classes_found, still_absent
 from inspector.report.formats import DIFF_FORMATS, FORMATS, text
 from inspector.report.picture import over_reference, require
 from inspector.text import progress
@@ -259,7 +259,7 @@ def accept(
         raise InspectorError(f"{first}: no such file or folder")
     beside = (first if first.is_file() else first.absolute()).parent / store.FOLDER
     folder = output or store.find(first) or beside
-    levels = store.measured(runs, ctx.obj)
+    levels = store.by_motion(store.measured(runs, ctx.obj), store.names_in(folder))
     if only:
         levels = [each for each in levels if any(fnmatchcase(each.name, one) for one in only)]
     if not levels:
@@ -373,13 +373,18 @@ def merge(
     """
     outputs = shared.outputs_of(write, FORMATS, overwrite=overwrite)
     found: dict[Path, tuple[Verdict, Path]] = {}
+    absent: list[Verdict] = []
     for path in results:
         for verdict in read_results(path):
+            if not verdict.of_run:
+                absent.append(verdict)
+                continue
             if verdict.path in found:
                 first = found[verdict.path][1]
                 raise InspectorError(f"{path}: the run {verdict.path} is in {first}, too")
             found[verdict.path] = verdict, path
     merged = [verdict for verdict, _ in found.values()]
+    merged += still_absent(absent, merged)
     if report is not None:
         html = _index_in(report, outputs, overwrite=overwrite)
         merged = [html.with_picture(each, report) for each in merged]

@@ -387,11 +387,12 @@ def _matching(
 ) -> tuple[list[Scenario], "Paths", list[str]]:
     """Scenarios of the run's motion, of several the one with its name; all their repetitions."""
     usable = [each for each in known if len(each.repetitions[-1].guide)]
-    named = [each for each in usable if each.name == run.name]
-    aligned = _aligned(run, _repetitions(named), joints)
-    # A run that lies on the motion of its name needs no other scenario.
-    if aligned and aligned[-1][1].share >= SAME_NAME:
-        return named, aligned, []
+    for name in (run.apart, run.name):
+        named = [each for each in usable if each.name == name]
+        aligned = _aligned(run, _repetitions(named), joints)
+        # A run that lies on the motion of its name needs no other scenario.
+        if aligned and aligned[-1][1].share >= SAME_NAME:
+            return named, aligned, []
     # Nothing is aligned where no joint is shared.
     shares = [own.share for _, own in _aligned(run, [e.repetitions[-1] for e in usable], joints)]
     least = max(SAME_MOTION, ALIKE * max(shares, default=0.0))

@@ -7,6 +7,7 @@ Each joint has two signals: its velocity, and its tracking error where a velocit
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,15 @@ class Levels:
     guided_by: str  # what these are, of `GUIDES`
     pace: NDArray[np.float32]  # slow speed, rms over the joints, shape (frames,), in [rad/s]
     origin: NDArray[np.float32] | None = None  # first of the guide of the stream it is a part of
+
+    @property
+    def apart(self) -> str:
+        """Name of a scenario of its own, if another motion has its name: with that of its file."""
+        folder, _, last = self.name.rpartition("/")
+        stem = Path(self.run).stem
+        if not stem.startswith(last):
+            return f"{self.name}/{stem}"
+        return "/".join(filter(None, (folder, stem))) or self.name
 
     @property
     def first(self) -> NDArray[np.float32]:

@@ -11,7 +11,7 @@ import os
 import re
 import zipfile
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import date
@@ -194,21 +194,30 @@ def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Leve
     return found
 
 
-def of_runs(runs: Sequence[Levels]) -> tuple[Scenario, ...]:
-    """Group runs by name and motion into scenarios, in order of their names.
+def by_motion(runs: Sequence[Levels], known: Collection[str] = ()) -> list[Levels]:
+    """Runs with the names of their scenarios, of which some are known.
 
     Two motions of one name are two scenarios: the second one has the name of its file.
     """
-    groups: dict[str, list[Levels]] = defaultdict(list)
+    last: dict[str, Levels] = {}
+    found = []
     for run in runs:
-        name = run.name
-        if groups[name] and share_of_motion(run, groups[name][-1]) < 0.5:
-            name = Path(run.run).stem or name
-        groups[name].append(replace(run, name=name))
+        other = run.apart in known or (
+            run.name in last and share_of_motion(run, last[run.name]) < 0.5
+        )
+        found.append(replace(run, name=run.apart) if other else run)
+        last[found[-1].name] = run
+    return found
+
+
+def of_runs(runs: Sequence[Levels]) -> tuple[Scenario, ...]:
+    """Group runs by name and motion into scenarios, in order of their names."""
+    groups: dict[str, list[Levels]] = defaultdict(list)
+    for run in by_motion(runs):
+        groups[run.name].append(run)
     return tuple(
         calibrated(Scenario(name, tuple(sorted(each, key=lambda run: natural(run.run))[-NEWEST:])))
         for name, each in sorted(groups.items())
-        if each
     )
 
 
@@ -221,6 +230,12 @@ def calibrated(scenario: Scenario) -> Scenario:
 
 
 # --- accepting
+
+
+def names_in(folder: Path) -> tuple[str, ...]:
+    """Names of the scenarios of a store; none if there is none."""
+    there = os.path.lexists(folder / NAME)
+    return tuple(each.name for each in Reference.load(folder).scenarios) if there else ()
 
 
 def accept_into(

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cache, partial
+from math import floor
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,7 @@ from inspector.verdict import (
 )
 from noiseclassifier import UNKNOWN, Event, Labels
 
+LOGS = r"\d+ of (\d+) logs"  # what a scenario with too few of them has
 LOUDER = "louder"  # class of a finding that only the reference shows
 # A run is frozen where it moves at less than a tenth of its references' speed, for half a second,
 # while these make three tenths of their usual speed.
@@ -111,6 +113,20 @@ class References:
         return found
 
 
+def still_absent(absent: Sequence[Verdict], runs: Sequence[Verdict]) -> list[Verdict]:
+    """What required scenarios lack, by the verdicts of several jobs, in all of their runs."""
+    known = Counter(name for each in runs if each.beside for name in each.beside.scenarios)
+    missing: dict[Path, dict[str, Missing]] = {each.path: {} for each in absent}
+    for verdict in absent:
+        for each in verdict.missing:
+            number, least = known[each.scenario], re.search(LOGS, each.reason)
+            if number < (int(least[1]) if least else 1):
+                reason = f"{number} of {least[1]} logs" if least and number else each.reason
+                missing[verdict.path][each.label] = replace(each, reason=reason)
+    first = {each.path: each for each in reversed(absent)}
+    return [replace(first[p], missing=tuple(m.values())) for p, m in missing.items() if m]
+
+
 def _root(run: Path, store: Path) -> Path | None:
     """The folder below which scenarios are named, such as runs/ beside reference/."""
     full, top = run.resolve(), store.resolve().parent
@@ -144,7 +160,8 @@ class Gate:
         if self.classes and event.label not in self.classes:
             return f"not of {', '.join(self.classes)} (--fail-on-class)"
         if self.min_score is not None and event.score < self.min_score:
-            return f"score {event.score:.2f} below {self.min_score:g} (--min-score)"
+            score = floor(event.score * 1e4) / 1e4  # one that is less than 1 is not told as 1
+            return f"score {score:g} below {self.min_score:g} (--min-score)"
         duration = event.stop - event.start
         if duration < self.min_duration:
             return f"{duration:.2f} s, shorter than {self.min_duration:g} s (--min-duration)"
@@ -189,6 +206,7 @@ def beside(
         words="; ".join(filter(None, [*words, *comparison.remarks])),
     )
     covered = known.shares[Kind.GENERAL] < 1.0
+    own = comparison.scenarios[0] if len(comparison.scenarios) == 1 else comparison.run.name
     status = verdict.status
     if any(not each.evidence.excused for each in events):
         status = Status.FINDINGS
@@ -199,7 +217,7 @@ def beside(
         status=status,
         events=events,
         beside=known,
-        scenario=verdict.scenario or comparison.run.name,
+        scenario=verdict.scenario or own,
     )
 
 
@@ -259,7 +277,8 @@ def _named(labels: Labels | None, each: Exceedance, absorbed: Sequence[Finding])
 def _failures(comparison: Comparison, reference: Reference) -> Iterable[tuple[str, str]]:
     """What of its scenario a run lacks: its end, or its motion; and why, in a few words."""
     run = comparison.run
-    known = [reference.named(name) for name in comparison.scenarios] or [reference.named(run.name)]
+    own = reference.named(run.apart) or reference.named(run.name)
+    known = [reference.named(name) for name in comparison.scenarios] or [own]
     scenarios = [each for each in known if each is not None and robot_fits(run, each)]
     if not scenarios:
         return
