@@ -451,7 +451,8 @@ def estimate(run: Run, kind: str) -> Estimate:
     if kind not in nm.KINDS:
         raise nm.UnknownKindError(kind, KINDS)
     if run.robot is None or not robot_known(run):
-        raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {run.robot!r}")
+        names = "none" if run.robot is None else repr(run.robot)
+        raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {names}")
     robot = nm.Robot.load(run.robot, floating_base=True if run.base_pose is not None else None)
     surface = nm.Surface.of(robot, "auto")
     q_desired, v_desired = robot.desired(run) or (None, None)

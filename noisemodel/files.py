@@ -1,5 +1,6 @@
 """Files: written whole or not at all, read within limits, and the cache of what takes long."""
 
+import errno
 import hashlib
 import io
 import os
@@ -117,7 +118,8 @@ def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
     if path.exists() and not overwrite:
         raise OutputError(EXISTS.format(path))
     if not path.parent.is_dir():
-        raise OutputError(f"{path}: cannot be written (No such file or directory: {path.parent})")
+        lost = FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+        raise OutputError(f"{path}: cannot be written ({lost.strerror}: {path.parent})") from lost
 
 
 def limit(name: str) -> int:

@@ -19,6 +19,7 @@ from noisemodel.run import (
     Run,
     continuous_quaternions,
     resample,
+    unnamed,
     with_velocities,
 )
 from noisemodel.types import Array, Mask, RunError, UnknownJointError
@@ -198,7 +199,7 @@ class Recorder:
             listed = f" ({', '.join(names)}); joint_names=… names others" if names else ""
             raise RunError(f"{name}: shape {row.shape}, expected ({width or 'joints'},){listed}")
         if not known and name not in WIDTHS:
-            self._joints = names or tuple(f"joint{number + 1}" for number in range(len(row)))
+            self._joints = names or unnamed(len(row))
             self._desired = self._desired or self._joints
         return row
 

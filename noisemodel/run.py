@@ -239,6 +239,11 @@ def rows_of(run: Run, rows: slice | NDArray[np.intp], **changes: Any) -> Run:
     return replace(run, **({"blocks": ()} | fields | changes))
 
 
+def unnamed(joints: int) -> tuple[str, ...]:
+    """Names of joints that have none: joint_0, joint_1 and so on."""
+    return tuple(f"joint_{number}" for number in range(joints))
+
+
 def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
     """The motion of a run, the fields ``MOTION``, in pieces that fit into memory.
 
@@ -293,7 +298,6 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
     samples, joints = len(signals["time"]), velocity.shape[-1]
     if velocity.ndim == 2 and len(velocity) != samples and joints == samples:
         joints = len(velocity)  # transposed, which the error states
-    unnamed = [f"joint{number + 1}" for number in range(joints)]
     robot = str(arrays.get("robot", ""))
     columns = [arrays.get(f"block_{name}", np.empty(0)) for name in ("start", "stop", "label")]
     if len({column.shape for column in columns}) > 1:
@@ -302,7 +306,7 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
     stages = [name for name in arrays if name.startswith(runfile.STAGE)]
     return {
         **signals,
-        "joint_names": tuple(map(str, arrays.get("joint_names", unnamed))),
+        "joint_names": tuple(map(str, arrays.get("joint_names", unnamed(joints)))),
         "desired_joint_names": tuple(map(str, arrays.get("desired_joint_names", ()))),
         "stages": {name.removeprefix(runfile.STAGE): arrays[name] for name in stages},
         "robot": str(folder / robot) if is_robot_file(robot) else robot or None,

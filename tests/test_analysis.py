@@ -389,7 +389,7 @@ def test_noise_that_is_not_finite_names_its_time():
     ("robot", "kind", "text"),
     [
         (None, "loud", "loud"),
-        (None, "normal", "kind 'normal' needs a robot, the run names None"),
+        (None, "normal", "kind 'normal' needs a robot, the run names none"),
         ("no robot", "paper", "kind 'paper' needs a robot, the run names 'no robot'"),
     ],
 )

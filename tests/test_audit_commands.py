@@ -23,7 +23,7 @@ def test_the_audit_of_a_30_hz_episode_in_degrees_gives_its_limits(episode):
     status, out, err = call("audit", episode)
     assert (status, err) == (4, "")
     assert "30 Hz" in out
-    assert "positions look like degrees (joint3" in out
+    assert "positions look like degrees (joint_2" in out
     assert "measured position of all joints is the desired one, 1 sample later" in out
     assert "velocities are differentiated positions" in out
     assert "impact: cannot tell: 30 Hz is below the rate of every model; needs 80 Hz" in out

@@ -137,12 +137,12 @@ def test_with_quantisation_loud_failures_stay_observable():
 def test_a_frame_requires_a_stretch_without_a_gap():
     run = noisy_run(1000.0)
     gaps = np.ones(len(run.time), dtype=bool)
-    gaps[::400] = False  # a frame takes 400 samples
+    gaps[::600] = False  # what lasts takes 600 samples
     for joined in (True, False):
-        gaps[400] = joined
+        gaps[600] = joined
         broken = run_of(run.velocity * gaps[:, None], 1000.0, valid=gaps.copy())
         assert audit(broken, LIBRARY).observable == joined
-    assert "no stretch of 0.4 s without a gap" in summary(audit(broken, LIBRARY))[0]
+    assert "no stretch of 0.6 s without a gap" in summary(audit(broken, LIBRARY))[0]
     with pytest.raises(CannotTellError, match="no stretch of 0.6 s without a gap"):
         label_run(broken, LIBRARY)
 

@@ -217,7 +217,7 @@ def test_what_cannot_be_exported_is_an_error_of_one_line(tmp_path):
     for arguments, expected, code in [
         ([demo_run(), "-o", tmp_path / "run.bag"], "there are .mcap, .csv, .parquet", 2),
         ([demo_run(), "-o", tmp_path / "there.csv"], "exists already", 3),
-        ([demo_run(), "-o", tmp_path / "no" / "run.csv"], "cannot be written", 3),
+        ([demo_run(), "-o", tmp_path / "no" / "run.csv"], "cannot be written", 5),
         ([demo_run(), "-o", tmp_path / "run.csv", "--kind", "loud"], "no kind 'loud' of noise", 2),
         ([tmp_path / "none.npz", "-o", tmp_path / "run.csv"], "cannot be read", 3),
     ]:

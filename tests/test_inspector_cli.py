@@ -162,7 +162,7 @@ def test_the_noise_is_printed_and_written(tmp_path):
     status, out, _ = inspector("noise", run, "--csv", tmp_path / "noise.csv")
     assert status == 0
     assert "peak 1 rad/s at 0.000 s" in out
-    assert "100.0%  joint1" in out
+    assert "100.0%  joint_0" in out
     lines = (tmp_path / "noise.csv").read_text().splitlines()
     assert lines[0] == "time [s],simplified [rad/s]"
     assert len(lines) == 10_001
@@ -188,7 +188,7 @@ def test_a_kind_that_does_not_exist_or_cannot_be_had_is_one_line(tmp_path):
     assert "no kind 'loud' of noise; there are simplified, paper" in err
     status, _, err = inspector("noise", run_without_robot(tmp_path / "run.npz"), "--kind", "paper")
     assert (status, err.count("\n")) == (3, 1)
-    assert "kind 'paper' needs a robot, the run names None" in err
+    assert "kind 'paper' needs a robot, the run names none" in err
 
 
 def test_a_profile_that_does_not_exist_at_a_rate_is_one_line(tmp_path):

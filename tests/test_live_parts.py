@@ -105,8 +105,9 @@ def test_the_unit_of_stamps_is_that_of_the_rate(unit, rate, start):
     assert lines[0].endswith(f"at {rate:g} Hz: read as such")
 
 
-def test_another_rate_than_the_nominal_one_is_a_warning():
-    *_, lines = taken(np.arange(50) / 800)
+@pytest.mark.parametrize("size", [50, 7, 1])
+def test_another_rate_than_the_nominal_one_is_a_warning(size):
+    *_, lines = taken(np.arange(50) / 800, size=size)
     assert lines == [
         "timestamps have 800 Hz, the nominal rate is 1000 Hz: labels and spectrogram are wrong,"
         " set --rate"

@@ -47,7 +47,7 @@ def test_names_select_joints_and_their_order():
     reader = CsvReader(head, ("shoulder", "elbow"))
     (rows,), _ = read(reader, b"0;1;2;3;4\r\n")
     assert rows["velocity_desired"].tolist() == [[3.0, 4.0]]
-    assert CsvReader(head, ()).names == ("joint1", "joint2")
+    assert CsvReader(head, ()).names == ("joint_0", "joint_1")
 
 
 @pytest.mark.parametrize(
@@ -106,6 +106,8 @@ def test_all_ways_of_reading_agree():
         (b"hello", (), "the header names no velocity; .* they are hello"),
         (b"a.velocity,b.velocity,a.position", (), "the header has no position of joint 'b'"),
         (b"a.velocity", ("b",), "the header has no velocity of joint 'b'"),
+        (b"dq1,dq2,dq3", ("a", "b"), "the header: 'dq3' is of joint 3, --names names 2"),
+        (b"dq1,dq2,dq2", (), "the header names the velocity of 'joint_2' twice"),
         (b"a.velocity [Nm]", (), r"the header names no velocity; .* they are a.velocity \[Nm\]"),
     ],
 )

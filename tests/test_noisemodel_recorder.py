@@ -186,7 +186,7 @@ def test_samples_are_interpolated_between_stamps_and_not_in_gaps_or_at_single_sa
         position=lambda time: np.angle(np.exp(1j * 25.0 * ramp(time))) + SHIFT,
         base_pose=lambda time: [*ramp(time)[:3], *sign[time / STEP] * turn(time)],
     )
-    assert run.joint_names == ("joint1", "joint2", "joint3", "joint4", "joint5")
+    assert run.joint_names == ("joint_0", "joint_1", "joint_2", "joint_3", "joint_4")
     np.testing.assert_array_equal(run.time, np.arange(44) * STEP)
     known = [*range(7), *range(12, 15), 30, 31, *range(40, 44)]
     assert np.flatnonzero(run.mask).tolist() == known
@@ -299,4 +299,4 @@ def test_desired_joints_keep_their_names_and_missing_velocities_are_differentiat
     assert set(run.meta["differentiated"]) == {"velocity", "velocity_desired"}
     assert np.allclose(run.velocity[:, 0], np.cos(run.time), atol=1e-4)
     np.testing.assert_array_equal(run.velocity_desired[:, 0], run.velocity[:, 0])
-    assert (run.joint_names, run.desired_joint_names) == (("joint1", "joint2"), ("b",))
+    assert (run.joint_names, run.desired_joint_names) == (("joint_0", "joint_1"), ("b",))

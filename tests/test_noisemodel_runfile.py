@@ -107,7 +107,7 @@ def test_any_simulator_writes_a_run_with_one_savez_of_any_numbers(tmp_path):
     run = Run.load(tmp_path / "run.npz")
     assert np.array_equal(run.velocity, VELOCITY)
     assert run.velocity.dtype == np.float64
-    assert run.joint_names == ("joint1", "joint2")
+    assert run.joint_names == ("joint_0", "joint_1")
     assert run.robot == "talos"
 
 
@@ -264,7 +264,7 @@ def test_lists_that_are_empty_are_no_names_and_no_blocks(tmp_path):
     empty = {name: [] for name in ("desired_joint_names", "block_start", "block_label")}
     np.savez(tmp_path / "run.npz", **(BASE | empty), block_stop=np.zeros(0, dtype=int))
     run = Run.load(tmp_path / "run.npz")
-    assert run.desired_joint_names == ("joint1", "joint2")
+    assert run.desired_joint_names == ("joint_0", "joint_1")
     assert run.blocks == ()
 
 

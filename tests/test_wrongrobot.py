@@ -135,4 +135,4 @@ def test_joints_that_a_run_file_does_not_name_are_those_of_its_robot_in_order(tm
     assert "assumed stationary: panda_finger_joint1, panda_finger_joint2" in out
     np.savez(tmp_path / "ten.npz", time=run.time, velocity=np.zeros((3000, 10)), robot="panda")
     status, _, err = call("classify", tmp_path / "ten.npz")
-    assert (status, "no joint 'joint1' in robot 'panda'" in err) == (3, True)
+    assert (status, "no joint 'joint_0' in robot 'panda'" in err) == (3, True)

@@ -29,6 +29,7 @@ from inspector.logs.motion import limit_warnings
 from inspector.logs.read import Reading, Source, open_source
 from inspector.text import counted, plain
 from noiseclassifier import Profile
+from noiseclassifier.lasting import SHORTEST
 from noiseclassifier.profile import FEWEST, HIGHEST, LOWEST
 from noisemodel import NoiseModelError, Run
 from noisemodel.run import part
@@ -89,8 +90,9 @@ def observable_classes(
     profile = chosen.profile
     labels = [label for label in chosen.classes if label != "ok"]
     gaps = np.flatnonzero(np.concatenate(([True], ~valid, [True])))
-    if np.diff(gaps).max() - 1 < profile.duration * logged * (1 - 1e-3):
-        return _none_of(labels, f"no stretch of {profile.duration:g} s without a gap")
+    needed = max(profile.duration, SHORTEST)
+    if np.diff(gaps).max() - 1 < needed * logged * (1 - 1e-3):
+        return _none_of(labels, f"no stretch of {needed:g} s without a gap")
     general = isinstance(library[name], nc.General)
     return tuple(
         _observability(label, bandwidth, profile, library, general=general) for label in labels

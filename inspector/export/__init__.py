@@ -475,4 +475,4 @@ def format_of(path: Path) -> Format:
     if found := FORMATS.get(path.suffix.lower()):
         return found
     known = ", ".join(f"{suffix} ({each.name})" for suffix, each in FORMATS.items())
-    raise InspectorError(f"{path}: no format of labels has this suffix; there are {known}")
+    raise OptionError(f"{path}: no format of labels has this suffix; there are {known}")

@@ -156,8 +156,13 @@ class CsvReader:
             kind, joint = meaning
             if not isinstance(joint, str):
                 number = joint - naming.first
-                joint = names[number] if number < len(names) else f"joint{number + 1}"
-            found.setdefault(kind, {})[joint] = place
+                if names and number >= len(names):
+                    problem = f"{column!r} is of joint {number + 1}, --names names {len(names)}"
+                    raise LiveError(f"the header: {problem}")
+                joint = names[number] if names else f"joint_{joint}"
+            if joint in found.setdefault(kind, {}):
+                raise LiveError(f"the header names the {kind} of {joint!r} twice")
+            found[kind][joint] = place
         if "velocity" not in found:
             raise LiveError(
                 "the header names no velocity; expected columns such as elbow.velocity,"

@@ -23,7 +23,7 @@ from inspector.reference.levels import LONGEST, Levels, LevelStream
 from noiseclassifier import Event, merged
 from noisemodel.files import beyond, limit
 from noisemodel.robot import joint_limits
-from noisemodel.run import LARGEST
+from noisemodel.run import LARGEST, unnamed
 from noisemodel.types import Array, Mask
 
 
@@ -157,7 +157,7 @@ class Clock:
         self._unit = 0.0  # until it is known
         self._last = self._shift = 0.0  # timestamp of the last sample taken; from there to its time
         self._before: float | None = None  # its time
-        self._checked = False
+        self._first_steps: Array | None = np.empty(0)  # until the rate is checked by them
 
     def take(self, stamps: Array, *, ended: bool = False) -> tuple[Mask, Array, Array]:
         """Decide about samples, those that waited before first; if the stream ended, about all.
@@ -257,9 +257,10 @@ class Clock:
             first = int(np.argmax(lost > 0))
             line = f"gap at {time[first]:.3f} s: {lost[first]:.0f} samples are missing"
             self._warnings.note("missing samples", line, int(lost.sum()))
-        if not self._checked and len(steps) > RATE_STEPS:
-            self._checked = True
-            step = float(np.median(steps))
+        if self._first_steps is not None:
+            self._first_steps = np.concatenate((self._first_steps, steps))
+        if self._first_steps is not None and len(self._first_steps) > RATE_STEPS:
+            step, self._first_steps = float(np.median(self._first_steps)), None
             if abs(step - 1.0) > RATE_TOLERANCE:
                 line = (
                     f"timestamps have {self._rate / step:.4g} Hz, the nominal rate is"
@@ -491,7 +492,7 @@ class LiveSession:
         joints, robot = widths["velocity"], self._robot
         if joints > limit("joints"):
             raise LiveError(f"{joints} joints, {beyond('joints')}")
-        names = self._names or tuple(f"joint{number + 1}" for number in range(joints))
+        names = self._names or unnamed(joints)
         if not self._names and robot is not None:
             known = tuple(joint_limits(robot))
             if len(known) < joints:

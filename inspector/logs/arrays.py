@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from difflib import get_close_matches
 from functools import partial
 from itertools import pairwise
 from math import prod
@@ -331,7 +332,9 @@ def _nothing(path: Path, arrays: Arrays, not_read: Sequence[str]) -> LogError:
         return no_motion(path, [*arrays, *not_read])
     wide = [n for n, each in arrays.items() if each.ndim == 2 and meaning(n) != COMMAND]
     name = max(wide, key=lambda each: len(arrays[each]), default="qpos")
-    example = f"--map position={name}"
+    alike = [(n, *get_close_matches(n, ("position", "velocity"), 1)) for n in wide]
+    name, signal = next((pair for pair in alike if len(pair) == 2), (name, "position"))
+    example = f"--map {signal}={name}"
     if "obs" in name and (half := arrays[name].shape[1] // 2):
         example += f"[0:{half}] --map velocity={name}[{half}:{2 * half}]"
     shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])

@@ -36,7 +36,7 @@ from noiseclassifier.jsontext import from_toml, text_of
 from noisemodel import Robot, RobotError, Run, UnknownJointError, UnknownRobotError
 from noisemodel.files import write_whole
 from noisemodel.robot import Limits, joint_limits
-from noisemodel.run import LONGEST, SHORTEST
+from noisemodel.run import LONGEST, SHORTEST, unnamed
 from noisemodel.runfile import ArchiveError, one_line
 from noisemodel.types import Array, Mask, Real
 
@@ -276,8 +276,9 @@ def named(run: Run) -> Run:
 
 def _named(joints: Sequence[str], known: Mapping[str, Limits]) -> tuple[str, ...]:
     """Names of joints; the robot's names replace mere numbers if it has as many joints."""
-    numbered = all(joint == f"joint{place}" for place, joint in enumerate(joints, start=1))
-    if numbered and len(joints) <= len(known) and not set(joints) & set(known):
+    earlier = tuple(f"joint{number + 1}" for number in range(len(joints)))  # version 0.6
+    mere = tuple(joints) in (unnamed(len(joints)), earlier)
+    if mere and len(joints) <= len(known) and not set(joints) & set(known):
         return tuple(known)[: len(joints)]
     return tuple(joints)
 
@@ -639,7 +640,7 @@ def _columns(
                 f"{what}, {whose} {len(names)}; take a part of it"
                 f" (--map {signal}={field.name}[0:{len(names)}]) or name all (--joints)",
             )
-    names = names or [f"joint_{number}" for number in range(width)]
+    names = names or unnamed(width)
     for column, name in zip(range(part.start, part.stop), names[:width], strict=True):
         yield whole._replace(columns=slice(column, column + 1), joint=name)
 

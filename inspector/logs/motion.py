@@ -468,7 +468,8 @@ def _main(log: Log, options: ReadOptions) -> Track:
     """The track whose stamps become the run's time: the one with the most joints."""
     moving = [track for track in log.tracks if track.signal in ("position", "velocity")]
     if not moving:
-        raise LogError(log.path, "holds no measured motion, only desired")
+        only = ", only desired" if log.tracks else ""
+        raise LogError(log.path, f"holds no measured motion{only}")
     track = max(moving, key=lambda track: len(track.joints))
     time, nominal, rate = track.stamps.time, track.stamps.clock.nominal, options.rate
     if rate is not None and not 1 / LARGEST_RATE_RATIO <= rate / nominal <= LARGEST_RATE_RATIO:

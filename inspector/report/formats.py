@@ -307,7 +307,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     ignored = sum(verdict.ignored for verdict in verdicts)
     runs += [f"{ignored} of the bad input ignored"] if ignored else []
     absent = sum(len(verdict.missing) for verdict in verdicts if not verdict.of_run)
-    logs = f"; no log for {counted(absent, 'required finding')}" if absent else ""
+    logs = f"; too few logs of {counted(absent, 'required scenario')}" if absent else ""
     findings = _numbers(number["findings"])
     total = counted(sum(verdict.of_run for verdict in verdicts), "run")
     found = f"; findings: {findings}" if findings else ""
@@ -483,7 +483,7 @@ def _remarks(verdicts: Sequence[Verdict], *, verbose: bool) -> Iterator[str]:
     if known and not verbose:
         scenarios = counted(len({each.scenarios for each in known}), "scenario")
         most = counted(max(each.repetitions for each in known), "repetition")
-        margin = max(each.margins_db.get("repetitions", 0.0) for each in known)
+        margin = max(db for each in known for db in each.margins_db.values())
         yield f"reference: {scenarios}, up to {most}, margin up to {margin:.1f} dB"
 
 
