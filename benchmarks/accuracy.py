@@ -20,8 +20,8 @@ motion of a real robot was available.
 """
 OTHERS = """
 Robots and controllers of PyBullet and Drake (`python -m benchmarks.elsewhere`), never used in
-training. Legged robots have all of the false alarms. The model and its alarm threshold were fixed
-before this look."""
+training. Legged robots have all of the false alarms. That motion is compared with all motion of its
+run followed from earlier looks at them, but was decided, like all thresholds, on other robots."""
 LASTING = """
 Other seeds of robots in wide domains: good runs, faults, tones over whole runs, and faults that are
 cut out of their runs. The thresholds of lines and bursts were chosen on runs of the same robots,

@@ -36,7 +36,7 @@ def test_a_bound_model_decides_as_the_full_one_without_the_missing_features(rate
     there = signals(rate, "oscillations", seed=7, names=GIVEN[given_])
     bound = model.at(rate, there)
     assert bound.profile.signals == GIVEN[given_]
-    _, features = frame_features(there, bound.profile)
+    _, features, _ = frame_features(there, bound.profile)
     full = np.full((len(features), len(RECIPE.columns)), np.nan)
     full[:, RECIPE.places(bound.profile)] = features
     expected = model.estimator.decision((full - model.mean) / model.scale)
@@ -66,7 +66,7 @@ def test_a_tone_is_in_features_of_one_name_at_any_rate(frequency):
         tone = 0.1 * np.sin(2 * np.pi * frequency * np.arange(round(2 * rate)) / rate)
         profile = RECIPE.at(rate, ("measured",))
         names = columns(profile)
-        _, features = frame_features({"measured": tone}, profile)
+        _, features, _ = frame_features({"measured": tone}, profile)
         means = [n for n, name in enumerate(names) if name.startswith("measured long mean")]
         loudest.add(names[means[features[0, means].argmax()]])
     assert loudest == {f"measured long mean {15 if frequency < 25 else 25}"}
@@ -120,7 +120,7 @@ def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_fe
     assert len(parts) == len(feeding)
     for names, part in zip(feeding, parts, strict=True):
         profile = RECIPE.at(500.0, names)
-        _, features = frame_features(one.signal, profile)
+        _, features, _ = frame_features(one.signal, profile)
         features = features if names is feeding[0] else features[::2]
         assert part.features.shape == (len(features), len(RECIPE.columns))
         places = RECIPE.places(profile)
@@ -137,7 +137,7 @@ def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_fe
 def test_frames_are_evaluated_as_the_model_bound_to_their_log_decides_them(label):
     one = recording(500.0, label, 0)
     bound = trained().at(500.0, one.signal)
-    _, features = frame_features(one.signal, bound.profile)
+    _, features, _ = frame_features(one.signal, bound.profile)
     predicted = bound.predict(features.astype(np.float32))
     part = next(nc.frames_of([one], RECIPE))
     expected = nc.Evaluation.of(part.labels, predicted, trained().classes)

@@ -1,4 +1,4 @@
-"""Features relative to a reference: the signal as far as it has come, or the rest of it."""
+"""Features relative to a reference: the signal as far as it has come, or all of it."""
 
 import sys
 from dataclasses import replace
@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import noiseclassifier as nc
-from noiseclassifier.features import LEAST_SPREAD, NORMAL, Rest, RunningReference, frame_features
+from noiseclassifier.features import (
+    ALIKE,
+    LEAST_SPREAD,
+    NORMAL,
+    Rest,
+    RunningReference,
+    frame_features,
+)
 
 module = sys.modules["noiseclassifier.features"]
 RECIPE = replace(nc.ANY, rounds=5)
@@ -114,31 +121,48 @@ def test_relative_features_do_not_change_with_the_scale_of_all_amplitudes(rate):
         np.testing.assert_allclose(more, np.log(scale), atol=1e-3)
 
 
-def test_flagged_frames_are_compared_with_the_rest_of_the_signal():
-    good, rest = frames(count=60), Rest()
-    flagged = np.arange(60) >= 45
-    for first in range(0, 60, 7):
-        rest.add(good[first : first + 7], flagged[first : first + 7])
-    places, features = rest.relative(flagged)
-    np.testing.assert_array_equal(places, np.arange(45, 60))
-    expected = by_median(good[:45], good[45:])
-    np.testing.assert_array_equal(features, np.hstack((good[45:], expected)))
+def rest_of(features, flagged, pace, every=7):
+    """What a signal that comes in pieces is compared with."""
+    rest = Rest()
+    for first in range(0, len(features), every):
+        part = slice(first, first + every)
+        rest.add(features[part], flagged[part], pace[part])
+    return rest
+
+
+@pytest.mark.parametrize("moves", [ALIKE, ALIKE - 1])
+def test_motion_is_compared_with_all_motion_if_there_is_enough_and_standing_with_the_rest(moves):
+    good, number = frames(count=60), np.arange(60)
+    flagged, pace = number % 4 == 1, np.where(number < moves, 2.0, 0.1)
+    places, features = rest_of(good, flagged, pace).relative(flagged)
+    motion = good[:moves] if moves >= ALIKE else good[~flagged]
+    expected = [by_median(motion, good[flagged & (pace > 1.0)])]
+    expected.append(by_median(good[~flagged], good[flagged & (pace < 1.0)]))
+    np.testing.assert_array_equal(places, np.flatnonzero(flagged))
+    np.testing.assert_array_equal(features, np.hstack((good[flagged], np.vstack(expected))))
+
+
+def test_standing_before_and_after_a_motion_changes_nothing_of_it():
+    motion, still = frames(count=40), frames(count=50) - 5.0
+    flagged, moves = np.ones(40, bool), np.full(40, 3.0)
+    _, alone = rest_of(motion, flagged, moves).relative(flagged)
+    flagged = np.arange(140) // 10 % 9 > 4
+    pace = np.concatenate((np.full(50, 0.01), moves, np.zeros(50)))
+    _, whole = rest_of(np.vstack((still, motion, still)), flagged, pace).relative(flagged)
+    np.testing.assert_array_equal(whole, alone)
 
 
 def test_a_signal_without_a_rest_is_compared_with_its_past_alone():
-    rest = Rest()
-    assert rest.relative(np.zeros(0, bool)) is None
-    rest.add(frames(count=20), np.ones(20, bool))
-    assert rest.relative(np.ones(20, bool)) is None
-    assert rest.relative(np.zeros(20, bool)) is None
+    rest, none = rest_of(frames(count=20), np.ones(20, bool), np.ones(20)), np.zeros(20, bool)
+    assert Rest().relative(none[:0]) is None
+    assert rest.relative(~none) is None
+    assert rest.relative(none) is None
 
 
 def test_memory_of_the_rest_does_not_grow_with_the_signal(monkeypatch):
     monkeypatch.setattr(module, "KEPT", 50)
-    good, rest = frames(count=2000), Rest()
     failures = np.arange(2000) % 400 == 3
-    for first in range(0, 2000, 13):
-        rest.add(good[first : first + 13], failures[first : first + 13])
+    rest = rest_of(frames(count=2000), failures, np.ones(2000), every=13)
     assert len(rest._features) <= 2 * 50 + 13 + failures.sum()
     places, _ = rest.relative(failures)
     np.testing.assert_array_equal(places, np.flatnonzero(failures))

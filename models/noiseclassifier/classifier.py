@@ -181,12 +181,12 @@ class Classifier:
         starts: list[Index] = []
         decisions: list[Array] = []
         rest = Rest() if whole and self.profile.reference else None
-        for first, plain in features_of_pieces(pieces, self.profile):
+        for first, plain, pace in features_of_pieces(pieces, self.profile):
             starts.append(first)
             decisions.append(self.decide(plain))
             if rest is not None:
                 own = plain[:, : plain.shape[1] // 2]  # the other half is relative to the past
-                rest.add(own, self._choose(decisions[-1]) != "ok")
+                rest.add(own, self._choose(decisions[-1]) != "ok", pace)
         found, begins = np.concatenate(decisions), np.concatenate(starts)
         labels = self.labels(found, begins, rate, start=start)
         again = rest.relative(labels.flagged) if rest is not None else None
@@ -299,11 +299,10 @@ class Stream:
         return self._labels(self._frames.finish())
 
     def _labels(self, frames: Frames) -> Labels:
-        starts, features = frames
-        if not len(starts):
+        if not len(frames.starts):
             return self._nothing
-        decisions = self.classifier.decide(features)
-        return self.classifier.labels(decisions, starts, self.rate, start=self.start)
+        decisions = self.classifier.decide(frames.features)
+        return self.classifier.labels(decisions, frames.starts, self.rate, start=self.start)
 
 
 def targets_of(labels: Words, known: Sequence[str]) -> tuple[tuple[str, ...], Index]:
@@ -420,7 +419,7 @@ def frames_of(
         fed = [names for names in TAKEN if feeds(named(recording.signal), names)]
         for number, names in enumerate(fed):
             profile = recipe.at(recording.rate, names)
-            starts, features = frame_features(recording.signal, profile, recording.valid)
+            starts, features, _ = frame_features(recording.signal, profile, recording.valid)
             begin, step = recording.start + starts / recording.rate, 1.0 / recording.rate
             truth = truth_of(begin, begin + profile.duration, within(recording), step=step)
             full = np.full((len(starts), len(efforts)), np.nan, dtype=np.float32)

@@ -12,7 +12,7 @@ the second.
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,9 +40,21 @@ BOUND = 1.5  # spreads by which a frame moves a running location at most, times 
 # Frames that are kept of a whole signal at most, beside those that may be failures: 10 minutes.
 KEPT = 6000
 FEWEST = 10  # frames of the rest of a signal that make a reference
-# First sample of each frame, shape (frames,), and its features, not yet standardised, shape
-# (frames, features).
-Frames: TypeAlias = tuple[Index, Array]
+# A robot moves where it is faster than this share of what so many percent of the frames are below.
+# From so many frames on, 3 s, its motion is a reference for itself.
+SLOW, FAST, ALIKE = 0.1, 95, 30
+
+
+class Frames(NamedTuple):
+    """Frames of a signal."""
+
+    starts: Index  # first sample of each, shape (frames,)
+    features: Array  # not yet standardised, shape (frames, features)
+    pace: Array  # mean amount of the first signal in each, shape (frames,), in [rad/s]
+
+
+# Starts of windows, shape (windows,), and their energies, shape (windows, energies).
+Windows: TypeAlias = tuple[Index, Array]
 
 
 # --- frames alone
@@ -337,7 +349,7 @@ def _cosines(count: int) -> Array:
 #
 # How loud fault-free motion is differs from robot to robot by orders of magnitude. Relative to a
 # reference, it differs far less: each feature less its location there, divided by its spread. The
-# reference is the signal itself so far; of a whole signal, also the rest of it. A failure that
+# reference is the signal itself so far; of a file, also the whole. A failure that
 # fills a whole signal is invisible relative to the signal itself; therefore the unchanged features
 # stay beside. A spread is 1.48 times a median absolute deviation, the standard deviation of a
 # normal distribution (P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5.1).
@@ -379,45 +391,62 @@ class RunningReference:
 
 
 class Rest:
-    """Features of a whole signal by which its findings are compared with the rest of it.
+    """Features of a whole signal by which its findings are compared with all of it.
 
-    Kept are those of all frames that may be failures, and of others evenly spread, so that memory
-    does not grow with the signal.
+    Motion is compared with all motion, whatever the robot does before and after. Where it stands,
+    or moves for less than 3 s, it is compared with all that is no finding. Kept are features of all
+    frames that may be failures, and of others evenly spread, so that memory does not grow with the
+    signal.
     """
 
     def __init__(self) -> None:
         self._step, self._count = 1, 0
         self._place, self._failure = np.empty(0, np.intp), np.empty(0, bool)
+        self._pace = np.empty(0)
         self._features: Array | None = None
 
-    def add(self, features: Array, failure: Mask) -> None:
+    def add(self, features: Array, failure: Mask, pace: Array) -> None:
         """Take the features of the next frames, shape (frames, features)."""
         place = self._count + np.arange(len(features))
         self._count += len(features)
         held = features[:0] if self._features is None else self._features
         self._place = np.concatenate((self._place, place))
         self._failure = np.concatenate((self._failure, failure))
+        self._pace = np.concatenate((self._pace, pace))
         self._features = np.concatenate((held, features))
         if np.count_nonzero(~self._failure) > 2 * KEPT:
             self._step *= 2
         kept = self._failure | (self._place % self._step == 0)
         if not kept.all():
             self._place, self._failure = self._place[kept], self._failure[kept]
-            self._features = self._features[kept]
+            self._pace, self._features = self._pace[kept], self._features[kept]
 
     def relative(self, flagged: Mask) -> tuple[Index, Array] | None:
-        """Places of flagged frames, and their features unchanged and relative to those of others.
+        """Places of flagged frames, and their features unchanged and relative to the reference.
 
-        None if there are no flagged frames, or too few others.
+        None if there are no flagged frames with a reference.
         """
         own = flagged[self._place]
-        if self._features is None or not own.any() or np.count_nonzero(~own) < FEWEST:
+        if self._features is None or not own.any():
             return None
-        others, features = self._features[~own], self._features[own]
-        location = np.median(others, axis=0)
-        spread = NORMAL * np.median(np.abs(others - location), axis=0)
-        both = np.concatenate((features, _relative(features, location, spread)), axis=1)
-        return self._place[own], both
+        moves = self._pace > SLOW * np.percentile(self._pace, FAST)
+        motion = moves if np.count_nonzero(moves) >= ALIKE else ~own
+        found = [
+            (self._place[rows], _beside(self._features[rows], self._features[reference]))
+            for rows, reference in ((own & moves, motion), (own & ~moves, ~own))
+            if rows.any() and np.count_nonzero(reference) >= FEWEST
+        ]
+        if not found:
+            return None
+        places, features = zip(*found, strict=True)
+        return np.concatenate(places), np.concatenate(features)
+
+
+def _beside(features: Array, reference: Array) -> Array:
+    """Features, unchanged and relative to those of a reference, shape (frames, features)."""
+    location = np.median(reference, axis=0)
+    spread = NORMAL * np.median(np.abs(reference - location), axis=0)
+    return np.concatenate((features, _relative(features, location, spread)), axis=1)
 
 
 def _relative(features: Array, location: Array, spread: Array) -> Array:
@@ -461,10 +490,11 @@ class FrameFeatures:
     def __init__(self, profile: Profile, rows: int) -> None:
         """Start a signal of so many norms and joints of the signals that go joint by joint."""
         self._profile, self._rows = profile, rows
-        self._nothing = np.empty(0, dtype=np.intp), np.empty((0, feature_count(profile)))
+        none = np.empty(0, dtype=np.intp)
+        self._nothing = Frames(none, np.empty((0, feature_count(profile))), np.empty(0))
         self._no_windows = [
             (
-                self._nothing[0],
+                none,
                 log_band_energies(np.zeros((rows, 1, each.window)), profile, each)[:0],
             )
             for each in profile.resolutions
@@ -553,7 +583,8 @@ class FrameFeatures:
         """Features of those frames that no gap touches, by the samples that are held."""
         places = frames - self._base
         length = self._profile.length
-        whole = frames[[bool(valid[place : place + length].all()) for place in places]]
+        kept = [bool(valid[place : place + length].all()) for place in places]
+        whole = frames[kept]
         if not len(whole):
             return self._nothing
         found, windows = [], []
@@ -568,11 +599,12 @@ class FrameFeatures:
         pooled = temporal_pooling(found, self._profile)
         if self._profile.reference:
             pooled = np.concatenate((pooled, self._relative.relative(pooled)), axis=1)
-        return whole, pooled
+        first = np.lib.stride_tricks.sliding_window_view(np.abs(samples[0]), length)
+        return Frames(whole, pooled, np.add.reduce(first[places[kept]], 1) / length)
 
     def _transformed(
-        self, wanted: Index, samples: Array, known: Frames, resolution: Resolution
-    ) -> Frames:
+        self, wanted: Index, samples: Array, known: Windows, resolution: Resolution
+    ) -> Windows:
         """Known windows and those that start at wanted samples, in order, and their energies."""
         # Of few windows at a time, as a stream has them, sets are faster than arrays.
         unknown = set(wanted.ravel().tolist()) - set(known[0].tolist())
@@ -598,5 +630,5 @@ def first_sample(profile: Profile) -> int:
 def _joined(parts: list[Frames]) -> Frames:
     if len(parts) == 1:
         return parts[0]
-    starts, found = zip(*parts, strict=True)
-    return np.concatenate(starts), np.concatenate(found)
+    starts, features, pace = zip(*parts, strict=True)
+    return Frames(np.concatenate(starts), np.concatenate(features), np.concatenate(pace))

@@ -477,5 +477,5 @@ ANY = LogBands(
     speed=True,
     rounds=300,
     leaves=16,
-    alarm=0.83,
+    alarm=0.77,
 )
