@@ -177,7 +177,7 @@ def kill_while_writing(place, arguments):
         process.stdin.flush()
     else:
         process.stdin.close()
-    while process.poll() is None and not written(place):
+    while process.poll() is None and not os.listdir(place / "out"):
         time.sleep(0.001)
     process.send_signal(signal.SIGKILL)
     process.wait()
