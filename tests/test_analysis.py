@@ -310,10 +310,7 @@ def test_what_a_run_lacks_and_what_was_computed_in_its_place_is_said():
         (run, ("The run has no base pose: the robot is drawn with its base at the origin.", made)),
         (replace(run, base_pose=pose), (made,)),
         (replace(run, position=None), (positions, made)),
-        (
-            replace(run, robot="no such robot"),
-            (f"No 3D robot: 'no such robot' is {neither}", made),
-        ),
+        (replace(run, robot="no such robot"), (f"No 3D robot: 'no such robot' is {neither}", made)),
         (moving(desired=False), (none, motion)),
         (moving(valid=np.arange(5000) >= 3), (none, gap)),
     ):
@@ -358,9 +355,7 @@ def test_the_level_of_a_run_is_that_of_its_samples_with_parts_of_a_thousandth_an
 def test_the_simplified_noise_has_what_is_measured_what_is_desired_and_the_base(tmp_path):
     base = np.tile([1.0, 2.0, 2.0, 0.0, 4.0, 0.0], (10, 1))
     run = still_and_fast(
-        velocity_desired=np.tile([0.5, 0.25], (10, 1)),
-        base_velocity=base,
-        valid=np.arange(10) < 2,
+        velocity_desired=np.tile([0.5, 0.25], (10, 1)), base_velocity=base, valid=np.arange(10) < 2
     )
     found = estimate(run, "simplified")
     assert found.parts == ("a", "b", "a, desired", "b, desired", "base")

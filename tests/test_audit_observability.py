@@ -6,14 +6,7 @@ from generalmodel import fixed
 from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.audit import (
-    OSCILLATIONS,
-    Observability,
-    audit,
-    band_edges,
-    shortcomings,
-    summary,
-)
+from inspector.audit import OSCILLATIONS, Observability, audit, band_edges, shortcomings, summary
 from inspector.library import CannotTellError, demo_run, label_run, load_library, model_files
 from inspector.verdict import Status, classify_file, exit_status
 from noiseclassifier import Profile

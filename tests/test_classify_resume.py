@@ -206,10 +206,7 @@ def test_a_verdict_is_read_back_as_it_was_written(tmp_path):
         add(Verdict(Path("c.npz"), Status.INTERNAL_ERROR), "2" * 64)  # tried again
     with kept(path, settings) as (verdicts, _):
         pass
-    assert verdicts == {
-        (Path("a.npz"), "0" * 64): WHOLE,
-        (Path("b.npz"), "1" * 64): plain,
-    }
+    assert verdicts == {(Path("a.npz"), "0" * 64): WHOLE, (Path("b.npz"), "1" * 64): plain}
 
 
 @pytest.mark.parametrize("torn", [b'{"run": "half a li', b"{}", b"\xff"])

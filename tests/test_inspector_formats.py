@@ -17,13 +17,7 @@ github, junit, markdown, sarif = (
 )
 BLOW, RATTLE = Finding("impact", 1.0, 1.5, 0.9), Finding("oscillations", 2.0, 3.0, 0.8, novel=True)
 QUIET = Verdict(Path("quiet.npz"), Status.OK, "general")
-LOUD = Verdict(
-    Path("loud.npz"),
-    Status.FINDINGS,
-    "general",
-    (BLOW, RATTLE),
-    model_sha256="1f2e",
-)
+LOUD = Verdict(Path("loud.npz"), Status.FINDINGS, "general", (BLOW, RATTLE), model_sha256="1f2e")
 SLOW = Verdict(Path("slow.npz"), Status.CANNOT_TELL, message="30 Hz is below every model")
 BROKEN = Verdict(Path("broken,1.npz"), Status.BAD_INPUT, message="not a run file: 100%\nbad")
 BUG = Verdict(

@@ -6,12 +6,7 @@ import pytest
 from commandline import call
 from generalmodel import fixed
 
-from inspector.library import (
-    CannotTellError,
-    label_run,
-    load_library,
-    model_files,
-)
+from inspector.library import CannotTellError, label_run, load_library, model_files
 from noiseclassifier.signals import JOINTS, MOTION
 from noisemodel import Run
 

@@ -126,10 +126,7 @@ def test_the_help_of_a_command_ends_with_an_example_that_is_accepted(help_of, pa
 
 
 def test_at_most_100_characters_tell_what_was_assumed_and_v_tells_all(capsys):
-    short, long = (
-        "radians; robot not named",
-        "; ".join(f"column {n} is joint" for n in range(20)),
-    )
+    short, long = ("radians; robot not named", "; ".join(f"column {n} is joint" for n in range(20)))
     whole = "a sentence without an end " * 10
     say_assumed({"a": short, "b": long, "c": whole}, verbose=False)
     lines = [line.split(": ", 1)[1] for line in capsys.readouterr().err.splitlines()]

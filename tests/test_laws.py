@@ -103,8 +103,7 @@ def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(kind, joint, frequen
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("robot", "rate"),
-    [("panda", 250.0), ("ur5", 10_000.0), ("go2", 2000.0), ("talos", 1000.0)],
+    ("robot", "rate"), [("panda", 250.0), ("ur5", 10_000.0), ("go2", 2000.0), ("talos", 1000.0)]
 )
 @given(**FAULTS)
 @settings(max_examples=15, deadline=None, derandomize=True)

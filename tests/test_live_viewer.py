@@ -8,10 +8,7 @@ from inspector.live import drawing
 from inspector.recording import viewer
 
 picture = pytest.importorskip("picture")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not picture.DRIVERS, reason=picture.MISSING),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not picture.DRIVERS, reason=picture.MISSING)]
 
 
 def test_a_viewer_follows_a_session_and_reports_no_error(monkeypatch):

@@ -1,13 +1,7 @@
 import numpy as np
 import pytest
 
-from inspector.localisation import (
-    Localisation,
-    first_stage,
-    onset,
-    quiet_statistics,
-    rise,
-)
+from inspector.localisation import Localisation, first_stage, onset, quiet_statistics, rise
 from noiseclassifier import Event
 from noisemodel import Block, Run
 
@@ -119,9 +113,7 @@ def test_joints_that_are_desired_in_another_order_or_not_at_all_are_matched_by_n
     fewer = {"velocity_desired": run.velocity_desired[:, 1:], "desired_joint_names": NAMES[1:]}
     assert found(flowing_run("desired", **fewer)).joints[0] == ("knee", pytest.approx(1.0, abs=0.1))
     turned = flowing_run(
-        "desired",
-        velocity_desired=run.velocity_desired[:, ::-1],
-        desired_joint_names=NAMES[::-1],
+        "desired", velocity_desired=run.velocity_desired[:, ::-1], desired_joint_names=NAMES[::-1]
     )
     assert found(turned) == found(run)
 

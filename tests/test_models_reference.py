@@ -122,7 +122,6 @@ def test_relative_features_do_not_change_with_the_scale_of_all_amplitudes(rate):
 
 
 def rest_of(features, flagged, pace, every=7):
-    """What a signal that comes in pieces is compared with."""
     rest = Rest()
     for first in range(0, len(features), every):
         part = slice(first, first + every)

@@ -382,10 +382,7 @@ def test_a_bad_urdf_is_one_line_that_names_the_file_and_the_problem(tmp_path, ca
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            welds(3).replace("</robot>", "<a ixx='1 2'/></robot>"),
-            "ixx of <a> is '1 2', expected 1",
-        ),
+        (welds(3).replace("</robot>", "<a ixx='1 2'/></robot>"), "ixx of <a> is '1 2', expected 1"),
         *(
             (
                 welds(3).replace("</robot>", f"{mass}</robot>"),

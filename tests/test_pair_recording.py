@@ -253,10 +253,7 @@ def test_different_joints_are_shown_each(tmp_path):
         what: read(tmp_path / "out.rrd", f"/joints/velocity/{what}/0", "SeriesLines:names")[1][0]
         for what in ("before", "after")
     }
-    assert named == {
-        "before": ["b before", "a before"],
-        "after": ["b after", "c after"],
-    }
+    assert named == {"before": ["b before", "a before"], "after": ["b after", "c after"]}
     assert not any(entity.startswith("/robot") for entity in entities(tmp_path / "out.rrd"))
 
 
