@@ -429,8 +429,9 @@ class Rest:
         own = flagged[self._place]
         if self._features is None or not own.any():
             return None
-        moves = self._pace > SLOW * np.percentile(self._pace, FAST)
-        motion = moves if np.count_nonzero(moves) >= ALIKE else ~own
+        even = self._place % self._step == 0  # failures, all of which are kept, count no more
+        moves = self._pace > SLOW * np.percentile(self._pace[even], FAST)
+        motion = moves & even if np.count_nonzero(moves & even) >= ALIKE else ~own
         found = [
             (self._place[rows], _beside(self._features[rows], self._features[reference]))
             for rows, reference in ((own & moves, motion), (own & ~moves, ~own))
