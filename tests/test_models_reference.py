@@ -13,8 +13,8 @@ from noiseclassifier.features import (
     ALIKE,
     LEAST_SPREAD,
     NORMAL,
-    Rest,
     RunningReference,
+    WholeReference,
     frame_features,
 )
 
@@ -121,19 +121,19 @@ def test_relative_features_do_not_change_with_the_scale_of_all_amplitudes(rate):
         np.testing.assert_allclose(more, np.log(scale), atol=1e-3)
 
 
-def rest_of(features, flagged, pace, every=7):
-    rest = Rest()
+def taken(features, flagged, pace, every=7):
+    whole = WholeReference()
     for first in range(0, len(features), every):
         part = slice(first, first + every)
-        rest.add(features[part], flagged[part], pace[part])
-    return rest
+        whole.add(features[part], flagged[part], pace[part])
+    return whole
 
 
 @pytest.mark.parametrize("moves", [ALIKE, ALIKE - 1])
 def test_motion_is_compared_with_all_motion_if_there_is_enough_and_standing_with_the_rest(moves):
     good, number = frames(count=60), np.arange(60)
     flagged, pace = number % 4 == 1, np.where(number < moves, 2.0, 0.1)
-    places, features = rest_of(good, flagged, pace).relative(flagged)
+    places, features = taken(good, flagged, pace).relative(flagged)
     motion = good[:moves] if moves >= ALIKE else good[~flagged]
     expected = [by_median(motion, good[flagged & (pace > 1.0)])]
     expected.append(by_median(good[~flagged], good[flagged & (pace < 1.0)]))
@@ -144,24 +144,24 @@ def test_motion_is_compared_with_all_motion_if_there_is_enough_and_standing_with
 def test_standing_before_and_after_a_motion_changes_nothing_of_it():
     motion, still = frames(count=40), frames(count=50) - 5.0
     flagged, moves = np.ones(40, bool), np.full(40, 3.0)
-    _, alone = rest_of(motion, flagged, moves).relative(flagged)
+    _, alone = taken(motion, flagged, moves).relative(flagged)
     flagged = np.arange(140) // 10 % 9 > 4
     pace = np.concatenate((np.full(50, 0.01), moves, np.zeros(50)))
-    _, whole = rest_of(np.vstack((still, motion, still)), flagged, pace).relative(flagged)
+    _, whole = taken(np.vstack((still, motion, still)), flagged, pace).relative(flagged)
     np.testing.assert_array_equal(whole, alone)
 
 
-def test_a_signal_without_a_rest_is_compared_with_its_past_alone():
-    rest, none = rest_of(frames(count=20), np.ones(20, bool), np.ones(20)), np.zeros(20, bool)
-    assert Rest().relative(none[:0]) is None
-    assert rest.relative(~none) is rest.relative(none) is None
+def test_a_signal_without_another_frame_is_compared_with_its_past_alone():
+    whole, none = taken(frames(count=20), np.ones(20, bool), np.ones(20)), np.zeros(20, bool)
+    assert WholeReference().relative(none[:0]) is None
+    assert whole.relative(~none) is whole.relative(none) is None
 
 
-def test_memory_of_the_rest_does_not_grow_with_the_signal(monkeypatch):
+def test_memory_of_the_whole_reference_does_not_grow_with_the_signal(monkeypatch):
     monkeypatch.setattr(module, "KEPT", 50)
     failures = np.arange(2000) % 17 < 7
-    rest = rest_of(frames(count=2000) + 3.0 * failures[:, None], failures, np.ones(2000), every=13)
-    assert len(rest._features) <= 2 * 50 + 13 + failures.sum()
-    places, features = rest.relative(failures)
+    whole = taken(frames(count=2000) + 3.0 * failures[:, None], failures, np.ones(2000), every=13)
+    assert len(whole._features) <= 2 * 50 + 13 + failures.sum()
+    places, features = whole.relative(failures)
     np.testing.assert_array_equal(places, np.flatnonzero(failures))
     assert np.median(relative_part(features)) > 1.0  # failures count no more than other frames

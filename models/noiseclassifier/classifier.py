@@ -23,7 +23,7 @@ from noiseclassifier.features import (
     CHUNK,
     FrameFeatures,
     Frames,
-    Rest,
+    WholeReference,
     features_of_pieces,
     frame_features,
     standard,
@@ -174,22 +174,22 @@ class Classifier:
 
         Args:
             pieces: Signals and their validity, one piece or more; all else as `classify` has it.
-            whole: Whether what is found has to stand out from the rest of the signal, too: of both
+            whole: Whether what is found has to stand out from the whole signal, too: of both
                 decisions, the one with the lower failure score counts then.
         """
         self.check_rate(rate, "lower the signal's rate, or take another model")
         starts: list[Index] = []
         decisions: list[Array] = []
-        rest = Rest() if whole and self.profile.reference else None
+        reference = WholeReference() if whole and self.profile.reference else None
         for first, plain, pace in features_of_pieces(pieces, self.profile):
             starts.append(first)
             decisions.append(self.decide(plain))
-            if rest is not None:
+            if reference is not None:
                 own = plain[:, : plain.shape[1] // 2]  # the other half is relative to the past
-                rest.add(own, self._choose(decisions[-1]) != "ok", pace)
+                reference.add(own, self._choose(decisions[-1]) != "ok", pace)
         found, begins = np.concatenate(decisions), np.concatenate(starts)
         labels = self.labels(found, begins, rate, start=start)
-        again = rest.relative(labels.flagged) if rest is not None else None
+        again = reference.relative(labels.flagged) if reference is not None else None
         if again is None:
             return labels
         places, features = again

@@ -349,10 +349,10 @@ def _cosines(count: int) -> Array:
 #
 # How loud fault-free motion is differs from robot to robot by orders of magnitude. Relative to a
 # reference, it differs far less: each feature less its location there, divided by its spread. The
-# reference is the signal itself so far; of a file, also the whole. A failure that
-# fills a whole signal is invisible relative to the signal itself; therefore the unchanged features
-# stay beside. A spread is 1.48 times a median absolute deviation, the standard deviation of a
-# normal distribution (P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5.1).
+# reference is the signal itself so far, and of a file also all of it. A failure that fills a whole
+# signal is invisible relative to the signal itself; therefore the unchanged features stay beside. A
+# spread is 1.48 times a median absolute deviation, the standard deviation of a normal distribution
+# (P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5.1).
 
 
 class RunningReference:
@@ -390,7 +390,7 @@ class RunningReference:
         self._spread += (apart - self._spread) / (self._frames + FIRST_FRAMES)
 
 
-class Rest:
+class WholeReference:
     """Features of a whole signal by which its findings are compared with all of it.
 
     Motion is compared with all motion, whatever the robot does before and after. Where it stands,
@@ -429,12 +429,13 @@ class Rest:
         own = flagged[self._place]
         if self._features is None or not own.any():
             return None
-        even = self._place % self._step == 0  # failures, all of which are kept, count no more
-        moves = self._pace > SLOW * np.percentile(self._pace[even], FAST)
-        motion = moves & even if np.count_nonzero(moves & even) >= ALIKE else ~own
+        evenly = self._place % self._step == 0  # failures, all of which are kept, count no more
+        moves = self._pace > SLOW * np.percentile(self._pace[evenly], FAST)
+        motion = moves & evenly
+        enough = np.count_nonzero(motion) >= ALIKE
         found = [
             (self._place[rows], _beside(self._features[rows], self._features[reference]))
-            for rows, reference in ((own & moves, motion), (own & ~moves, ~own))
+            for rows, reference in ((own & moves, motion if enough else ~own), (own & ~moves, ~own))
             if rows.any() and np.count_nonzero(reference) >= FEWEST
         ]
         if not found:
