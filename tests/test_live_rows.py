@@ -106,7 +106,7 @@ def test_all_ways_of_reading_agree():
         (b"hello", (), "the header names no velocity; .* they are hello"),
         (b"a.velocity,b.velocity,a.position", (), "the header has no position of joint 'b'"),
         (b"a.velocity", ("b",), "the header has no velocity of joint 'b'"),
-        (b"dq1,dq2,dq3", ("a", "b"), "the header: 'dq3' is of joint 3, --names names 2"),
+        (b"dq1,dq2,dq3", ("a", "b"), "column 'dq3' is joint 3, and --names has 2"),
         (b"dq1,dq2,dq2", (), "the header names the velocity of 'joint_2' twice"),
         (b"a.velocity [Nm]", (), r"the header names no velocity; .* they are a.velocity \[Nm\]"),
     ],

@@ -115,6 +115,7 @@ FITS = {"dof_vel": VELOCITY, "t": TIME}
     [
         ({"dof_vel": VELOCITY}, [], r"there are no stamps; give the log's rate"),
         ({"speed": VELOCITY, "t": TIME}, [], "holds no known joint positions or velocit.* speed"),
+        ({"velocty": VELOCITY, "t": TIME}, [], "such as --map velocity=velocty;"),
         (
             {"dof_vel": VELOCITY.T, "t": TIME},
             [],

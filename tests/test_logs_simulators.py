@@ -343,8 +343,7 @@ def test_observations_without_names_are_an_error_with_the_line_to_type(tmp_path)
         " it has observations (400, 14), actions (400, 2)"
     )
     run = read_log(path, mapping=line.replace("--map ", "").split()).run
-    assert run.rate == 25.0
-    assert np.array_equal(run.velocity, velocity)
+    assert (run.rate, np.array_equal(run.velocity, velocity)) == (25.0, True)
 
 
 @pytest.mark.parametrize(("rate", "frequency"), [(20, 2.5), (30, 0.3), (240, 5), (500, 40)])

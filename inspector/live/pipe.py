@@ -157,8 +157,8 @@ class CsvReader:
             if not isinstance(joint, str):
                 number = joint - naming.first
                 if names and number >= len(names):
-                    problem = f"{column!r} is of joint {number + 1}, --names names {len(names)}"
-                    raise LiveError(f"the header: {problem}")
+                    problem = f"column {column!r} is joint {number + 1}"
+                    raise LiveError(f"{problem}, and --names has {len(names)}")
                 joint = names[number] if names else f"joint_{joint}"
             if joint in found.setdefault(kind, {}):
                 raise LiveError(f"the header names the {kind} of {joint!r} twice")

@@ -257,9 +257,10 @@ class Clock:
             first = int(np.argmax(lost > 0))
             line = f"gap at {time[first]:.3f} s: {lost[first]:.0f} samples are missing"
             self._warnings.note("missing samples", line, int(lost.sum()))
-        if self._first_steps is not None:
-            self._first_steps = np.concatenate((self._first_steps, steps))
-        if self._first_steps is not None and len(self._first_steps) > RATE_STEPS:
+        if self._first_steps is None:
+            return lost
+        self._first_steps = np.concatenate((self._first_steps, steps))
+        if len(self._first_steps) > RATE_STEPS:
             step, self._first_steps = float(np.median(self._first_steps)), None
             if abs(step - 1.0) > RATE_TOLERANCE:
                 line = (

@@ -332,10 +332,11 @@ def _nothing(path: Path, arrays: Arrays, not_read: Sequence[str]) -> LogError:
         return no_motion(path, [*arrays, *not_read])
     wide = [n for n, each in arrays.items() if each.ndim == 2 and meaning(n) != COMMAND]
     name = max(wide, key=lambda each: len(arrays[each]), default="qpos")
-    alike = [(n, *get_close_matches(n, ("position", "velocity"), 1)) for n in wide]
-    name, signal = next((pair for pair in alike if len(pair) == 2), (name, "position"))
+    signals = ("position", "velocity")
+    close = {n: signal for n in wide for signal in get_close_matches(n, signals, 1, 0.8)}
+    name, signal = next(iter(close.items()), (name, "position"))
     example = f"--map {signal}={name}"
-    if "obs" in name and (half := arrays[name].shape[1] // 2):
+    if not close and "obs" in name and (half := arrays[name].shape[1] // 2):
         example += f"[0:{half}] --map velocity={name}[{half}:{2 * half}]"
     shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])
     problem = "the file holds no known joint positions or velocities; name them, such as"

@@ -122,11 +122,12 @@ class Noise:
         self, runs: Sequence[tuple[Run, Given]], scenario: str, reason: str, accepted: Path
     ) -> None:
         """Accept runs as repetitions of a scenario; another test process may do so, too."""
-        measured, events = [], {}
+        found, events = [], {}
         for place, (run, source) in enumerate(runs, 1):
             file = str(source) if source is not run else f"{self._node.nodeid} {place}"
-            measured.append(_levels(run, scenario, file=file, sha256=store.digest(run)))
+            found.append(_levels(run, scenario, file=file, sha256=store.digest(run)))
             events[file] = self._judged(run, scenario)[1].events
+        measured = store.by_motion(found, store.names_in(accepted))
         wanted, by = store.wanted_in(measured, events), store.who()
         store.accept_into(accepted, measured, wanted=wanted, reason=reason, by=by)
 

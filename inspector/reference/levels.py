@@ -66,9 +66,11 @@ class Levels:
         """Name of a scenario of its own, if another motion has its name: with that of its file."""
         folder, _, last = self.name.rpartition("/")
         stem = Path(self.run).stem
+        if not stem:
+            return self.name
         if not stem.startswith(last):
             return f"{self.name}/{stem}"
-        return "/".join(filter(None, (folder, stem))) or self.name
+        return f"{folder}/{stem}" if folder else stem
 
     @property
     def first(self) -> NDArray[np.float32]:
