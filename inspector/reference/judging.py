@@ -26,8 +26,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector.reference.levels import HOP, SIGNALS, Levels, Octaves
-from inspector.verdict import Evidence
+from inspector.reference.levels import HIGHEST, HOP, SIGNALS, Levels, Octaves
+from inspector.verdict import Evidence, Finding
 from noisemodel.types import Array
 
 PAD = 20  # frames for which a repetition is held before its start and after its end: delays
@@ -69,6 +69,7 @@ GAP = 1.0
 SAME_MOTION, SAME_NAME = 0.8, 0.2
 # Time and share of its scenario by which a run may be longer or shorter without a word.
 LONGER, SHARE_LONGER = 0.5, 0.1
+WHOLE = 0.9  # share of a run's band that is compared, from which on nothing is said
 ALIKE = 0.9  # share of the best one's from which another scenario is of the same motion, too
 Real32 = NDArray[np.float32]
 
@@ -258,12 +259,23 @@ class Comparison:
         """Share of the frames that have an evidence."""
         return float(np.mean(self.kind == KINDS.index(kind))) if len(self.kind) else 0.0
 
-    def covered(self, start: float, stop: float) -> bool:
-        """Whether a reference covers all frames whose middle lies in a stretch, or the nearest."""
-        inside = (self.time >= start) & (self.time <= stop)
+    def covered(self, event: Finding) -> bool:
+        """Whether a reference covers all frames of a finding, in its joint and up to its band.
+
+        The frames are those whose middle lies in it, or the nearest.
+        """
+        inside = (self.time >= event.start) & (self.time <= event.stop)
         if not inside.any() and len(inside):
-            inside[np.abs(self.time - (start + stop) / 2).argmin()] = True
-        return bool(inside.any() and np.isfinite(self.score[inside]).all())
+            inside[np.abs(self.time - (event.start + event.stop) / 2).argmin()] = True
+        known, over = event.localisation, self.over[inside]
+        if known is None and (self.joints, self.octaves) != (self.run.joints, self.run.octaves):
+            return False
+        if known is not None and known.joints:
+            over = over[:, [joint == known.joints[0][0] for joint in self.joints]]
+        if known is not None and known.band:
+            over = over[..., [high > known.band[0] for _, high in self.octaves]]
+        whole = np.isfinite(self.score[inside]) & np.isfinite(over).any(axis=(1, 2, 3))
+        return bool(inside.any() and whole.all())
 
     def __str__(self) -> str:
         number = f"{self.repetitions} repetition{'s' * (self.repetitions != 1)}"
@@ -372,12 +384,12 @@ def _common(
     cells, remarks = Cells.shared(run, every, any), []
     if lacking := [joint for joint in run.joints if joint not in cells.joints]:
         remarks.append(f"no reference for joints {', '.join(lacking[:5])}")
-    if len(cells.octaves) < len(run.octaves):
+    top = cells.octaves[-1][1] if cells.octaves else 0.0
+    if top < WHOLE * HIGHEST * run.rate:
         rates = sorted({each.rate for each in every})
         shown = ", ".join(f"{rate:g}" for rate in rates[:3])
         remarks.append(
-            f"compared up to {cells.octaves[-1][1] if cells.octaves else 0:.0f} Hz: the run has"
-            f" {run.rate:g} Hz, the reference {shown} Hz"
+            f"compared up to {top:.0f} Hz: the run has {run.rate:g} Hz, the reference {shown} Hz"
         )
     return cells, remarks
 

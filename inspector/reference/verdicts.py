@@ -250,8 +250,7 @@ def _events(
     if comparison.scenarios:
         references = f"{comparison.repetitions} of {' and '.join(comparison.scenarios)}"
     for event in left:
-        covered = comparison.covered(event.start, event.stop)
-        excused = f"as loud as {references}" if covered else ""
+        excused = f"as loud as {references}" if comparison.covered(event) else ""
         found.append(replace(event, evidence=replace(GENERAL, excused=excused)))
     return tuple(sorted(found, key=lambda event: (event.start, event.stop)))
 
