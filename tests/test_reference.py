@@ -15,6 +15,7 @@ import pytest
 from commandline import call
 
 import inspector
+import noisemodel as nm
 from inspector.reference import judging, store
 from inspector.reference.levels import decoded, encoded, levels, octaves
 from inspector.reference.store import Reference
@@ -233,6 +234,31 @@ def test_a_reference_of_another_robot_is_told_and_the_general_model_decides(own,
     assert "pick: 1 repetition replace the accepted, of a robot with other joints" in out
 
 
+def test_what_no_reference_covers_is_decided_by_the_general_model(own, simulate):
+    run = simulate.run("pick", 9)
+    tone = 0.3 * np.sin(600 * np.pi * run.time) * np.exp(-(((run.time - 3) / 0.3) ** 2))
+    loud = replace(run, velocity=run.velocity + np.eye(len(run.joint_names))[-1] * tone[:, None])
+    loud.save(own / "now.npz")
+    for name, change in (
+        ("fewer", without_last_joint),
+        ("slower", lambda one: nm.decimated(one, 250.0)),
+    ):
+        (own / name).mkdir()
+        for number in (1, 2, 3):
+            change(simulate.run("pick", number)).save(own / name / f"pick-{number}.npz")
+        status, runs, _ = classified(own / "now.npz", "--reference", own / name)
+        (event,) = runs["now"]["events"]
+        assert (status, event["evidence"]["kind"], event["fails"]) == (1, "general", True)
+    assert classified(own / "now.npz", "--reference", own / "runs")[0] == 1
+
+
+def without_last_joint(run):
+    kept = {name: getattr(run, name)[:, :-1] for name in ("position", "velocity")}
+    kept |= {f"{name}_desired": getattr(run, f"{name}_desired")[:, :-1] for name in kept}
+    names = run.joint_names[:-1]
+    return replace(run, joint_names=names, desired_joint_names=names, **kept)
+
+
 def test_a_run_played_slower_and_begun_later_is_aligned(reference, simulate):
     run = simulate.run("pick", 7)
     source = np.arange(0, len(run.time) - 1, 0.97)
@@ -358,6 +384,16 @@ def test_findings_in_what_is_accepted_are_warned_of_and_wanted_from_then_on(own,
 
 
 # --- the store
+
+
+def test_what_people_want_of_a_scenario_stays_when_its_runs_are_replaced(own, project):
+    toml, place = own / "reference" / "reference.toml", '\n[[scenario]]\nname = "place"'
+    wanted = '\n[[scenario.wanted]]\nclass = "impact"\ntime_s = [1.0, 2.0]\nrequired = true\n'
+    toml.write_text(toml.read_text().replace(place, wanted + place))
+    again = project / "chatter" / "pick-1.npz"
+    assert "replace" in call("accept", again, "--reason", "louder", "-o", own / "reference")[1]
+    (pick, *_) = Reference.load(own / "reference").scenarios
+    assert [each.label for each in pick.wanted if each.required] == ["impact"]
 
 
 def test_what_is_wanted_may_be_as_loud_as_stated_and_is_missed(own, project):

@@ -268,7 +268,7 @@ def accept(
     after, changes = store.accept_into(
         folder,
         levels,
-        wanted=store.wanted_in(levels, {str(each.path): each.events for each in verdicts}),
+        events={str(each.path): each.events for each in verdicts},
         reason=reason.strip(),
         by=by or store.who(),
     )

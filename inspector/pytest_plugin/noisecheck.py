@@ -127,9 +127,7 @@ class Noise:
             file = str(source) if source is not run else f"{self._node.nodeid} {place}"
             found.append(_levels(run, scenario, file=file, sha256=store.digest(run)))
             events[file] = self._judged(run, scenario)[1].events
-        measured = store.by_motion(found, store.names_in(accepted))
-        wanted, by = store.wanted_in(measured, events), store.who()
-        store.accept_into(accepted, measured, wanted=wanted, reason=reason, by=by)
+        store.accept_into(accepted, found, events=events, reason=reason, by=store.who())
 
     def _allowed(self, allow: str | Iterable[Allowed]) -> tuple[Allowed, ...]:
         """What may be there, of classes that there are."""

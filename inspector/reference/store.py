@@ -28,11 +28,13 @@ from inspector.logs.read import Reading, open_source, sources
 from inspector.reference.judging import (
     Comparison,
     Expected,
+    Margin,
     Scenario,
     compare,
     leave_one_moment_out,
     leave_one_out,
     margin_of,
+    robot_fits,
     share_of_motion,
 )
 from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encoded, levels, octaves
@@ -234,22 +236,24 @@ def calibrated(scenario: Scenario) -> Scenario:
 
 def names_in(folder: Path) -> tuple[str, ...]:
     """Names of the scenarios of a store; none if there is none."""
-    there = os.path.lexists(folder / NAME)
-    return tuple(each.name for each in Reference.load(folder).scenarios) if there else ()
+    if not os.path.lexists(folder / NAME):
+        return ()
+    with _alone_in(folder):
+        return tuple(each.name for each in Reference.load(folder).scenarios)
 
 
 def accept_into(
     folder: Path,
     runs: Sequence[Levels],
     *,
-    wanted: Mapping[str, Sequence[Expected]],
+    events: Mapping[str, Sequence[Event]],
     reason: str,
     by: str,
 ) -> tuple[Reference, list[tuple[str, str]]]:
     """Accept runs into a store, and tell what changed by the names of scenarios; all others stay.
 
     Runs of an accepted scenario that are as it is join its repetitions, of which the newest ten
-    stay; runs that differ replace them.
+    stay; runs that differ replace them. Findings in runs, by their files, are wanted from then on.
     """
     home = folder.absolute().parent
     for each in runs:
@@ -258,7 +262,9 @@ def accept_into(
     with _alone_in(folder):
         there = os.path.lexists(folder / NAME)
         kept = {each.name: each for each in (Reference.load(folder).scenarios if there else ())}
-        found = of_runs([replace(each, run=_within(each.run, home)) for each in runs])
+        named = by_motion(runs, kept)
+        wanted = wanted_in(named, events)
+        found = of_runs([replace(each, run=_within(each.run, home)) for each in named])
         changes = []
         for new in found:
             facts: dict[str, Any] = {"accepted": date.today(), "by": by, "reason": reason}
@@ -306,7 +312,9 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
     over, margin = [compare(each, (old,)) for each in fresh], margin_of(old.scores_db).db
     same = all(not each.exceedances and each.scenarios and each.quieter <= margin for each in over)
     repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
-    own = {**facts, "wanted": old.wanted if same else facts["wanted"]}
+    # What people wrote stays; what an earlier `accept` heard does not.
+    by_hand = (e for e in old.wanted if e.required or e.reason or e.loudest_db is None)
+    own = {**facts, "wanted": old.wanted if same else (*by_hand, *facts["wanted"])}
     changed = calibrated(replace(old, repetitions=repetitions, **own))
     worst = max((each.worst for each in over if isfinite(each.worst)), default=float("nan"))
     words = f"{counted(len(fresh), 'repetition')} {'added' if same else 'replace the accepted'}"
@@ -367,7 +375,10 @@ def save(reference: Reference, folder: Path) -> None:
     for scenario in reference.scenarios:
         name = _file_name(scenario.name, names)
         sha256 = _write_levels(folder / name, scenario)
-        lines += ["", *_lines(scenario, name, sha256)]
+        newest = scenario.repetitions[-1]
+        alike = [each for each in reference.scenarios if robot_fits(newest, each)]
+        margin = margin_of([db for each in alike for db in each.scores_db])
+        lines += ["", *_lines(scenario, margin, name, sha256)]
     with replacing(folder / NAME, overwrite=True) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
     for path in folder.glob("*.npz"):  # of scenarios that people removed
@@ -405,7 +416,7 @@ def _write_levels(path: Path, scenario: Scenario) -> str:
         return hashlib.sha256(temporary.read_bytes()).hexdigest()
 
 
-def _lines(scenario: Scenario, file: str, sha256: str) -> list[str]:
+def _lines(scenario: Scenario, margin: Margin, file: str, sha256: str) -> list[str]:
     """A scenario as TOML."""
     newest = scenario.repetitions[-1]
     loud = newest.level.reshape(len(newest.level), len(newest.joints), -1)
@@ -416,7 +427,7 @@ def _lines(scenario: Scenario, file: str, sha256: str) -> list[str]:
         **{key: getattr(scenario, key) for key in FACTS},
         "accepted": scenario.accepted or date.today(),
         "duration_s": [round(each, 3) for each in scenario.duration],
-        "margin_db": round(margin_of(scenario.scores_db).db, 1),
+        "margin_db": round(margin.db, 1),
         "scores_db": list(scenario.scores_db),
         "elsewhere_db": list(scenario.elsewhere_db),
         "joints": list(newest.joints),
