@@ -70,6 +70,12 @@ def test_quiet_stretches_keep_clear_of_failures_and_gaps():
     assert quiet_stretches(run, [Block(0.0, 6.0, "impact")], length=0.1) == []
 
 
+def test_a_run_of_measured_velocities_alone_names_the_joint_but_no_stage():
+    alone = shaken_run(velocity_desired=None, desired_joint_names=())
+    found = localise(alone, [SHAKE])[SHAKE]
+    assert (found.stage, found.following, found.joints[0][0]) == ("", "", "knee")
+
+
 def test_the_words_for_a_localisation_are_stage_lead_joints_and_band():
     joints = (("knee", 0.8), ("hip", 0.04))
     found = Localisation("commanded", "measured", 0.003, joints=joints, band=(85.0, 130.0))

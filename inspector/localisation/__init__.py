@@ -242,7 +242,22 @@ def quiet_statistics(run: Run, failures: Sequence[Failure]) -> QuietStatistics:
     size = velocity.shape[2]
     warm = min(max(1, round(WARM * run.rate)), size - 1)
     change = sudden(velocity, first.valid, run.rate)
-    step = max(1, (size - warm) * len(change) // ROWS)
+    weights = np.zeros((0, joints, len(lags)))
+    if stages > 1:
+        weights = _prediction(change, lags, warm)
+    level = _innovation(change, weights, lags, first.valid).level[..., warm:]
+    return QuietStatistics(  # over stretches; levels have the shape (stretches, stages, samples)
+        weights,
+        lags,
+        power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
+        peak=np.percentile(level.max(axis=2), 90.0, axis=0),
+    )
+
+
+def _prediction(change: Array, lags: Indices, warm: int) -> Array:
+    """Weights by which each stage's changes in quiet stretches predict those of the next one."""
+    count, stages, size, joints = change.shape
+    step = max(1, (size - warm) * count // ROWS)
     # By stage, joint, stretch and sample, and then with all samples in a row.
     moved = np.ascontiguousarray(change.transpose(1, 3, 0, 2))
     target = moved[1:, ..., warm::step].reshape(stages - 1, joints, -1)
@@ -252,14 +267,7 @@ def quiet_statistics(run: Run, failures: Sequence[Failure]) -> QuietStatistics:
     square = past @ past.swapaxes(2, 3)
     mean = np.trace(square, axis1=2, axis2=3)[..., None, None] / len(lags)
     square = square + (RIDGE * mean + np.finfo(float).tiny) * np.eye(len(lags))
-    weights = np.linalg.solve(square, past @ target[..., None])[..., 0]
-    level = _innovation(change, weights, lags, first.valid).level[..., warm:]
-    return QuietStatistics(  # over stretches; levels have the shape (stretches, stages, samples)
-        weights,
-        lags,
-        power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
-        peak=np.percentile(level.max(axis=2), 90.0, axis=0),
-    )
+    return np.asarray(np.linalg.solve(square, past @ target[..., None])[..., 0])
 
 
 def _innovation(change: Array, weights: Array, lags: Indices, valid: Mask) -> Innovation:
@@ -584,12 +592,13 @@ def localise(
     failures: list[Failure] = [*found, *annotated]
     if not failures:
         return {}
-    quiet = quiet_statistics(run, failures) if has_stages(run) else None
+    quiet, staged = quiet_statistics(run, failures), has_stages(run)
     localised = {}
     for failure in failures:
         reach = max(ANNOTATED, frame) if failure in found else ANNOTATED
-        stage = Localisation() if quiet is None else first_stage(run, quiet, failure, reach=reach)
-        localised[failure] = replace(stage, band=band(run, failure, failures))
+        known = first_stage(run, quiet, failure, reach=reach)
+        stage = known.stage if staged else ""  # it says nothing if there is no other
+        localised[failure] = replace(known, stage=stage, band=band(run, failure, failures))
     return localised
 
 
