@@ -53,6 +53,25 @@ def test_a_stream_with_a_finding_prints_it_and_ends_with_1(live):
     assert any(line.startswith("findings: 1 impact") for line in lines)
 
 
+def test_single_samples_that_are_lost_or_late_hide_no_finding(live, rows):
+    """As in a file, which `classify` takes for one without a gap."""
+    header, *lines = rows[0].splitlines()
+    lossy = [line for place, line in enumerate(lines) if place % 3000 or not place]
+    early = rows[0].replace("\n2,", "\n2.00004,").replace("\n1.5,", "\n1.50004,")
+    for text in ("\n".join([header, *lossy, ""]), early):
+        status, out, _ = live(text=text)
+        assert (status, "findings: 1 impact" in out) == (1, True)
+
+
+def test_a_stream_of_which_little_can_be_judged_is_not_ok(live, rows):
+    header, *lines = rows[0].splitlines()
+    holes = [line for place, line in enumerate(lines) if place % 4200 > 30]
+    status, out, _ = live(text="\n".join([header, *holes[:15_000], ""]))
+    assert (status, "cannot-tell: gaps leave labels to" in out) == (4, True)
+    status, out, _ = live(text="\n".join([header, *lines[:5900], ""]))
+    assert (status, "it takes 0.6 s to tell what lasts" in out) == (4, True)
+
+
 def test_json_lines_tell_of_a_finding_when_it_is_there_and_when_it_is_over(live):
     status, out, _ = live("--format", "json")
     begin, end, summary = map(json.loads, out.splitlines())

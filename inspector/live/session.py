@@ -21,6 +21,7 @@ from inspector.logs.motion import LONG, LimitWatch
 from inspector.recording.views import FARTHEST
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from noiseclassifier import Event, merged
+from noiseclassifier.lasting import SHORTEST
 from noisemodel.files import beyond, limit
 from noisemodel.robot import joint_limits
 from noisemodel.run import LARGEST, unnamed
@@ -128,7 +129,9 @@ def widths_of(rows: Mapping[str, Array], joint_names: Sequence[str]) -> dict[str
     return {name: array.shape[1] for name, array in rows.items()}
 
 
-GAP_STEPS = 1.5  # steps after which a sample is taken to be missing; timestamps may jitter by less
+GAP_STEPS = 1.5  # steps after which a sample may be missing; timestamps may jitter by less
+MISSING = 0.75  # steps by which a sample is late after the others, if one before it is missing
+FEW = 4  # samples in a row that are interpolated if they are missing; more are a gap, as in a file
 JUMP_STEPS = 20.0  # steps beyond which a timestamp is believed only once others agree with it
 AGREE = 5  # timestamps in a row that make a jump a new segment, and no outlier
 # Jump ahead up to which samples are missing, in [s]; beyond, the clock was set.
@@ -158,6 +161,7 @@ class Clock:
         self._last = self._shift = 0.0  # timestamp of the last sample taken; from there to its time
         self._before: float | None = None  # its time
         self._first_steps: Array | None = np.empty(0)  # until the rate is checked by them
+        self._late = 0.0  # steps by which the last sample came later than those before it
 
     def take(self, stamps: Array, *, ended: bool = False) -> tuple[Mask, Array, Array]:
         """Decide about samples, those that waited before first; if the stream ended, about all.
@@ -249,10 +253,10 @@ class Clock:
         """Samples that are missing before each time; warns of them, and once of a wrong rate."""
         if not len(time):
             return np.empty(0)
-        before = time[0] if self._before is None else self._before
+        before = time[0] - 1.0 / self._rate if self._before is None else self._before
         steps = self._rate * np.diff(time, prepend=before)
         self._before = float(time[-1])
-        lost = np.where(steps >= GAP_STEPS, np.round(steps) - 1.0, 0.0)
+        lost = self._missing(steps)
         if lost.any():
             first = int(np.argmax(lost > 0))
             line = f"gap at {time[first]:.3f} s: {lost[first]:.0f} samples are missing"
@@ -268,6 +272,20 @@ class Clock:
                     f" {self._rate:g} Hz: labels and spectrogram are wrong, set --rate"
                 )
                 self._warnings.note("wrong rate", line)
+        return lost
+
+    def _missing(self, steps: Array) -> Array:
+        """Samples that are missing before each: a late one after an early one tells of none."""
+        lost = np.zeros(len(steps))
+        usual = float(np.clip(np.median(steps), 1.0 - RATE_TOLERANCE, 1.0 + RATE_TOLERANCE))
+        late, done = self._late, 0
+        for place in [*np.flatnonzero(steps >= GAP_STEPS).tolist(), len(steps)]:
+            late += float((steps[done : place + 1] - usual).sum())
+            if place < len(steps) and late >= MISSING:
+                lost[place] = round(late)
+                late -= lost[place]
+            done = place + 1
+        self._late = 0.5 * float(np.clip(late, -0.5, 0.5))  # errors must not add up
         return lost
 
     def _note_dropped(self, stamps: Array) -> None:
@@ -286,6 +304,7 @@ UNSEEN = "samples that the viewer may not have shown"
 BATCH = 0.05  # samples are worked on in batches of this duration, in [s]
 FASTEST = 1e6  # highest rate, in [Hz]
 MOST_DROPPED = 0.05  # share of the samples that may be left out for a verdict of `ok`
+LEAST_LABELLED = 0.5  # share of the stream that has labels in such a verdict
 
 
 @dataclass(frozen=True)
@@ -370,6 +389,7 @@ class LiveSession:
         self._latest, self._now = -1.0 / rate, 0.0  # timestamp that came, time that was worked on
         self._buffer: SampleBuffer | None = None  # what follows is there once there are samples
         self._samples = self._unconfirmed = 0  # since the viewer was last known to be there
+        self._last: tuple[Array, dict[str, Array]] | None = None  # time and signals of a sample
         self._counts: Counter[str] = Counter()  # frames that were labelled, by class
         self._levels: Levels | None = None
         self._closed = False
@@ -439,6 +459,8 @@ class LiveSession:
             status = Status.CANNOT_TELL
             told = ", ".join(f"{count} {kind}" for kind, count in dropped.items())
             reason = f"more than {MOST_DROPPED:.0%} of the samples were left out ({told})"
+        elif status is Status.OK and (reason := self._untold(samples / self._rate)):
+            status = Status.CANNOT_TELL
         return Summary(
             samples=samples,
             rate=self._rate,
@@ -451,6 +473,14 @@ class LiveSession:
             reason=reason,
             levels=self._levels,
         )
+
+    def _untold(self, seconds: float) -> str:
+        """Why labels of a stream that lasts so long are too few for a verdict; empty if not."""
+        labeller, count = self._labeller, self._counts.total()
+        if seconds < SHORTEST:
+            return f"{seconds:.3g} s of samples; it takes {SHORTEST:g} s to tell what lasts"
+        share = count / max(1.0, (seconds - labeller.length) / labeller.hop)
+        return f"gaps leave labels to {share:.0%} of the stream" if share < LEAST_LABELLED else ""
 
     def close(self) -> Summary:
         """Show what waits, tell of findings that last to the end, and end the recording."""
@@ -558,6 +588,7 @@ class LiveSession:
         self._samples += len(kept)
         if not len(time):
             return
+        time, signals, lost = self._filled(time, signals, lost)
         self._now = float(time[-1])
         self._drawing.begin(float(time[0]), signals)
         motion = np.hstack([signals[name] for name in self._noisy])
@@ -590,6 +621,26 @@ class LiveSession:
         self._unconfirmed = 0 if self._sink.check_viewer() else self._unconfirmed + len(time)
         if self._sink.gone:
             self._note_unseen()
+
+    def _filled(
+        self, time: Array, signals: dict[str, Array], lost: Array
+    ) -> tuple[Array, dict[str, Array], Array]:
+        """Samples with the few that are missing, interpolated as they are in a file."""
+        before, last = self._last, {name: values[-1:] for name, values in signals.items()}
+        self._last = (time[-1:], last)
+        few = (lost > 0) & (lost <= FEW)
+        if before is None or not few.any():
+            return time, signals, lost
+        place = np.cumsum(1 + np.where(few, lost, 0.0))
+        every, known = np.arange(1, place[-1] + 1), np.append(0.0, place)
+        found = {}
+        for name, values in signals.items():
+            whole = np.vstack((before[1][name], values))
+            columns = [np.interp(every, known, column) for column in whole.T]
+            found[name] = np.reshape(columns, (whole.shape[1], len(every))).T
+        left = np.zeros(len(every))
+        left[place.astype(int) - 1] = np.where(few, 0.0, lost)
+        return np.interp(every, known, np.append(before[0], time)), found, left
 
     def _label(self, time: Array, motion: Array, valid: Mask) -> None:
         """Label and draw a stretch without missing samples."""
