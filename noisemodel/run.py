@@ -141,8 +141,8 @@ class Run:
 
     @cached_property
     def rate(self) -> float:
-        """Nominal sample rate: the inverse of the median step, in [Hz]."""
-        return float(f"{1.0 / median_step(self.time):.9g}")
+        """Nominal sample rate: the inverse of the mean step, in [Hz]."""
+        return float(f"{(len(self.time) - 1) / float(self.time[-1] - self.time[0]):.9g}")
 
     @property
     def duration(self) -> float:

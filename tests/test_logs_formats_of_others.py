@@ -13,6 +13,7 @@ from commandline import call
 
 from inspector import read_log
 from inspector.errors import LogError
+from inspector.logs.names import column_signal
 
 TIME = np.arange(21) / 100
 EPOCH = 1_700_000_000  # where absolute stamps start, in [s] since 1970
@@ -346,11 +347,38 @@ def test_columns_take_the_place_of_a_header_and_leave_columns_out(tmp_path):
         read_log(path, columns=("time", "q1", "q2"))
 
 
+def test_milliseconds_that_could_be_seconds_are_known_by_positions_and_velocities(tmp_path):
+    time = np.arange(4000) / 2000
+    rows = np.column_stack((time, np.sin(3 * time), 3 * np.cos(3 * time)))
+    lines = [f"{1000 * t:g},{q:.9f},{v:.9f}" for t, q, v in rows]
+    (tmp_path / "log.csv").write_text("\n".join(["time,q1,dq1", *lines]))
+    found = read_log(tmp_path / "log.csv")
+    assert found.run.rate == pytest.approx(2000.0)
+    assert any("positions and velocities fit, if stamps are in" in each for each in found.remarks)
+
+
+def test_dates_a_second_apart_are_no_milliseconds(tmp_path):
+    lines = [f"2024-03-01T00:{i // 60:02}:{i % 60:02},{np.sin(i)}" for i in range(200)]
+    (tmp_path / "log.csv").write_text("\n".join(["time,q1", *lines]))
+    assert read_log(tmp_path / "log.csv").run.rate == 1.0
+
+
+@pytest.mark.parametrize("word", ["Set", "Demand", "Nominal", "traj", "requested", "tgt"])
+def test_a_set_point_is_never_a_measured_signal(word):
+    name = f"Axis1.{word}Vel" if word.istitle() else f"Axis1_{word}_vel"
+    assert column_signal(name) == ("velocity_desired", "Axis1")
+    assert column_signal("Axis1_max_vel") is None
+
+
 @pytest.mark.parametrize(
     ("stamp", "message"),
     [
         (lambda time: round(100 * time), "'time' counts samples; give the log's rate.* --rate HZ"),
-        (ticks(1e4, 0), "median step of 100 is milliseconds or microseconds; .* --rate 10$"),
+        (ticks(1e4, 0), "100 is milliseconds or microseconds; .* --rate 10 or --rate 10000$"),
+        (
+            lambda time: EPOCH + round(100 * time),
+            "step of 1 is seconds or milliseconds; .* --rate 1 or --rate 1000$",
+        ),
         (ticks(1e3, EPOCH * 10**5), "median step of 10 is none that is known; .* --rate 100$"),
     ],
 )

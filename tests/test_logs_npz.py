@@ -38,6 +38,16 @@ def test_a_run_file_whose_time_is_not_uniform_is_resampled(tmp_path):
     assert np.allclose(run.velocity[:, 0], np.sin(since), atol=1e-4)
 
 
+def test_the_unit_in_a_name_counts_for_arrays_as_for_columns(tmp_path):
+    arrays = {"q_deg": np.rad2deg(POSITION), "dq_degs": np.rad2deg(VELOCITY)}
+    columns = {n.replace("q", f"q{i}"): a[:, i] for n, a in arrays.items() for i in range(len(a.T))}
+    for each in (arrays, columns):
+        found = read_log(save(tmp_path, time=TIME, **each))
+        assert np.allclose(found.run.velocity, VELOCITY)
+        assert np.allclose(found.run.position, POSITION)
+        assert any("converted from deg" in remark for remark in found.remarks)
+
+
 FREE = """<mujoco><worldbody><body><freejoint/><geom size="0.1"/>
 <body pos="0.2 0 0"><joint name="arm" axis="0 0 1"/><geom size="0.05"/></body>
 </body></worldbody></mujoco>"""

@@ -44,7 +44,9 @@ LARGEST_STEP = 1.0  # larger steps of a position are a turn or a reset, in [rad]
 # Least correlation of velocities with the steps of positions from which the rate is found.
 FITS = 0.98
 # Relative difference from which a rate found from the values contradicts a stated one.
-DISAGREE = 0.25
+DISAGREE = 0.1
+LONGEST_DATES = 3600.0  # longest step of stamps that are dates, in [s]
+SLOW = 0.02  # median step from which stamps in seconds may be in milliseconds, in [s]
 # Share of samples out of order above which a log is refused: it is several, or has no stamps.
 MOST_UNORDERED = 0.1
 BLOCK = 500_000  # values that are interpolated at once, which takes about ten times their memory
@@ -69,22 +71,29 @@ def _unit_of(path: Path, name: str, first: float, steps: Array, rate: float | No
         return "seconds"
     rates = {unit: 1 / (step * float(UNITS[unit])) for unit in UNITS} if step else {}
     low, high = RATES[0] / NEARLY, RATES[1]
+    dates = start["seconds"] > EPOCH[0] and step < LONGEST_DATES
     possible = {
         unit: f"{each:g}"
         for unit, each in rates.items()
-        if (low < each or unit == "nanoseconds") and each <= high and start[unit] < EPOCH[1]
+        if (low < each or unit == "nanoseconds" or (unit == "seconds" and dates))
+        and each <= high
+        and start[unit] < EPOCH[1]
     }
-    found = [unit for unit in possible if start[unit] > EPOCH[0]] or list(possible)
+    absolutely = [unit for unit in possible if start[unit] > EPOCH[0]]
+    # Stamps of a robot that has been on for weeks, in ms, are like dates a second apart.
+    found = list(possible) if absolutely in ([], ["seconds"]) else absolutely
     if len(found) == 1:
         return found[0]
     unit = " or ".join(found) or "none that is known"
-    how = f"with the log's rate it is recognised: --rate {next(iter(possible.values()), '100')}"
+    rates_known = " or ".join(f"--rate {possible[each]}" for each in found) or "--rate 100"
+    how = f"with the log's rate it is recognised: {rates_known}"
     raise LogError(path, f"the unit of stamps with a median step of {step:g} is {unit}; {how}")
 
 
 def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -> Stamps:
     """Stamps from an array of numbers."""
-    if values.dtype.kind == "M":
+    dated = values.dtype.kind == "M"
+    if dated:
         values = values.astype("datetime64[ns]").astype(np.int64)
     if values.dtype.kind not in "iuf" or values.ndim != 1 or len(values) < 2:
         held = f"{values.dtype} of shape {values.shape}"
@@ -93,7 +102,8 @@ def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -
         sample = int(np.argmin(np.isfinite(values)))
         raise LogError(path, f"column {name!r} holds {values[sample]} (sample {sample + 1})")
     since = (values - values[0]).astype(np.float64)
-    return stamps_since(path, name, Decimal(str(values[0])), since, rate)
+    first = Decimal(str(values[0]))
+    return stamps_since(path, name, first, since, rate, unit="nanoseconds" if dated else "")
 
 
 def stamps_since(
@@ -103,9 +113,10 @@ def stamps_since(
     since: Array,
     rate: float | None,
     rows: Sequence[int] | None = None,
+    unit: str = "",
 ) -> Stamps:
     """Stamps from the first one, exact, and the differences to it, shape (samples,)."""
-    unit = _unit_of(path, name, float(first), np.diff(since), rate)
+    unit = unit or _unit_of(path, name, float(first), np.diff(since), rate)
     if unit == SAMPLES:
         return Stamps(Decimal(0), since, rows, unit, name=name)
     time = since if unit == "seconds" else since * float(UNITS[unit])
@@ -119,16 +130,32 @@ def in_seconds(path: Path, tracks: Sequence[Track], options: ReadOptions) -> lis
     found = None
     if position and velocity and position.stamps is velocity.stamps:
         shared = [joint for joint in position.joints if joint in velocity.joints]
-        if shared and position.stamps.unit == SAMPLES:
-            holes = np.concatenate(([False], np.diff(position.stamps.time) != 1))
+        stamps = position.stamps
+        if shared and stamps.unit == SAMPLES:
+            holes = np.concatenate(([False], np.diff(stamps.time) != 1))
             known = np.where(holes[:, None], np.nan, position.of(shared))
             found = rate_of(known, velocity.of(shared))
+        elif shared and _may_be_milliseconds(stamps, options):
+            found = rate_of(position.of(shared), velocity.of(shared))
     timed = {
         id(stamps): _timed(path, stamps, options, found)
         for stamps in clocks_of(tracks)
         if stamps.unit == SAMPLES
     }
+    for stamps in clocks_of(tracks) if found is not None and not timed else ():
+        assert found is not None
+        if abs(found * float(np.median(np.diff(stamps.time))) / 1000 - 1) <= DISAGREE:
+            own = replace(stamps, start=stamps.start / 1000, time=stamps.time / 1000)
+            why = f"at {found:g} Hz positions and velocities fit, if stamps are in milliseconds"
+            timed[id(stamps)] = replace(own, unit="milliseconds", remark=why)
     return on_clocks(tracks, timed)
+
+
+def _may_be_milliseconds(stamps: Stamps, options: ReadOptions) -> bool:
+    """Whether stamps were taken for seconds by their steps alone, which are long for these."""
+    told = options.rate or TIME_UNITS.get(without_unit(stamps.name)[1])
+    slow = len(stamps.time) > 1 and float(np.median(np.diff(stamps.time))) > SLOW
+    return slow and not told and stamps.unit == "seconds" and stamps.start < Decimal(EPOCH[0])
 
 
 def _timed(path: Path, stamps: Stamps, options: ReadOptions, found: float | None) -> Stamps:

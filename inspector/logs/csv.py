@@ -113,7 +113,8 @@ def _read(path: Path, options: ReadOptions) -> Log:
     else:  # absolute stamps exceed the precision of a float
         exact = _decimals(path, header[time], cells, rows)
         since = np.array([float(stamp - exact[0]) for stamp in exact])
-        stamps = stamps_since(path, header[time], exact[0], since, options.rate, rows)
+        unit = "" if _date(cells[0]) is None else "seconds"
+        stamps = stamps_since(path, header[time], exact[0], since, options.rate, rows, unit)
     for place, lacking in zip(wanted, np.isnan(values).T, strict=True):
         if SPARSE <= (share := lacking.mean()) < 1:
             how = "columns with another clock must be in a separate log (--desired)"

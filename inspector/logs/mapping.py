@@ -65,6 +65,8 @@ SAMPLES = "samples"  # the unit of stamps that count samples, of a log whose rat
 # Round rates are these, times a power of ten, in [Hz].
 ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 NEAR = 0.05  # largest relative difference of a nominal rate to the round one that replaces it
+# Rates between these, and how near a nominal one has to be to them.
+BETWEEN, VERY_NEAR = (1.2, 1.5, 2.4, 4.8, 9.6), 0.01
 UNIFORM = 1e-3  # largest relative deviation of a uniform clock's steps from their median
 GAP = 5.0  # length of a step, in nominal ones, above which it is a gap
 
@@ -75,7 +77,7 @@ JOINT = "{joint}"  # what stands for the name of a joint in a pattern of a mappi
 class Clock(NamedTuple):
     """Rate, jitter and gaps of timestamps."""
 
-    nominal: float  # inverse of the median step, in [Hz]
+    nominal: float  # inverse of the mean step, without gaps and outliers, in [Hz]
     rate: float  # given; else the nominal one if stamps are uniform, or the nearest round one
     uniform: bool
     jitter_rms: float  # deviation of the steps from that rate's, without gaps, in [s]
@@ -110,15 +112,20 @@ class Stamps:
         if not SHORTEST <= step <= LONGEST:
             expected = f"{SHORTEST:g} s to {LONGEST:g} s"
             raise InspectorError(f"the stamps' median step is {step:g} s, expected {expected}")
-        nominal = float(f"{1 / step:.9g}")
         uniform = bool((np.abs(steps - step) <= UNIFORM * step).all())
+        near = steps if uniform else steps[np.abs(steps - step) < 0.5 * step]
+        step = float(near.mean())  # what rounding makes of a single step would add up
+        nominal = float(f"{1 / step:.9g}")
         rate = self.rate or nominal
         if not self.rate and not uniform:
             power = 10.0 ** np.floor(np.log10(nominal))
-            near = float(power * min(ROUND, key=lambda digit: abs(digit * power / nominal - 1)))
-            rate = near if abs(near / nominal - 1) <= NEAR else nominal
+            for digits, near_by in ((BETWEEN, VERY_NEAR), (ROUND, NEAR)):
+                plain = float(power * min(digits, key=lambda one: abs(one * power / nominal - 1)))
+                if abs(plain / nominal - 1) <= near_by:
+                    rate = plain
+                    break
         uniform = uniform and abs(rate * step - 1) <= UNIFORM
-        wide = np.flatnonzero(steps > GAP / rate)
+        wide = np.flatnonzero(steps > GAP / rate * (1 + UNIFORM))
         deviations = np.delete(steps, wide) - 1 / rate
         edges = [0, *(wide + 1), len(self.time)]
         jitter = float(np.sqrt(np.mean(deviations**2))), float(np.abs(deviations).max())
@@ -538,7 +545,7 @@ def _without_units(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[
     found: dict[str, list[str]] = {}
     converted = []
     for each in log.fields:
-        factor = factor_of(each.name) if each.values.shape[1] == 1 else 1.0
+        factor = factor_of(each.name)
         if factor != 1.0 and not options.units:
             found.setdefault(without_unit(each.name)[1], []).append(each.name)
             each = replace(each, values=each.values * factor)

@@ -62,7 +62,7 @@ QUANTITIES = {
 }
 DESIRED = (
     r"desired|des|reference|ref|targets?|commanded|commands?|cmd|cmptd|set_?points?|sp|goal"
-    r"|demanded|planned|soll"
+    r"|demand(?:ed)?|planned|soll|set|nominal|traj(?:ectory)?|tgt|requested|expected"
 )
 MEASURED = r"actual|act|feedback|fbk|measured|meas|msr|present|ist"
 JOINT_WORD = r"joints?|dof|motor|axis|actuator"
@@ -81,7 +81,7 @@ WHOSE = rf"(?:(?:output|shaft|rotor|encoder|angular|motor|joint){GAP})?"
 ALONE = (
     r"(?P<quantity>(?:joint|dof)_(?:pos|vel|positions?|velocity|velocities|efforts?|torques?)"
     r"|positions?|pos|angles?|velocity|velocities|vel|efforts?|torques?|applied_torque|tau"
-    r"|q|qd|dq|q_?dot)"
+    r"|q|qd|dq|q_?dot|theta|theta_?dot|dtheta|omega)"
 )
 
 # A joint, then the signal of a run file, as it is written there
@@ -105,8 +105,9 @@ PATTERNS = (
 # Things before a quantity that are no joints.
 NOT_JOINTS = (
     rf"(?:.*{GAP})?(?:tcp|eef?|end_?effector|cartesian|cart|linear|angular|lin|ang|com|imu|odom|gps"
-    rf"|gravity|friction|external|ext|contact|inertia|bias|residual|disturbance)"
-    rf"(?:{GAP}.*)?|base|root|body|tool|object|robot|max|min|mean|x|y|z|roll|pitch|yaw|wind"
+    rf"|gravity|friction|external|ext|contact|inertia|bias|residual|disturbance|limits?)"
+    rf"(?:{GAP}.*)?|base|root|body|tool|object|robot|x|y|z|roll|pitch|yaw|wind"
+    rf"|(?:.*{GAP})?(?:max|min|mean)"
 )
 # Names of what a controller computes: ``/state/error/positions[0]``, ``PositionError1``.
 NOT_MOTION = (
