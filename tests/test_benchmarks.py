@@ -4,7 +4,6 @@ import importlib
 from pathlib import Path
 
 import pytest
-from commandline import python
 
 ROOT = Path(__file__).parents[1]
 
@@ -47,12 +46,6 @@ def test_sides_take_turns_and_the_median_counts(bench):
     found = bench("table").in_turns({name: side(name) for name in times}, 3, warm=1)
     assert calls == ["ours", "other"] * 4
     assert found == {"ours": 3.0, "other": 2.0}
-
-
-def test_an_unknown_benchmark_is_refused():
-    done = python("-m", "benchmarks", "nothing", cwd=ROOT)
-    assert done.returncode == 2
-    assert "no benchmark nothing; there are extended, stream" in done.stderr
 
 
 def test_mutants_are_of_what_fast_tests_measure(bench):
