@@ -288,7 +288,8 @@ def extents(
     found += [(e, nc.bursts.MARGIN + nc.bursts.HOP, frame, labels.step) for e in bursts]
     for span, more, length, step in sorted(found, key=lambda each: (each[0].start, each[0].stop)):
         start, stop = extent(run, span.start - more, span.stop + more, frame=length, hop=step)
-        own = replace(span, start=start, stop=stop)
+        # As JSON has them, so that a verdict that is read again says the same.
+        own = replace(span, start=round(start, 6), stop=round(stop, 6))
         if pairs and pairs[-1][0].stop >= span.start:
             before, located = pairs.pop()
             span = joined(before, span)

@@ -166,7 +166,7 @@ def _facts(run: nm.Run) -> dict[str, str]:
 def _faults(path: Path, run: nm.Run) -> tuple[nc.Fault, ...]:
     """All faults that were injected into a run, as the events of its meta have them."""
     bad = [block for block in run.blocks if block.label != "ok"]
-    found = []
+    begin, end, found = float(run.time[0]), float(run.time[-1]), []
     events = run.meta.get("events") or ()
     for event in events if isinstance(events, list | tuple) else (events,):
         try:
@@ -177,7 +177,8 @@ def _faults(path: Path, run: nm.Run) -> tuple[nc.Fault, ...]:
             raise InspectorError(
                 f"{path}: an event of its meta lacks label, start or stop as numbers in s"
             ) from error
-        found.append(nc.Fault(start, stop, label, felt))
+        if stop > begin and start < end:  # a piece of a run has the events of all of it
+            found.append(nc.Fault(start, stop, label, felt))
     return tuple(found)
 
 
@@ -271,10 +272,7 @@ def train(
 def profile_at(name: str, rate: float) -> nc.Profile:
     """A profile by its name."""
     if name not in PROFILES:
-        raise OptionError(
-            f"no profile {name!r} of one rate; there are {', '.join(PROFILES)}, and {ANY_RATE} for"
-            " any rate"
-        )
+        raise OptionError(f"no profile {name!r} of one rate; there are {', '.join(PROFILES)}")
     found = PROFILES[name](rate)
     if found.rate != rate:
         raise OptionError(f"profile {name} exists at {found.rate:g} Hz only, not {rate:g}")

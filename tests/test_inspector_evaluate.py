@@ -1,6 +1,7 @@
 """The command that measures a model."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from commandline import call
 
 from inspector import training
 from noiseclassifier.recording import group_of
+from noisemodel import Run
 
 
 def run(path, seed, *, label="oscillations"):
@@ -53,6 +55,14 @@ def test_the_measures_of_a_model_are_printed(folder):
     report = json.loads(out)
     assert (status, report["model"], report["runs"]) == (0, "model.npz", 6)
     assert np.array(report["frames"]["confusion"]).sum() == 6 * 2 * 7
+
+
+def test_a_piece_of_a_run_has_no_fault_that_comes_after_it(folder, tmp_path):
+    whole = Run.load(folder / "test" / "run3.npz")
+    events = [{"label": "oscillations", "start": t, "stop": t + 1.0} for t in (1.0, 2.5)]
+    replace(whole, meta={"events": events}).save(tmp_path / "piece.npz")
+    out = call("evaluate", folder / "model.npz", tmp_path / "piece.npz")[1]
+    assert "1 injected fault (1 detectable)" in out
 
 
 def test_runs_that_it_was_trained_on_are_refused_in_one_line(folder):

@@ -238,14 +238,6 @@ def test_trees_are_calibrated_by_trees_that_left_a_third_of_the_groups_out():
     assert alone.calibration.tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
-def test_parts_whose_training_frames_are_of_one_class_do_not_calibrate():
-    targets = np.array([0, 0, 0, 0, 1, 0, 1])
-    groups = np.array(["calm"] * 4 + ["bad"] * 3)
-    ((train, test),) = module._parts(targets, groups)
-    assert train.tolist() == [4, 5, 6]
-    assert test.tolist() == [0, 1, 2, 3]
-
-
 def test_a_class_of_one_group_alone_leaves_other_probabilities_as_they_are():
     generator = np.random.default_rng(0)
     features = generator.normal(size=(1200, 6))

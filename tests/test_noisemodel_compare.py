@@ -292,19 +292,6 @@ def test_robots_that_are_left_out_are_named_with_the_reason(urdfs, tmp_path):
         none.to_arrow()
 
 
-def test_progress_passes_each_robot_on(urdfs):
-    passed = []
-
-    def progress(results, *, total):
-        for result in results:
-            passed.append((result.name, total))
-            yield result
-
-    found = compare([*urdfs, "tallos"], kinds=FEW, progress=progress)
-    assert passed == [(name, 3) for name in (*urdfs, "tallos")]
-    assert len(found) == 2
-
-
 def test_runs_and_robots_that_do_not_suffice_are_left_out(tmp_path):
     robot = chain(tmp_path, "revolute")
     assert "the run names no robot; `inspector import --robot`" in reason(
@@ -345,12 +332,6 @@ def test_the_motion_is_the_excitation_of_seed_0_unless_another_is_named(urdfs):
     np.testing.assert_array_equal(found.pressure, zero.pressure)
     assert not np.array_equal(found.pressure, one.pressure)
     assert found.rate == 4000.0
-
-
-def test_the_parts_of_the_spectrum_join_where_their_names_say():
-    edges = list(comparing.BANDS.values())
-    assert [high for _, high in edges[:-1]] == [low for low, _ in edges[1:]] == [20, 100, 500]
-    assert (edges[0][0], edges[-1][1]) == (0.0, np.inf)
 
 
 KINDS = ("paper", "normal", "C")

@@ -78,7 +78,7 @@ def test_the_full_scale_is_used_without_clipping_and_standstill_is_silent():
     assert common_gain([sound]) == 0.0
     assert not read(sound.file(60.0))[0].any()
     assert "silent: nothing reaches 1e-06 rad/s" in sound.description(0.0)
-    assert str(sound).startswith("simplified noise: silent")
+    assert str(sound).startswith("simplified noise above 20 Hz: silent")
 
 
 def test_gaps_are_silent_without_ringing():

@@ -99,6 +99,7 @@ def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path
     """Paths of the run files, checked before the logs are read."""
     with errors_of(output):
         if len(names) == 1 and not several and not output.is_dir():
+            shared.check_suffix(output, ".npz")
             return (output,)
     if output.suffix == ".npz" or output.is_file():
         problem = f"{len(names)} runs do not fit into one file"
@@ -148,6 +149,7 @@ def export(
     library = {} if annotate else load_library(model)
     recorded = opened(run, ctx.obj).run
     if annotate:
+        shared.check_suffix(output, ".npz")
         blocks = read_labels(annotate, recorded)
         replace(recorded, blocks=blocks).save(output, overwrite=overwrite)
         told = counted(len(blocks), "label")

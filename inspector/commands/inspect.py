@@ -350,6 +350,7 @@ def listen(
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
     shared.one_at_a_time(ctx.obj, len(runs))
+    shared.check_suffix(output, ".wav")
     paths = sonification.output_paths(output, len(runs), overwrite=overwrite)
     recorded = [opened(run, ctx.obj).run for run in runs]
     for each in recorded:

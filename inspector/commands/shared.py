@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NoReturn, TypeVar, get_args
 
 import typer
 
-from inspector.errors import OUTPUT_LOST, InspectorError, Unknown, worst
+from inspector.errors import OUTPUT_LOST, Unknown, worst
 from inspector.logs.mapping import check_joints, read_options
 from inspector.logs.motion import limit_warnings
 from inspector.logs.read import Opened, Reading, open_run
@@ -219,12 +219,19 @@ def jobs_or_dask(jobs: int, dask: str) -> Jobs:
     return dask or jobs
 
 
+def check_suffix(output: Path, suffix: str) -> None:
+    """Refuse an output whose name says that it is of another format."""
+    if output.suffix.lower() not in ("", suffix):
+        problem = f"{output}: {suffix} is written, whatever its name"
+        raise typer.BadParameter(f"{problem}; end it in {suffix}", param_hint="'--output'")
+
+
 def prepare(folder: Path, *files: str, overwrite: bool) -> None:
     """Make the folder of a report before long work is done for it; it has none of the files."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InspectorError(f"{folder}: cannot be made a folder ({error.strerror})") from error
+        raise OutputError(f"{folder}: cannot be made a folder ({error.strerror})") from error
     for name in files:
         refuse_existing(folder / name, overwrite=overwrite)
 

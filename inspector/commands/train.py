@@ -34,6 +34,7 @@ def train(
     overwrite: shared.Overwrite = False,
 ) -> None:
     """Train a model on annotated runs."""
+    shared.check_suffix(output, ".npz")
     measures, left_out = learning.train(
         inputs, profile, rate, output, part=part, overwrite=overwrite
     )

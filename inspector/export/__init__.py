@@ -116,7 +116,7 @@ def arrow_table(content: Content) -> Any:
         middles = (labels.start + labels.stop) / 2
         steps = np.diff(middles) if len(middles) > 1 else labels.stop - labels.start
         nearest = np.searchsorted((middles[1:] + middles[:-1]) / 2, time)
-        outside = np.abs(time - middles[nearest]) > np.median(steps) / 2
+        outside = np.abs(time - middles[nearest]) > np.median(steps) / 2 + 1e-6
         framed: dict[str, Any] = {"frame_start": labels.start, "frame_stop": labels.stop}
         framed["label"] = labels.debounced.astype(object)
         framed |= {

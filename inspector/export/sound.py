@@ -115,7 +115,7 @@ def sonify(run: nm.Run, *, joint: str = "", speed: float = 1.0, playing: int = R
         raise OptionError(f"a speed of {speed:g}, expected 0.01 to 1000")
     lowest = LOWEST_AUDIBLE / speed
     signal = mix(_velocities(run, joint), valid=run.mask, rate=run.rate, lowest=lowest)
-    what = f"simplified noise of {joint}" if joint else "simplified noise"
+    what = f"simplified noise{f' of {joint}' if joint else ''} above {lowest:g} Hz"
     return Sound(what, signal, run.rate, float(run.time[0]), speed, playing)
 
 

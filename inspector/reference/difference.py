@@ -256,7 +256,7 @@ def _row(
     changes = _changes(found)
     outcome, reason = _outcome(verdicts, back, scores, margin, changes)
     events = [event for each in were for event in each.events]
-    findings = [*_findings(verdicts, events, NEW), *_findings(were, (), RESOLVED)]
+    findings = [*_findings(verdicts, events, NEW, least), *_findings(were, (), RESOLVED, least)]
     return Row(
         name,
         outcome,
@@ -318,13 +318,14 @@ def _changes(found: Sequence[Comparison]) -> tuple[Change, ...]:
 
 
 def _findings(
-    verdicts: Sequence[Verdict], earlier: Sequence[Event], kind: str
+    verdicts: Sequence[Verdict], earlier: Sequence[Event], kind: str, least: float = 0.0
 ) -> list[ChangedFinding]:
-    """Findings of runs that the other side does not have as loud."""
+    """Findings of runs that the other side does not have as loud, by a least margin in [dB]."""
     found = []
     for verdict in verdicts:
         for event in verdict.events:
-            if not event.evidence.excused:
+            over = event.evidence.over_db
+            if not event.evidence.excused and (over is None or over > least):
                 alike = [other for other in earlier if other.label == event.label]
                 there = bool(match([event], alike, collar=4 * HOP))
                 found.append(ChangedFinding(LOUDER if there else kind, verdict.path, event))
