@@ -218,6 +218,15 @@ def test_differences_of_positions_are_recognised(dtype):
     assert differentiator_of(run_of(central, 100.0, position=position)) is CENTRAL
 
 
+def test_velocities_that_a_simulator_integrated_were_measured():
+    _, _, velocity = motion(500.0)
+    run = run_of(velocity, 500.0, position=np.cumsum(velocity / 500.0, axis=0))
+    assert differentiator_of(run) is None
+    way = np.diff(run.position, axis=0, prepend=run.position[:1])
+    for by in (way * 500.0, way / np.diff(run.time, prepend=-0.002)[:, None]):
+        assert differentiator_of(run_of(by, 500.0, position=run.position)) is not None
+
+
 def test_velocities_differentiated_on_import_are_known(tmp_path):
     time, position, _ = motion(1000.0)
     position += noise(position.shape, 1e-5)
