@@ -43,6 +43,8 @@ def test_columns_are_found_by_their_names():
 def test_names_select_joints_and_their_order():
     (rows,), _ = read(CsvReader(HEAD, ("wrist",)), b"0,1,2,3,4,9\n")
     assert rows["velocity"].tolist() == [[2.0]]
+    (rows,), _ = read(CsvReader(b"t,dq1 [deg/s]", ()), b"0,180\n")
+    assert rows["velocity"].tolist() == [[np.pi]]
     head = b"t;actual_qd_0;actual_qd_1;target_qd_0;target_qd_1"
     reader = CsvReader(head, ("shoulder", "elbow"))
     (rows,), _ = read(reader, b"0;1;2;3;4\r\n")

@@ -151,7 +151,7 @@ class CsvReader:
         naming = Naming.of(self._header)
         for place, column in enumerate(self._header):
             meaning = column_signal(column, naming)
-            if meaning is None or meaning[0] not in SIGNALS or factor_of(column) != 1.0:
+            if meaning is None or meaning[0] not in SIGNALS:
                 continue
             kind, joint = meaning
             if not isinstance(joint, str):
@@ -174,6 +174,10 @@ class CsvReader:
             if lacking := [name for name in self.names if name not in by_joint]:
                 raise LiveError(f"the header has no {kind} of joint {lacking[0]!r}")
             self._places[kind] = [by_joint[name] for name in self.names]
+        self._factors = {
+            kind: np.array([factor_of(self._header[place]) for place in places])
+            for kind, places in self._places.items()
+        }
         time = time_column(self._header)
         self._time = self._header.index(time) if time else None
         self._second = float(UNITS[TIME_UNITS.get(without_unit(time)[1], "seconds")])
@@ -184,7 +188,8 @@ class CsvReader:
         plain = numbers_in(lines, len(columns), self._delimiter, columns)
         table = self._read_lines(lines, first, note) if plain is None else plain[0]
         if len(table):
-            rows = {name: table[:, places] for name, places in self._places.items()}
+            found = self._places.items()
+            rows = {name: table[:, places] * self._factors[name] for name, places in found}
             if self._time is not None:
                 rows["time"] = table[:, self._time] * self._second
             yield rows
