@@ -54,7 +54,6 @@ def test_a_stream_with_a_finding_prints_it_and_ends_with_1(live):
 
 
 def test_single_samples_that_are_lost_or_late_hide_no_finding(live, rows):
-    """As in a file, which `classify` takes for one without a gap."""
     header, *lines = rows[0].splitlines()
     lossy = [line for place, line in enumerate(lines) if place % 3000 or not place]
     early = rows[0].replace("\n2,", "\n2.00004,").replace("\n1.5,", "\n1.50004,")
@@ -70,6 +69,8 @@ def test_a_stream_of_which_little_can_be_judged_is_not_ok(live, rows):
     assert (status, "cannot-tell: gaps leave labels to" in out) == (4, True)
     status, out, _ = live(text="\n".join([header, *lines[:5900], ""]))
     assert (status, "it takes 0.6 s to tell what lasts" in out) == (4, True)
+    status, out, _ = live(text="\n".join([header, *lines[:15_000:2], ""]))
+    assert (status, "is the rate right?" in out) == (4, True)
 
 
 def test_json_lines_tell_of_a_finding_when_it_is_there_and_when_it_is_over(live):

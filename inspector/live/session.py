@@ -304,6 +304,7 @@ UNSEEN = "samples that the viewer may not have shown"
 BATCH = 0.05  # samples are worked on in batches of this duration, in [s]
 FASTEST = 1e6  # highest rate, in [Hz]
 MOST_DROPPED = 0.05  # share of the samples that may be left out for a verdict of `ok`
+MOST_ADDED = 0.2  # share of the samples that may be missing and interpolated in such a verdict
 LEAST_LABELLED = 0.5  # share of the stream that has labels in such a verdict
 
 
@@ -389,6 +390,7 @@ class LiveSession:
         self._latest, self._now = -1.0 / rate, 0.0  # timestamp that came, time that was worked on
         self._buffer: SampleBuffer | None = None  # what follows is there once there are samples
         self._samples = self._unconfirmed = 0  # since the viewer was last known to be there
+        self._added = 0  # that were missing and are interpolated
         self._last: tuple[Array, dict[str, Array]] | None = None  # time and signals of a sample
         self._counts: Counter[str] = Counter()  # frames that were labelled, by class
         self._levels: Levels | None = None
@@ -479,6 +481,8 @@ class LiveSession:
         labeller, count = self._labeller, self._counts.total()
         if seconds < SHORTEST:
             return f"{seconds:.3g} s of samples; it takes {SHORTEST:g} s to tell what lasts"
+        if self._added > MOST_ADDED * self._samples:
+            return f"{self._added} samples are missing beside {self._samples}: is the rate right?"
         share = count / max(1.0, (seconds - labeller.length) / labeller.hop)
         return f"gaps leave labels to {share:.0%} of the stream" if share < LEAST_LABELLED else ""
 
@@ -638,6 +642,7 @@ class LiveSession:
             whole = np.vstack((before[1][name], values))
             columns = [np.interp(every, known, column) for column in whole.T]
             found[name] = np.reshape(columns, (whole.shape[1], len(every))).T
+        self._added += len(every) - len(time)
         left = np.zeros(len(every))
         left[place.astype(int) - 1] = np.where(few, 0.0, lost)
         return np.interp(every, known, np.append(before[0], time)), found, left
