@@ -1,5 +1,3 @@
-"""The tables of the benchmarks."""
-
 import importlib
 from pathlib import Path
 

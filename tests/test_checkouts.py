@@ -1,5 +1,3 @@
-"""Names of 0.6 that are gone are in `docs/renamed.csv`."""
-
 import csv
 import importlib
 import inspect

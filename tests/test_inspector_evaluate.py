@@ -1,5 +1,3 @@
-"""The command that measures a model."""
-
 import json
 from dataclasses import replace
 from pathlib import Path

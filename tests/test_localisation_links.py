@@ -1,5 +1,3 @@
-"""Links of a fault."""
-
 import numpy as np
 import pytest
 from test_noisemodel_noise import arm_run

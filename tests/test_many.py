@@ -5,7 +5,7 @@ import pytest
 from commandline import call
 from recordings import entities, read
 
-from inspector.compare.many import Several, lay, report, shortened, write
+from inspector.compare.many import Several, lay, report, write
 from inspector.logs.read import open_run
 from inspector.recording.views import TOP
 from noiseclassifier import Event
@@ -57,10 +57,6 @@ def test_every_run_starts_at_0_unless_clocks_count_and_its_blocks_with_it(tmp_pa
 def test_runs_of_one_file_name_are_told_apart(tmp_path):
     paths = [run_file(tmp_path / folder, "run") for folder in "xy"]
     assert laid(*paths).names == tuple(map(str, paths))
-
-
-def test_names_that_are_too_long_show_their_end():
-    assert shortened(["x", "panda-obstacle-full-7001"]) == ["x", "…tacle-full-7001"]
 
 
 def rows(path, below):

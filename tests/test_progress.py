@@ -1,5 +1,3 @@
-"""Progress where there is no terminal."""
-
 import io
 import sys
 import time
