@@ -28,6 +28,7 @@ from inspector.library import (
 from inspector.localisation import Localisation, extent, localise
 from inspector.localisation.order import Order, order
 from inspector.logs.clocks import without_hold
+from inspector.logs.mapping import check_joints
 from inspector.logs.read import Opened, open_run
 from noiseclassifier import Event
 from noiseclassifier.lasting import joined
@@ -70,10 +71,10 @@ class Analysis:
 
     @cached_property
     def noise_level(self) -> tuple[Array, Array]:
-        """Level of the noise above 10 Hz, see `inspector.levels.velocity_levels`."""
+        """Level of the measured motion above 10 Hz, see `inspector.levels.velocity_levels`."""
         run = self.run
         start = float(run.time[0])
-        return velocity_levels(self.noise[:, None], run.mask, run.rate, start=start)
+        return velocity_levels(run.motion, run.mask, run.rate, start=start, together=True)
 
     @cached_property
     def joint_levels(self) -> tuple[Array, Array]:
@@ -363,7 +364,8 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
         inside = np.flatnonzero((time >= start - STEP / 2) & (time <= stop + STEP / 2))
         if len(inside):
             peak = inside[level[inside].argmax()]
-            moment = Moment(label, max(start, begin), min(stop, end), float(time[peak]))
+            start, stop = max(start, begin), min(stop, end)
+            moment = Moment(label, start, stop, float(np.clip(time[peak], start, stop)))
             found.append((float(level[peak]), moment))
     found.sort(key=lambda pair: -pair[0])
     return tuple(moment for _, moment in found[:MOST])
@@ -454,15 +456,18 @@ def estimate(run: Run, kind: str) -> Estimate:
     if run.robot is None or not robot_known(run):
         names = "none" if run.robot is None else repr(run.robot)
         raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {names}")
-    robot = nm.Robot.load(run.robot, floating_base=True if run.base_pose is not None else None)
+    floats = run.base_pose is not None or run.base_velocity is not None
+    robot = nm.Robot.load(run.robot, floating_base=floats or None)
     surface = nm.Surface.of(robot, "auto")
     q_desired, v_desired = robot.desired(run) or (None, None)
     noise = nm.extended(
         robot, surface, *robot.configuration(run), kind, q_desired=q_desired, v_desired=v_desired
     )
     without = surface.without_geometry
-    remarks = (f"links without geometry: {', '.join(without)}",) if without else ()
-    return Estimate(kind, "√W", noise.power, noise.names, remarks)
+    remarks = [f"links without geometry: {', '.join(without)}"] if without else []
+    if lacking := check_joints(run.joint_names, run.robot):
+        remarks.append(f"not in the log, assumed stationary: {', '.join(lacking)}")
+    return Estimate(kind, "√W", noise.power, noise.names, tuple(remarks))
 
 
 def noise_level(run: Run, estimate: Estimate) -> str:

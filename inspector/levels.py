@@ -66,9 +66,12 @@ SPECTRUM = Scale(-60.0, 0.0, "dB re 1 rad/s")
 
 
 def velocity_levels(
-    velocity: Real, valid: Mask, rate: float, *, start: float = 0.0
+    velocity: Real, valid: Mask, rate: float, *, start: float = 0.0, together: bool = False
 ) -> tuple[Array, Array]:
-    """The level of velocities above 10 Hz over time, of each joint, or of a noise as one column.
+    """The level of velocities above 10 Hz over time, of each joint, or of all as one column.
+
+    Of all together it is the sum of their powers: in their norm, a joint that moves would hide the
+    vibration of another.
 
     Returns the starts of steps of 50 ms, in [s], and levels of the root mean square of what is
     valid in each, shape (steps, joints), in [dB re 1 rad/s]; NaN in gaps.
@@ -80,6 +83,7 @@ def velocity_levels(
         here = np.arange(0, rows.stop - rows.start, size)
         first = rows.start // size
         energy[first : first + len(here)] = np.add.reduceat(np.square(fast), here, axis=0)
+    energy = energy.sum(axis=1, keepdims=True) if together else energy
     count = np.add.reduceat(valid.astype(np.float64), firsts)[:, None]
     level = np.maximum(decibel(energy / np.maximum(count, 1.0)), FLOOR_DB)
     return start + firsts / rate, np.asarray(np.where(count > 0.0, level, np.nan))

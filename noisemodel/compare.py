@@ -109,9 +109,13 @@ class Comparison:
 
     @property
     def loudest(self) -> tuple[str, float]:
-        """The link with the largest share in the energy of the reference, and that share."""
+        """The link with the largest share in the energy of the reference, and that share.
+
+        It is "-" of a robot that makes no noise.
+        """
         shares = self.shares[self.reference]
-        return self.links[shares.argmax()], float(shares.max())
+        name = self.links[shares.argmax()] if shares.any() else "-"
+        return name, float(shares.max())
 
     def by_band(self, kind: int) -> Array:
         """Spectral distance of a kind to the reference in each of ``BANDS``, in [dB], or nan."""

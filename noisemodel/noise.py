@@ -333,8 +333,8 @@ class LinkNoise:
 def link_noise(run: Run, kind: str = "normal") -> LinkNoise:
     """The extended noise of a run with a robot and positions, in bins, by one of ``KINDS``."""
     assert run.robot is not None
-    floating = True if run.base_pose is not None else None
-    robot = Robot.load(run.robot, floating_base=floating)
+    floats = run.base_pose is not None or run.base_velocity is not None
+    robot = Robot.load(run.robot, floating_base=floats or None)
     surface = Surface.of(robot, "auto")
     samples = len(run.time)
     size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))

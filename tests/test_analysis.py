@@ -476,7 +476,7 @@ def test_the_worst_joint_is_that_of_the_worst_finding_and_else_the_loudest(tmp_p
     event = Event("oscillations", 1.0, 1.3, 1.0)
     found = inspected(tmp_path, events=(event,), velocity=velocity, joint_names=("a", "b"))
     vars(found)["localisations"] = {event: Localisation(joints=(("b", 0.9), ("a", 0.1)))}
-    assert worst(found)[0].peak == pytest.approx(1.0, abs=STEP)
+    assert 1.0 <= worst(found)[0].peak <= 1.3
     assert worst_joint(found) == 1
     assert worst_joint(replace(found, findings=(), spans=())) == 0
 
@@ -489,7 +489,7 @@ def test_gaps_last_from_their_first_sample_to_the_next_valid_one():
     assert gaps(Run(**fields)) == []
 
 
-def test_a_moment_ends_with_the_run_and_peaks_within_half_a_step(tmp_path):
+def test_a_moment_ends_with_the_run_and_peaks_within_itself(tmp_path):
     late = Event("impact", 3.5, 9.0, 1.0)
     early = Event("oscillations", -1.0, 0.5, 1.0)
     gone = Event("oscillations", 7.0, 8.0, 1.0)
@@ -499,7 +499,7 @@ def test_a_moment_ends_with_the_run_and_peaks_within_half_a_step(tmp_path):
     assert (found["oscillations"].start, found["oscillations"].stop) == (0.0, 0.5)
     short = Event("impact", 1.001, 1.002, 1.0)  # within one step of 50 ms, from 1.0 s
     (only,) = worst(inspected(tmp_path / "other", events=(short,)))
-    assert only.peak == pytest.approx(1.025)
+    assert 1.001 <= only.peak <= 1.002
 
 
 def test_rows_are_the_loudest_during_findings_in_the_order_of_the_robot():

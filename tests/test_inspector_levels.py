@@ -50,6 +50,9 @@ def test_a_tone_of_one_rad_per_second_effective_is_at_zero_decibels():
     assert time[0] == 3.0
     np.testing.assert_allclose(np.diff(time), STEP)
     np.testing.assert_allclose(level[2:-2], 0.0, atol=0.2)
+    turning = np.hstack((tone(np.sqrt(2)), 9.0 + tone(0.0)))  # hides nothing of the other joint
+    _, both = velocity_levels(turning, everywhere(turning), RATE, together=True)
+    np.testing.assert_allclose(both, level, atol=1e-6)
 
 
 def test_slow_motion_and_standstill_have_no_level():

@@ -1,5 +1,3 @@
-"""ROS bags, written by rosbags."""
-
 import tracemalloc
 
 import numpy as np

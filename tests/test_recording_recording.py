@@ -117,7 +117,7 @@ def test_the_noise_is_logged_sample_by_sample_beside_its_level_and_drawn_by_extr
     _, policy = read(path, "/noise/simplified", "SeriesLines:aggregation_policy")
     assert policy == [[5]]  # MinMax: the default would hide vibration
     time, values = read(path, "/level/noise", "Scalars:scalars")
-    starts, level = velocity_levels(expected[:, None], run.mask, run.rate)
+    starts, level = velocity_levels(run.velocity, run.mask, run.rate, together=True)
     np.testing.assert_allclose(time, starts, atol=1e-9)
     np.testing.assert_allclose(values, level, rtol=1e-9)
 

@@ -27,8 +27,8 @@ def test_system_packages_that_pictures_take_are_named(monkeypatch, tmp_path):
         (["view", demo_run(), "-o", "s.jpg"], "s.jpg: name a .rrd, .png or .html file"),
         (["view", demo_run(), demo_run(), "-o", "v.png"], ".png takes one run"),
         (["view", demo_run(), "-o", "v.rrd", "--at", "1"], "--at takes -o FILE.png"),
-        (["view", demo_run(), "-o", "s.png", "--at", "100"], "--at 100: the run lasts from 0.00 s"),
-        (["view", demo_run(), "-o", "s.png", "--at", "-1"], "--at -1: the run lasts from 0.00 s"),
+        (["view", demo_run(), "-o", "s.png", "--at", "100"], "--at 100: the samples are from 0 s"),
+        (["view", demo_run(), "-o", "s.png", "--at", "-1"], "--at -1: the samples are from 0 s"),
     ],
 )
 def test_what_cannot_be_shot_leaves_nothing(arguments, text, tmp_path, monkeypatch):

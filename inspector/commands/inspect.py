@@ -142,7 +142,7 @@ def _picture(run: Path, output: Path, request: Request) -> None:
     source, at = opened(run, request.reading), request.at
     first, last = (float(source.run.time[place]) for place in (0, -1))
     if at is not None and not first <= at <= last:
-        raise typer.BadParameter(f"--at {at:g}: the run lasts from {first:.2f} s to {last:.2f} s")
+        raise typer.BadParameter(f"--at {at:g}: the samples are from {first:g} s to {last:g} s")
     found, _, beside = _analysed(source, request)
     seconds = sonification.worst_time(found) if at is None else at
     with TemporaryDirectory() as folder:

@@ -233,9 +233,10 @@ class Pair:
 
     @cached_property
     def vibration(self) -> list[Array]:
-        """The noise above 10 Hz of both, each of shape (samples,), in [rad/s]; 0 in gaps."""
-        noises = [side.noise[:, None] for _, side in self.sides]
-        return [vibrating(each, self.valid, self.rate)[:, 0] for each in noises]
+        """The motion above 10 Hz of both, each of shape (samples,), in [rad/s]; 0 in gaps."""
+        motions = [side.run.motion for _, side in self.sides]
+        fast = (vibrating(each, self.valid, self.rate) for each in motions)
+        return [np.sqrt(np.square(each).sum(axis=1)) for each in fast]
 
     @property
     def links(self) -> tuple[LinkNoise, LinkNoise] | None:

@@ -12,7 +12,7 @@ import rerun as rr
 
 from inspector import colors, levels
 from inspector.analysis import Analysis, analyse
-from inspector.levels import FLOOR_DB, velocity_levels
+from inspector.levels import FLOOR_DB
 from inspector.library import Library
 from inspector.logs.read import Opened
 from inspector.recording import panels, views
@@ -37,8 +37,7 @@ class Several:
         """Of each run, starts of steps of 50 ms in [s], and levels above 10 Hz; NaN in gaps."""
         found = []
         for side in self.sides:
-            run, noise = side.run, side.noise[:, None]
-            time, level = velocity_levels(noise, run.mask, run.rate, start=float(run.time[0]))
+            time, level = side.noise_level
             found.append((time, level[:, 0]))
         return tuple(found)
 
@@ -145,7 +144,7 @@ def report(several: Several) -> str:
         shown = f"**{name}** (worst)" if index == several.worst else name
         count = Counter(spoken(event.label) for event in side.findings)
         found = ", ".join(f"{number} {label}" for label, number in count.items())
-        lines.append(f"| {shown} | {found or side.status} | {several.peaks[index]:.0f} |")
+        lines.append(f"| {shown} | {found or side.status} | {several.peaks[index]:z.0f} |")
     lines += ["", "Peak of the level above 10 Hz, in dB re 1 rad/s."]
     remarks: dict[str, list[str]] = {}
     for name, side in zip(several.names, several.sides, strict=True):

@@ -21,7 +21,7 @@ from inspector.recording.robot import Drawn, log_colours
 from inspector.recording.views import Camera, Label, Panel, Part, Timed
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
-from inspector.report import brief, classes_of, finding_of, spoken
+from inspector.report import brief, classes_of, finding_of, missed, spoken
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Robot, Run
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
@@ -245,9 +245,8 @@ def log_marks(
 def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
     """List findings, and annotated failures that were not found, by time."""
     rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
-    missed = "annotated" if analysis.labels is None else "not found"
     rows += [
-        (missed, block)
+        ("annotated" if analysis.labels is None else missed(analysis, block), block)
         for block in analysis.run.blocks
         if block.label != "ok" and finding_of(analysis, block) is None
     ]

@@ -482,7 +482,7 @@ def middles(count: int) -> list[float]:
 
 def written(level: float) -> str:
     """A level in a label, in [dB]."""
-    return f"{level:.0f}".replace("-", "\u2212")
+    return f"{level:z.0f}".replace("-", "\u2212")
 
 
 def ticks(low: float, high: float, panel: Panel) -> list[float]:

@@ -90,6 +90,13 @@ def brief(analysis: Analysis, event: Event | Block) -> str:
     return ", ".join(filter(None, [f"{spoken(event.label)} {when}", first]))
 
 
+def missed(analysis: Analysis, block: Block) -> str:
+    """What became of an annotated failure of which no finding has the class."""
+    there = [e for e in analysis.findings if e.start < block.stop and block.start < e.stop]
+    others = ", ".join(map(spoken, sorted({event.label for event in there})))
+    return f"found as {others}" if others else "not found"
+
+
 def annotated(analysis: Analysis, *, bold: str = "") -> list[str]:
     """Annotated failures and what became of them; where one was found, that says the rest."""
     lines = []
@@ -101,10 +108,7 @@ def annotated(analysis: Analysis, *, bold: str = "") -> list[str]:
             found = f"found, {event.start:.2f} s to {event.stop:.2f} s"
             lines.append(f"{bold}{spoken(block.label)}{bold}, {when}: {found}")
             continue
-        there = [e for e in analysis.findings if e.start < block.stop and block.start < e.stop]
-        others = ", ".join(map(spoken, sorted({event.label for event in there})))
-        found = f", found as {others}" if others else ", not found"
-        found = "" if analysis.labels is None else found
+        found = "" if analysis.labels is None else f", {missed(analysis, block)}"
         lines.append(sentence(analysis, block, bold=bold, found=found))
     return lines
 
