@@ -400,9 +400,11 @@ def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: 
     strips = [[[shift, low], [shift, high]] for low, high in pairwise(edges.tolist())]
     bar = rr.LineStrips2D(strips, colors=shades, radii=rr.Radius.ui_points(6.0))
     recording.log(f"/axis/{panel.name}/right/scale", bar, static=True)
+    room = max(1.0, (top - low) * (GROWN * panel.height - AXIS) / LINE)  # of labels
+    every = max(1, int(np.ceil(len(scale.ticks) / room)))
     ticks = [
         Label(low + (top - low) * float(scale.place(np.array(tick))), written(tick), 8.0)
-        for tick in scale.ticks
+        for tick in scale.ticks[::-every][::-1]
     ]
     log_labels(recording, panel, "right", [*ticks, Label(1.0, title)])
 
