@@ -17,7 +17,6 @@ from noisemodel import Run
 
 
 def streamed(run):
-    """A run as rows."""
     names = [f"{name}.velocity" for name in run.joint_names]
     names += [f"{name}_desired" for name in names]
     text = io.StringIO()

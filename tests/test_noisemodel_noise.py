@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import noisemodel as nm
+from inspector.analysis import estimate
 from noisemodel import (
     KINDS,
     GeometryError,
@@ -372,6 +373,13 @@ def test_what_is_missing_is_said_in_a_sentence_each(tmp_path):
     )
     moving = replace(run, base_velocity=np.zeros((200, 6)))
     assert len(link_noise(moving).remarks) == 2
+
+
+def test_a_base_is_heard_without_its_pose(tmp_path):
+    robot = chain(tmp_path, "revolute", floating_base=True)
+    run = as_run(robot, *motion(robot, samples=400))
+    for heard in (lambda one: link_noise(one).power, lambda one: estimate(one, "normal").power):
+        np.testing.assert_allclose(heard(replace(run, base_pose=None)), heard(run), rtol=1e-6)
 
 
 def test_each_link_names_the_joints_that_move_it():

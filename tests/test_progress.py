@@ -15,8 +15,6 @@ def test_a_line_every_ten_seconds_says_how_many_are_left(capsys, monkeypatch):
 
 
 class Terminal(io.StringIO):
-    """Standard error that says that it is a terminal."""
-
     def isatty(self):
         return True
 
