@@ -1,5 +1,3 @@
-"""NumPy archives: run files, MuJoCo's state, Isaac's arrays, and others by mapping."""
-
 import mujoco
 import numpy as np
 import pytest

@@ -1,5 +1,3 @@
-"""Parquet, wide and as LeRobot has it, written by pyarrow."""
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq

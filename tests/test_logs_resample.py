@@ -36,12 +36,16 @@ def test_a_rate_within_5_percent_of_a_round_one_becomes_that(tmp_path, nominal, 
 
 
 def test_rounded_stamps_have_the_rate_of_all_of_them(tmp_path):
-    """A step of 1/1200 s in whole microseconds is off by 0.04 %, which would add up."""
     time = np.arange(4000) / 1200
     for stamps in (np.round(time, 6), time.astype(np.float32).astype(float), time + 1.7e9):
         run = read_log(log(tmp_path, stamps)).run
         assert run.rate == pytest.approx(1200.0, rel=1e-6)
         assert run.time[-1] == pytest.approx(time[-1], abs=1e-4)
+
+
+def test_steps_of_which_none_is_near_the_median_have_its_rate(tmp_path):
+    time = np.cumsum(np.tile([0.01, 0.05], 200))[:399]  # as many short ones as long ones
+    assert read_log(log(tmp_path, time - time[0])).run.rate == pytest.approx(100 / 3, rel=0.1)
 
 
 @pytest.mark.parametrize("lost", [4, 5])

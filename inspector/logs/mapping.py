@@ -114,7 +114,8 @@ class Stamps:
             raise InspectorError(f"the stamps' median step is {step:g} s, expected {expected}")
         uniform = bool((np.abs(steps - step) <= UNIFORM * step).all())
         near = steps if uniform else steps[np.abs(steps - step) < 0.5 * step]
-        step = float(near.mean())  # what rounding makes of a single step would add up
+        if len(near):  # what rounding makes of a single step would add up
+            step = float(near.mean())
         nominal = float(f"{1 / step:.9g}")
         rate = self.rate or nominal
         if not self.rate and not uniform:
