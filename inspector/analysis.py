@@ -70,7 +70,7 @@ class Analysis:
         return nm.simplified(self.run.motion, self.run.velocity_desired)
 
     @cached_property
-    def noise_level(self) -> tuple[Array, Array]:
+    def vibration_level(self) -> tuple[Array, Array]:
         """Level of the measured motion above 10 Hz, see `inspector.levels.velocity_levels`."""
         run = self.run
         start = float(run.time[0])
@@ -356,7 +356,7 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
     ]
     stretches = [(failure.label, failure.start, failure.stop) for failure in failures]
     begin, end = float(run.time[0]), float(run.time[-1])
-    starts, levels = analysis.noise_level
+    starts, levels = analysis.vibration_level
     time = (starts + np.append(starts[1:], end + 1.0 / run.rate)) / 2
     level = np.nan_to_num(levels[:, 0], nan=FLOOR_DB)
     found = []

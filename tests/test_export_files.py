@@ -171,7 +171,7 @@ def test_mcap_holds_levels_where_they_are_known(exported, tmp_path):
     folder, content = exported
     path = folder / "demo.mcap"
     stamps, found = zip(*messages(path, "/level"), strict=True)
-    start, level = content.analysis.noise_level
+    start, level = content.analysis.vibration_level
     assert [each["level"] for each in found] == level[:, 0].tolist()
     np.testing.assert_allclose(np.array(stamps) * 1e-9, start, atol=1e-9)
     run = plain_run()

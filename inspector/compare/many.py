@@ -37,7 +37,7 @@ class Several:
         """Of each run, starts of steps of 50 ms in [s], and levels above 10 Hz; NaN in gaps."""
         found = []
         for side in self.sides:
-            time, level = side.noise_level
+            time, level = side.vibration_level
             found.append((time, level[:, 0]))
         return tuple(found)
 

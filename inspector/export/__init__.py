@@ -231,7 +231,7 @@ def _topics(content: Content) -> dict[str, tuple[dict[str, Any], Iterator[Row]]]
     if content.extended is not None:
         noise["extended"] = content.extended
     samples = zip(*(each.tolist() for each in noise.values()), strict=True)
-    (start, level), number = analysis.noise_level, {"level": NUMBER}
+    (start, level), number = analysis.vibration_level, {"level": NUMBER}
     levels = zip(start.tolist(), level[:, 0].tolist(), strict=True)
     topics: dict[str, tuple[dict[str, Any], Iterator[Row]]] = {
         "/noise": (

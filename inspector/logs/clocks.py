@@ -142,8 +142,9 @@ def in_seconds(path: Path, tracks: Sequence[Track], options: ReadOptions) -> lis
         for stamps in clocks_of(tracks)
         if stamps.unit == SAMPLES
     }
-    for stamps in clocks_of(tracks) if found is not None and not timed else ():
-        assert found is not None
+    if found is None or timed:
+        return on_clocks(tracks, timed)
+    for stamps in clocks_of(tracks):
         if abs(found * float(np.median(np.diff(stamps.time))) / 1000 - 1) <= DISAGREE:
             own = replace(stamps, start=stamps.start / 1000, time=stamps.time / 1000)
             why = f"at {found:g} Hz positions and velocities fit, if stamps are in milliseconds"

@@ -316,7 +316,7 @@ def log_noise(
 def _log_level(
     recording: rr.RecordingStream, analysis: Analysis, beside: Comparison | None
 ) -> Timed:
-    (time, level), lowest = analysis.noise_level, 10.0
+    (time, level), lowest = analysis.vibration_level, 10.0
     if beside is not None:
         time, level, lowest = beside.time, beside.noise[:, None], beside.octaves[0][0]
         names = [f"{each} repetition [dB re 1 rad/s]" for each in ("quietest", "loudest")]

@@ -60,7 +60,8 @@ def picture(analysis: Analysis, beside: Comparison | None = None) -> bytes:
         panels.append((1.1, partial(_band, beside=beside, analysis=analysis)))
         panels.append((ROW * len(beside.loudest(SHOWN)), partial(_over, beside=beside)))
     else:
-        panels.append((1.1, partial(curve, of=analysis.noise_level, label=LEVEL, limits=LIMITS)))
+        vibration = analysis.vibration_level
+        panels.append((1.1, partial(curve, of=vibration, label=LEVEL, limits=LIMITS)))
     if beside is None and labels is not None and alarm is not None:
         failure = (labels.start + labels.stop) / 2, 1.0 - labels.scores[:, 0]
         shown = partial(curve, of=failure, label=FAILURE, limits=(0.0, 1.05), alarm=alarm)
