@@ -158,39 +158,19 @@ def _spread(starts: Indices, size: int, most: int = MOST) -> list[slice]:
     return [slice(start, start + size) for start in starts.tolist()]
 
 
-DESIRED, MEASURED = "desired", "measured"
+def stages_of(run: Run, part: slice) -> Array:
+    """Velocities of a part of a run at each stage, shape (stages, samples, joints).
 
-
-@dataclass(frozen=True, eq=False)
-class Flow:
-    """The velocities of a stretch of a run at each stage of the control flow."""
-
-    # Of the stages: those that the run names, in its order, then desired and measured.
-    names: tuple[str, ...]
-    joints: tuple[str, ...]
-    velocity: Array  # shape (stages, samples, joints), in [rad/s] or [m/s]
-    time: Array  # shape (samples,), in [s]
-    valid: Mask  # False in gaps, shape (samples,)
-    rate: float  # samples per second, in [Hz]
-
-
-def flow(run: Run, part: slice) -> Flow:
-    """Gather the stages of a run, for the joints that all of them have."""
-    names, joints = [*run.stages, MEASURED], list(range(len(run.joint_names)))
+    Stages are those that the run names, in its order, then desired and measured. Joints are those
+    that all of them have.
+    """
+    joints, wanted = list(range(len(run.joint_names))), list[int]()
     if run.velocity_desired is not None:
         joints, wanted = in_both(run)
-    signals = [each[part][:, joints] for each in (*run.stages.values(), run.velocity)]
+    signals = [each[part][:, joints] for each in run.stages.values()]
     if run.velocity_desired is not None:
-        names.insert(-1, DESIRED)
-        signals.insert(-1, run.velocity_desired[part][:, wanted])
-    return Flow(
-        names=tuple(names),
-        joints=tuple(run.joint_names[index] for index in joints),
-        velocity=np.array(signals, dtype=np.float64),
-        time=run.time[part],
-        valid=run.mask[part],
-        rate=run.rate,
-    )
+        signals.append(run.velocity_desired[part][:, wanted])
+    return np.array([*signals, run.velocity[part][:, joints]], dtype=np.float64)
 
 
 SPAN = 0.001  # time over which a velocity's change is taken, in [s]
@@ -201,18 +181,6 @@ LENGTH = 0.1  # length of a quiet stretch, in [s]
 WARM = TRAIL + LAGS[-1] + SPAN  # transient of filters and prediction, in [s]
 ROWS = 3000  # most samples of the least squares
 RIDGE = 1e-3  # regularisation of the least squares, as a share of the mean power
-
-
-@dataclass(frozen=True, eq=False)
-class Innovation:
-    """Innovation of a stretch of a run."""
-
-    change: Array  # sudden changes, shape (stages, samples, joints), in [rad/s²]
-    residual: Array  # their prediction residual, of the same shape
-    total: Array  # norm of the changes over the joints, shape (stages, samples), in [rad/s²]
-    # Norm of the residual, but no more than ``total``, shape (stages, samples), in [rad/s²]: a
-    # change that was predicted and does not occur is no innovation.
-    level: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,23 +198,21 @@ class QuietStatistics:
 
 def quiet_statistics(run: Run, failures: Sequence[Failure]) -> QuietStatistics:
     """Fit the prediction to the quiet stretches of a run, and measure its residual there."""
-    parts = quiet_stretches(run, failures, length=LENGTH + WARM)
-    stretches = [flow(run, part) for part in parts]
-    first = stretches[0] if stretches else flow(run, slice(0, 1))
-    stages, _, joints = first.velocity.shape
     lags = np.unique(np.round(np.array(LAGS) * run.rate).astype(np.int64))
-    zeros = np.zeros(stages)
-    if not stretches:
-        return QuietStatistics(np.zeros((stages - 1, joints, len(lags))), lags, zeros, zeros)
-    velocity = np.stack([each.velocity for each in stretches])
-    size = velocity.shape[2]
-    warm = min(max(1, round(WARM * run.rate)), size - 1)
-    change = sudden(velocity, first.valid, run.rate)
+    parts = quiet_stretches(run, failures, length=LENGTH + WARM)
+    if not parts:
+        nothing = np.zeros(len(stages_of(run, slice(0, 1))))
+        return QuietStatistics(np.zeros((0, 0, len(lags))), lags, nothing, nothing)
+    velocity = np.stack([stages_of(run, part) for part in parts])
+    _, stages, size, joints = velocity.shape
+    valid, warm = np.ones(size, dtype=np.bool_), min(max(1, round(WARM * run.rate)), size - 1)
+    change = sudden(velocity, valid, run.rate)
     weights = np.zeros((0, joints, len(lags)))
     if stages > 1:
         weights = _prediction(change, lags, warm)
-    level = _innovation(change, weights, lags, first.valid).level[..., warm:]
-    return QuietStatistics(  # over stretches; levels have the shape (stretches, stages, samples)
+    *_, level = _innovation(change, weights, lags, valid)
+    level = level[..., warm:]  # shape (stretches, stages, samples)
+    return QuietStatistics(
         weights,
         lags,
         power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
@@ -270,16 +236,23 @@ def _prediction(change: Array, lags: Indices, warm: int) -> Array:
     return np.asarray(np.linalg.solve(square, past @ target[..., None])[..., 0])
 
 
-def _innovation(change: Array, weights: Array, lags: Indices, valid: Mask) -> Innovation:
-    """Innovation of changes of shape (..., stages, samples, joints), by their prediction."""
+def _innovation(
+    change: Array, weights: Array, lags: Indices, valid: Mask
+) -> tuple[Array, Array, Array]:
+    """Innovation of sudden changes of shape (..., stages, samples, joints), in [rad/s²].
+
+    Returns their prediction residual, of the same shape, and over the joints, the norm of the
+    changes and of the residual, but no more than the former: a change that was predicted and does
+    not occur is no innovation.
+    """
     residual = change.copy()
     for place, own in enumerate(weights):
         for column, lag in enumerate(lags.tolist()):
             past = change[..., place, : change.shape[-2] - lag, :]
             residual[..., place + 1, lag:, :] -= own[:, column] * past
     residual[..., ~valid, :] = 0.0
-    total, rest = np.linalg.norm(change, axis=-1), np.linalg.norm(residual, axis=-1)
-    return Innovation(change, residual, total, np.minimum(total, rest))
+    total, level = np.linalg.norm(change, axis=-1), np.linalg.norm(residual, axis=-1)
+    return residual, total, np.minimum(total, level)
 
 
 def sudden(velocity: Array, valid: Mask, rate: float) -> Array:
@@ -362,47 +335,64 @@ def first_stage(
     """
     stop = min(failure.stop, failure.start + LONGEST)
     edges = (failure.start - BEFORE, max(stop, failure.start + reach) + AFTER)
-    stages = flow(run, slice(*np.searchsorted(run.time, edges).tolist()))
-    start, end = np.searchsorted(stages.time, (failure.start, stop)).tolist()
-    if end <= start or not stages.valid[start:end].any():
+    part = slice(*np.searchsorted(run.time, edges).tolist())
+    time, valid, rate = run.time[part], run.mask[part], run.rate
+    start, end = np.searchsorted(time, (failure.start, stop)).tolist()
+    if end <= start or not valid[start:end].any():
         return Localisation()
-    change = sudden(stages.velocity, stages.valid, stages.rate)
-    innovation = _innovation(change, quiet.weights, quiet.lags, stages.valid)
-    found, during = None, slice(start, end)
-    level, size = innovation.level[-1, during], max(1, round(BIN * run.rate))
-    power = np.add.reduceat(np.square(level), np.arange(0, len(level), size)) / size
+    change, during = sudden(stages_of(run, part), valid, rate), slice(start, end)
+    residual, total, level = _innovation(change, quiet.weights, quiet.lags, valid)
+    size = max(1, round(BIN * rate))
+    power = np.square(level[-1, during])
+    power = np.add.reduceat(power, np.arange(0, len(power), size)) / size
     loud = power > max(LOUD * power.max(), MORE * float(quiet.power[-1]))
+    blow = None
     if not loud.sum() * BIN >= LASTING:
         edges = (failure.start - EARLY, failure.start + reach)
-        first, last = np.searchsorted(stages.time, edges).tolist()
-        found = _earliest(stages, innovation, quiet, first, last)
-    return found or _adding(stages, innovation, quiet, during) or Localisation()
+        first, last = np.searchsorted(time, edges).tolist()
+        blow = _earliest(total, level, quiet, first, last, rate=rate)
+    found = blow or _adding(change, total, level, quiet, during, rate=rate)
+    if found is None:
+        return Localisation()
+    stage, following, lag, rows = found
+    desired = run.velocity_desired is not None
+    names = [*run.stages, *(["desired"] if desired else []), "measured"]
+    joints = [n for n in run.joint_names if not desired or n in run.desired_joint_names]
+    power = np.square(residual[stage, rows]).sum(axis=0)
+    shares = power / (power.sum() or 1.0)
+    ranked = np.argsort(-shares, kind="stable")[:JOINTS].tolist()
+    return Localisation(
+        stage=names[stage] if len(names) > 1 else "",
+        following="" if following is None else names[following],
+        lag=lag / rate,
+        joints=tuple((joints[i], float(shares[i])) for i in ranked if shares[i] > 0.0),
+        onset=None if blow is None else float(time[rows.start]),
+    )
 
 
 def _earliest(
-    stages: Flow, innovation: Innovation, quiet: QuietStatistics, first: int, last: int
-) -> Localisation | None:
+    total: Array, level: Array, quiet: QuietStatistics, first: int, last: int, *, rate: float
+) -> tuple[int, int | None, int, slice] | None:
     """Order the stages by the onset of a blow or jump, around the steepest rise of any of them.
 
     A stage whose peak is less than a fifth of all changes there passes on what the stage before it
     did. The first stage has no prediction: its peak has to exceed that in quiet stretches, or the
     next stage to follow within 3 ms. Of simultaneous ones, the one that a motion passes first wins.
+    It gives the first stage, the next one, the lag between them, and where the joints show.
     """
-    rate, samples = stages.rate, len(stages.time)
     # A stage without innovation in quiet stretches would exceed its peak at once.
     scale = quiet.peak + PASSED_ON * (float(quiet.peak.max()) or 1.0)
-    relative = (innovation.level / scale[:, None]).max(axis=0)
-    moment = rise(relative, first, last, rate=rate)
+    moment = rise((level / scale[:, None]).max(axis=0), first, last, rate=rate)
     early, late = (max(1, round(time * rate)) for time in AROUND)
-    around = slice(max(0, moment - early), min(samples, moment + late))
-    least = PASSED_ON * innovation.total[:, around].max(axis=1)
+    around = slice(max(0, moment - early), min(level.shape[1], moment + late))
+    least = PASSED_ON * total[:, around].max(axis=1)
     onsets = [
-        onset(level, moment, around, rate=rate, least=own)
-        for level, own in zip(innovation.level, least.tolist(), strict=True)
+        onset(each, moment, around, rate=rate, least=own)
+        for each, own in zip(level, least.tolist(), strict=True)
     ]
     found = sorted((at, place) for place, at in enumerate(onsets) if at is not None)
     if found and found[0][1] == 0 and len(onsets) > 1:
-        common = float(innovation.level[0, around].max()) <= EXCEEDS * quiet.peak[0]
+        common = float(level[0, around].max()) <= EXCEEDS * quiet.peak[0]
         if common and (onsets[1] is None or onsets[1] - found[0][0] > RESPONSE * rate):
             found = found[1:]
     if not found:
@@ -410,44 +400,30 @@ def _earliest(
     earliest, place = found[0]
     at, other = next((later for later in found if later[0] > earliest), (earliest, None))
     fresh = slice(earliest, earliest + max(1, round(SPREAD * rate)))
-    return Localisation(
-        stage=stages.names[place],
-        following="" if other is None else stages.names[other],
-        lag=(at - earliest) / rate,
-        joints=_joints(stages, innovation.residual[place, fresh]),
-        onset=float(stages.time[earliest]),
-    )
+    return place, other, at - earliest, fresh
 
 
 def _adding(
-    stages: Flow, innovation: Innovation, quiet: QuietStatistics, during: slice
-) -> Localisation | None:
-    """Find the first stage whose innovation has a quarter of the largest excess power of any."""
-    power = np.square(innovation.level[:, during]).mean(axis=1)
-    total = np.square(innovation.total[:, during]).mean(axis=1)
-    least = np.maximum(MORE * quiet.power, PASSED_ON**2 * total)
+    change: Array, total: Array, level: Array, quiet: QuietStatistics, during: slice, *, rate: float
+) -> tuple[int, int | None, int, slice] | None:
+    """Find the first stage whose innovation has a quarter of the largest excess power of any.
+
+    It gives what `_earliest` does; the next stage is the measured one.
+    """
+    power = np.square(level[:, during]).mean(axis=1)
+    least = np.maximum(MORE * quiet.power, PASSED_ON**2 * np.square(total[:, during]).mean(axis=1))
     excess = np.where(power > least, power - quiet.power, 0.0)
     if not excess.max() > 0.0:
         return None
-    place = int(np.argmax(excess >= ADDS * excess.max()))
-    joints = _joints(stages, innovation.residual[place, during])
-    if place == len(excess) - 1:
-        return Localisation(stages.names[place], joints=joints)
-    cause, effect = innovation.change[place, during], innovation.change[-1, during]
+    place, last = int(np.argmax(excess >= ADDS * excess.max())), len(excess) - 1
+    if place == last:
+        return place, None, 0, during
     # The lag, up to the slowest, at which one follows the other best, all joints together.
-    most = max(1, round(SLOWEST * stages.rate))
-    waves = [np.fft.rfft(signal, len(cause) + most, axis=0) for signal in (effect, cause)]
-    together = np.fft.irfft((waves[0] * waves[1].conj()).sum(axis=1), len(cause) + most)
-    lag = int(np.argmax(together[: most + 1])) / stages.rate
-    return Localisation(stages.names[place], stages.names[-1], lag, joints=joints)
-
-
-def _joints(stages: Flow, residual: Array) -> tuple[tuple[str, float], ...]:
-    """Joints of the largest residual, shape (samples, joints), and their shares of its power."""
-    power = np.square(residual).sum(axis=0)
-    shares = power / (power.sum() or 1.0)
-    ranked = np.argsort(-shares, kind="stable")[:JOINTS].tolist()
-    return tuple((stages.joints[i], float(shares[i])) for i in ranked if shares[i] > 0.0)
+    most = max(1, round(SLOWEST * rate))
+    size = during.stop - during.start + most
+    cause, effect = (np.fft.rfft(change[each, during], size, axis=0) for each in (place, last))
+    together = np.fft.irfft((effect * cause.conj()).sum(axis=1), size)
+    return place, last, int(np.argmax(together[: most + 1])), during
 
 
 def rise(level: Array, first: int, last: int, *, rate: float) -> int:
@@ -592,13 +568,11 @@ def localise(
     failures: list[Failure] = [*found, *annotated]
     if not failures:
         return {}
-    quiet, staged = quiet_statistics(run, failures), has_stages(run)
-    localised = {}
+    quiet, localised = quiet_statistics(run, failures), {}
     for failure in failures:
         reach = max(ANNOTATED, frame) if failure in found else ANNOTATED
         known = first_stage(run, quiet, failure, reach=reach)
-        stage = known.stage if staged else ""  # it says nothing if there is no other
-        localised[failure] = replace(known, stage=stage, band=band(run, failure, failures))
+        localised[failure] = replace(known, band=band(run, failure, failures))
     return localised
 
 
