@@ -75,36 +75,34 @@ def observable_classes(
     bandwidth: Bandwidth, valid: Mask, library: Library, signals: Collection[str], *, rate: float
 ) -> tuple[ClassObservability, ...]:
     """Determine the observability of each failure class."""
-    logged = 2 * bandwidth.nyquist
+    logged, lowest = 2 * bandwidth.nyquist, None
     try:
         name, chosen = nc.nearest(library, rate, signals, logged=logged)
     except nc.ModelsError as error:
         models = library.values()
         known = [each.recipe if isinstance(each, nc.General) else each.profile for each in models]
-        classes = dict.fromkeys(name for each in known for name in each.classes[1:])
-        if isinstance(error, nc.MissingSignalError):
-            return _none_of(classes, str(error))
-        rates = [LOWEST if isinstance(each, nc.LogBands) else each.rate for each in known]
-        reason = f"{rate:g} Hz is below the rate of every model"
-        return _none_of(classes, reason, min(rates, default=None))
-    profile = chosen.profile
-    labels = [label for label in chosen.classes if label != "ok"]
-    gaps = np.flatnonzero(np.concatenate(([True], ~valid, [True])))
-    needed = max(profile.duration, SHORTEST)
-    if np.diff(gaps).max() - 1 < needed * logged * (1 - 1e-3):
-        return _none_of(labels, f"no stretch of {needed:g} s without a gap")
-    general = isinstance(library[name], nc.General)
+        labels, reason = [name for each in known for name in each.classes], str(error)
+        if not isinstance(error, nc.MissingSignalError):
+            rates = [LOWEST if isinstance(each, nc.LogBands) else each.rate for each in known]
+            lowest = min(rates, default=None)
+            reason = f"{rate:g} Hz is below the rate of every model"
+    else:
+        labels, profile = list(chosen.classes), chosen.profile
+        gaps = np.flatnonzero(np.concatenate(([True], ~valid, [True])))
+        needed = max(profile.duration, SHORTEST)
+        reason = f"no stretch of {needed:g} s without a gap"
+        if np.diff(gaps).max() - 1 >= needed * logged * (1 - 1e-3):
+            general = isinstance(library[name], nc.General)
+            return tuple(
+                _observability(label, bandwidth, profile, library, general=general)
+                for label in labels
+                if label != "ok"
+            )
     return tuple(
-        _observability(label, bandwidth, profile, library, general=general) for label in labels
+        ClassObservability(label, Observability.CANNOT_TELL, needed=lowest, reason=reason)
+        for label in dict.fromkeys(labels)
+        if label != "ok"
     )
-
-
-def _none_of(
-    labels: Iterable[str], reason: str, needed: float | None = None
-) -> tuple[ClassObservability, ...]:
-    """Say of all classes that they cannot be observed, why, and which rate it takes, in [Hz]."""
-    cannot_tell = Observability.CANNOT_TELL
-    return tuple(ClassObservability(each, cannot_tell, 0.0, 0.0, needed, reason) for each in labels)
 
 
 def _observability(
@@ -116,7 +114,9 @@ def _observability(
     low, high = max(wanted[0], edges[0]), min(wanted[1], edges[-1], bandwidth.usable)
     if np.sum((edges[:-1] < high) & (edges[1:] <= high) & (edges[1:] > low)) < FEWEST:
         needed = _rate_for(low, library) if whole else None
-        return _none_of([label], bandwidth.limit, needed)[0]
+        return ClassObservability(
+            label, Observability.CANNOT_TELL, needed=needed, reason=bandwidth.limit
+        )
     if high < wanted[1]:
         # A general model has the bands that the log has.
         by_model = edges[-1] <= bandwidth.usable and not general
@@ -306,11 +306,19 @@ def text(name: str, audit: Audit, assumed: str = "") -> str:
 
 def summary(audit: Audit, *, classes: bool = True) -> tuple[str, ...]:
     """Write the one or two lines that a report has for an audit: classes, then warnings."""
-    warnings = "; ".join(audit.warnings)
-    lines = [_sentence(audit)] if classes else []
-    if warnings:
+    lines, limited = [], dict[tuple[str, str], list[str]]()
+    for each in audit.classes if classes else ():
+        if each.observability is not Observability.OBSERVABLE:
+            limited.setdefault(_limit(each, audit.bandwidth), []).append(each.label)
+    clauses = [f"{lead}{_and(labels)} {rest}" for (lead, rest), labels in limited.items()]
+    if classes and audit.classes:
+        sentence = (
+            "; ".join(clauses) or f"the log can show {_and([c.label for c in audit.classes])}"
+        )
+        lines.append(f"{sentence[0].upper()}{sentence[1:]}.")
+    if warnings := "; ".join(audit.warnings):
         lines.append(f"Warnings: {warnings}{'' if warnings.endswith('?') else '.'}")
-    return tuple(filter(None, lines))
+    return tuple(lines)
 
 
 def shortcomings(audit: Audit) -> tuple[str, ...]:
@@ -321,53 +329,10 @@ def shortcomings(audit: Audit) -> tuple[str, ...]:
 
 def as_json(found: Mapping[str, tuple[Audit, str]], failed: Mapping[str, str]) -> str:
     """Write audits as ``noise-audit/2``."""
-    runs = [{**_plain(name, each), "assumed": told} for name, (each, told) in found.items()]
-    runs += [{"run": name, "message": message} for name, message in failed.items()]
-    return json.dumps({"format": "noise-audit/2", "runs": runs}, indent=2)
-
-
-def _sentence(audit: Audit) -> str:
-    """Write a sentence on what cannot be seen, or that all classes can."""
-    if not audit.classes:
-        return ""
-    limited: dict[tuple[str, str], list[str]] = {}
-    for each in audit.classes:
-        if each.observability is not Observability.OBSERVABLE:
-            limited.setdefault(_limit(each, audit), []).append(each.label)
-    clauses = [f"{lead}{_and(labels)} {rest}" for (lead, rest), labels in limited.items()]
-    sentence = "; ".join(clauses) or f"the log can show {_and([c.label for c in audit.classes])}"
-    return f"{sentence[0].upper()}{sentence[1:]}."
-
-
-def _limit(each: ClassObservability, audit: Audit) -> tuple[str, str]:
-    """What cannot be seen of a class: the words before and after its name."""
-    if each.observability is Observability.CANNOT_TELL:
-        needed = f"; requires {each.needed:g} Hz" if each.needed else ""
-        return "", f"cannot be observed ({each.reason}{needed})"
-    if each.reason.startswith(MASKED):
-        return "", f"only from {plain(each.low)} to {plain(each.high, 4)} Hz ({each.reason})"
-    above = f"above {plain(each.high, 4)} Hz cannot be seen"
-    reach = audit.bandwidth
-    if each.reason == reach.limit and reach.usable == reach.nyquist / reach.hold:
-        return f"at {plain(2 * reach.usable, 4)} Hz, ", above
-    needed = f"; all of it requires {each.needed:g} Hz" if each.needed else ""
-    return "", f"{above} ({each.reason}{needed})"
-
-
-def _and(words: list[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
-
-
-def _plain(name: str, audit: Audit) -> dict[str, Any]:
-    reach = audit.bandwidth
-    return {
-        "run": name,
-        "rate": audit.rate,
-        "duration": audit.duration,
-        "joints": audit.joints,
-        "jitter": dict(zip(("rms", "max"), audit.jitter, strict=True)) if audit.jitter else None,
-        "gaps": asdict(audit.gaps),
-        "bandwidth": {
+    runs: list[dict[str, Any]] = []
+    for name, (audit, assumed) in found.items():
+        reach, jitter = audit.bandwidth, audit.jitter
+        bandwidth = {
             "usable": reach.usable,
             "limit": reach.limit,
             "zero_order_hold": reach.hold,
@@ -376,11 +341,41 @@ def _plain(name: str, audit: Audit) -> dict[str, Any]:
             "quantisation_step": reach.step,
             "quantisation_floor_from": reach.floor_from,
             "quiet_from": reach.quiet_from,
-        },
-        "warnings": list(audit.warnings),
-        "notes": list(audit.notes),
-        "classes": [asdict(each) for each in audit.classes],
-    }
+        }
+        runs.append(
+            {
+                "run": name,
+                "rate": audit.rate,
+                "duration": audit.duration,
+                "joints": audit.joints,
+                "jitter": jitter and dict(zip(("rms", "max"), jitter, strict=True)),
+                "gaps": asdict(audit.gaps),
+                "bandwidth": bandwidth,
+                "warnings": list(audit.warnings),
+                "notes": list(audit.notes),
+                "classes": [asdict(each) for each in audit.classes],
+                "assumed": assumed,
+            }
+        )
+    runs += [{"run": name, "message": message} for name, message in failed.items()]
+    return json.dumps({"format": "noise-audit/2", "runs": runs}, indent=2)
+
+
+def _limit(each: ClassObservability, reach: Bandwidth) -> tuple[str, str]:
+    """What cannot be seen of a class: the words before and after its name."""
+    needed = f"requires {each.needed:g} Hz" if each.needed else ""
+    if each.observability is Observability.CANNOT_TELL:
+        return "", f"cannot be observed ({each.reason}{needed and f'; {needed}'})"
+    if each.reason.startswith(MASKED):
+        return "", f"only from {plain(each.low)} to {plain(each.high, 4)} Hz ({each.reason})"
+    above = f"above {plain(each.high, 4)} Hz cannot be seen"
+    if each.reason == reach.limit and reach.usable == reach.nyquist / reach.hold:
+        return f"at {plain(2 * reach.usable, 4)} Hz, ", above
+    return "", f"{above} ({each.reason}{needed and f'; all of it {needed}'})"
+
+
+def _and(words: list[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 
 
 # Of files
