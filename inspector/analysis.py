@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -169,13 +168,6 @@ def headline(status: Status, findings: Sequence[Event], reason: str = "") -> str
     return "; ".join([*parts, f"{novel} out of distribution"] if novel else parts)
 
 
-def status_of(frames: int, findings: Sequence[Event]) -> Status:
-    """Take the status of so many labelled frames from their findings."""
-    if not frames:
-        return Status.CANNOT_TELL
-    return Status.FINDINGS if findings else Status.OK
-
-
 def analyse(
     run: nm.Run | str | Path,
     library: Library | None = None,
@@ -208,22 +200,31 @@ def analyse(
     library = load_library() if library is None else library
     run, left_out = without_placeholder(run)
     slower = without_hold(run)
-    seen = audit(run, library, slower=slower)
-    named = (name or "run").encode(errors="backslashreplace").decode()  # a file's may be no UTF-8
-    about: dict[str, Any] = {"name": named, "run": run, "audit": seen, "unknown": unknown}
-    about |= {"sha256": sha256, "assumed": assumed}
+    found = Analysis(
+        name=(name or "run").encode(errors="backslashreplace").decode(),  # a file's may be no UTF-8
+        status=Status.CANNOT_TELL,
+        run=run,
+        audit=audit(run, library, slower=slower),
+        notes=(left_out,) if left_out else (),
+        unknown=unknown,
+        sha256=sha256,
+        assumed=assumed,
+    )
     try:
         labelled = label_run(run, library, slower=slower)
         labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
         spans, findings = extents(run, labels, labelled.lasting, labelled.bursts)
     except (CannotTellError, nc.SignalError, nm.RunError) as error:
-        notes = (left_out,) if left_out else ()
-        return Analysis(status=Status.CANNOT_TELL, reason=str(error), notes=notes, **about)
-    known = len(labels) if findings else int((labels.label != nc.UNKNOWN).sum())
-    status, reason = status_of(known, findings), "" if known else f"every frame is {nc.UNKNOWN}"
-    if not findings and not seen.observable:
-        status, reason = Status.CANNOT_TELL, " ".join(summary(seen))
-    return Analysis(
+        return replace(found, reason=str(error))
+    status, reason = Status.FINDINGS if findings else Status.CANNOT_TELL, ""
+    if not findings and not found.audit.observable:
+        reason = " ".join(summary(found.audit))
+    elif not findings and (labels.label == nc.UNKNOWN).all():
+        reason = f"every frame is {nc.UNKNOWN}"
+    elif not findings:
+        status = Status.OK
+    return replace(
+        found,
         status=status,
         reason=reason,
         labels=labels,
@@ -232,8 +233,7 @@ def analyse(
         alarm=labelled.alarm,
         spans=spans,
         findings=findings,
-        notes=tuple(filter(None, [left_out, labelled.remark])),
-        **about,
+        notes=(*found.notes, *filter(None, [labelled.remark])),
     )
 
 
@@ -243,7 +243,6 @@ def analyse_file(
     *,
     links: bool = True,
     kind: str = "normal",
-    unknown: Unknown = Unknown.FINDING,
 ) -> Analysis:
     """Analyse a file for people: with its hash, its links, and what was assumed of a log.
 
@@ -252,10 +251,8 @@ def analyse_file(
         kind: Kind of the extended noise, see ``noisemodel.noise``.
     """
     opened = path if isinstance(path, Opened) else open_run(path)
-    name, digest = opened.source.shown.stem, opened.sha256
-    found = analyse(opened.run, library, name=name, sha256=digest, unknown=unknown)
-    found = replace(found, assumed=opened.assumed)
-    return with_links(found, kind if links else "")
+    found = analyse(opened.run, library, name=opened.source.shown.stem, sha256=opened.sha256)
+    return with_links(replace(found, assumed=opened.assumed), kind if links else "")
 
 
 def with_links(analysis: Analysis, kind: str) -> Analysis:

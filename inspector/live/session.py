@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inspector.analysis import headline, status_of
+from inspector.analysis import headline
 from inspector.errors import InspectorError, Status
 from inspector.library import Library, load_library
 from inspector.live.drawing import Drawing, Sink
@@ -454,7 +454,9 @@ class LiveSession:
             return Summary(0, self._rate, "", {}, counts, self._sink.where)
         labeller, findings = self._labeller, self._found
         samples = self._samples + self._buffer.held
-        status = status_of(self._counts.total(), findings)
+        status = Status.FINDINGS if findings else Status.OK
+        if not self._counts.total():
+            status = Status.CANNOT_TELL
         reason = labeller.remark if not labeller.model else "no frame was labelled"
         dropped = {kind: counts[kind] for kind in DROPPED if kind in counts}
         if status is Status.OK and sum(dropped.values()) > MOST_DROPPED * max(samples, 1):
