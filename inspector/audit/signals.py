@@ -314,9 +314,12 @@ def corner(spectrum: Spectrum, floor: Array) -> float | None:
         octaves = np.log2(frequency[end] / frequency[place])
         if not above[place] or np.ptp(flat) > FLAT or drop < max(DROP, STEEP * octaves):
             continue
-        octave = 10.0 ** (np.median(flat) / 10.0) * frequency[place] / 2
-        if octave < LOUD**2 and _goes_on(level, above, place):
-            plateau = float(np.median(flat))
+        # What follows has to fall, octave by octave, into the floor or up to the end.
+        stop = place + int(np.argmin(np.append(above[place:-1], False)))
+        starts = np.arange(place + 1, stop - PER_OCTAVE + 1)
+        steep = (level[starts] - level[starts + PER_OCTAVE] >= STEEP).all()
+        plateau = _median(flat)
+        if steep and 10.0 ** (plateau / 10.0) * frequency[place] / 2 < LOUD**2:
             return float(frequency[np.flatnonzero(level[: place + 1] >= plateau - 3.0)[-1]])
     return None
 
@@ -324,15 +327,6 @@ def corner(spectrum: Spectrum, floor: Array) -> float | None:
 def _median(values: Array) -> float:
     ordered = np.sort(values)  # for the few values of a band, `np.median` takes six times as long
     return float(ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]) / 2
-
-
-def _goes_on(level: Array, above: Mask, place: int) -> bool:
-    """Whether what follows ``place`` falls, octave by octave, into the floor or up to the end."""
-    below = np.flatnonzero(~above[place:])
-    end = place + int(below[0]) if len(below) else len(level) - 1
-    starts = np.arange(place + 1, end - PER_OCTAVE + 1)
-    falls = level[starts] - level[starts + PER_OCTAVE]
-    return bool((falls >= STEEP).all())
 
 
 # Copies, units, and placeholders
