@@ -14,7 +14,7 @@ import os
 import reprlib
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from enum import StrEnum
@@ -263,17 +263,13 @@ class Verdict:
     @classmethod
     def of(cls, path: Path, analysis: Analysis) -> "Verdict":
         """Take from an analysis of a file what is printed."""
-        run = analysis.run
+        run, located, orders = analysis.run, analysis.localisations, analysis.orders
         return cls(
             path,
             analysis.status,
             analysis.model,
             tuple(
-                Finding.of(
-                    event,
-                    localisation=analysis.localisations.get(event),
-                    order=analysis.orders.get(event),
-                )
+                Finding.of(event, localisation=located.get(event), order=orders.get(event))
                 for event in analysis.findings
             ),
             analysis.message,
@@ -460,20 +456,16 @@ def exit_status(verdicts: Sequence[Verdict]) -> int:
     return worst(EXIT[verdict.status] for verdict in counted)
 
 
-def counts(verdicts: Iterable[Verdict]) -> dict[str, dict[str, int]]:
+def counts(verdicts: Sequence[Verdict]) -> dict[str, dict[str, int]]:
     """Count what all outputs state."""
-    runs: Counter[str] = Counter()
-    found: Counter[str] = Counter()
-    for verdict in verdicts:
-        runs[verdict.status.value] += verdict.of_run
-        found["failing"] += len(verdict.failing)
-        found["missing"] += len(verdict.missing)
-        found.update(event.ruling.value for event in verdict.excused)
-    excuses = [each.value for each in Ruling if each not in FAILING]
-    return {
-        "runs": {status.value: runs[status.value] for status in EXIT},
-        "findings": {name: found[name] for name in ("failing", "missing", *excuses)},
+    runs = Counter(verdict.status for verdict in verdicts if verdict.of_run)
+    excused = Counter(event.ruling for verdict in verdicts for event in verdict.excused)
+    found = {
+        "failing": sum(len(verdict.failing) for verdict in verdicts),
+        "missing": sum(len(verdict.missing) for verdict in verdicts),
+        **{ruling.value: excused[ruling] for ruling in Ruling if ruling not in FAILING},
     }
+    return {"runs": {status.value: runs[status] for status in EXIT}, "findings": found}
 
 
 RESULTS = "noise-verdict/3"  # format of what `classify --write json=FILE` writes
