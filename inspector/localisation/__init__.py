@@ -207,9 +207,8 @@ def quiet_statistics(run: Run, failures: Sequence[Failure]) -> QuietStatistics:
     _, stages, size, joints = velocity.shape
     valid, warm = np.ones(size, dtype=np.bool_), min(max(1, round(WARM * run.rate)), size - 1)
     change = sudden(velocity, valid, run.rate)
-    weights = np.zeros((0, joints, len(lags)))
-    if stages > 1:
-        weights = _prediction(change, lags, warm)
+    nothing = np.zeros((0, joints, len(lags)))
+    weights = _prediction(change, lags, warm) if stages > 1 else nothing
     *_, level = _innovation(change, weights, lags, valid)
     level = level[..., warm:]  # shape (stretches, stages, samples)
     return QuietStatistics(
@@ -574,8 +573,3 @@ def localise(
         known = first_stage(run, quiet, failure, reach=reach)
         localised[failure] = replace(known, band=band(run, failure, failures))
     return localised
-
-
-def has_stages(run: Run) -> bool:
-    """Whether a run has a stage to compare the measured motion with."""
-    return bool(run.stages) or run.velocity_desired is not None

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from inspector.analysis import Analysis
 from inspector.errors import Status
-from inspector.localisation import Localisation, fault_links, has_stages
+from inspector.localisation import Localisation, fault_links
 from inspector.text import counted
 from inspector.verdict import Finding
 from noiseclassifier import UNKNOWN, Event
@@ -154,5 +154,7 @@ def localised(analysis: Analysis, failure: Event | Block) -> tuple[str, str, str
 
 def note(analysis: Analysis) -> str:
     """Why no failure has a stage; empty if the run has stages."""
-    without = analysis.localisations and not has_stages(analysis.run)
+    if not analysis.localisations or analysis.run.stages:
+        return ""
+    without = analysis.run.velocity_desired is None
     return "No stages: the run has no desired velocities and no named stages." if without else ""
