@@ -104,9 +104,11 @@ def best_lines(
         for wave, motion in zip(waves, motions, strict=True)
         for piece in _pieces(wave[:, joint], *motion, max(SLOWEST, fastest / FINER))
     ]
-    if fastest <= SLOWEST or not _energy(pieces) > 0.0:
+    energy = sum(float(piece.weight @ np.square(piece.wave)) for piece in pieces)
+    if fastest <= SLOWEST or not energy > 0.0:
         return None, 0.0, 0.0
-    found, over_angle = _explained(pieces, fastest, run.rate, fewest=FEWEST, periods=PERIODS)
+    found, rest = _best_line(pieces, fastest, run.rate, fewest=FEWEST, periods=PERIODS)
+    over_angle = 1.0 - rest / energy
     if over_angle < least:
         return None, over_angle, 0.0
     # Time is the angle of a joint that turns at 1 rad/s throughout. Few periods count too: a tone
@@ -115,8 +117,8 @@ def best_lines(
         piece._replace(angle=np.arange(len(piece.wave)) / run.rate, speed=np.ones(len(piece.wave)))
         for piece in pieces
     ]
-    _, over_time = _explained(uniform, 1.0, run.rate)
-    return Order(run.joint_names[joint], found), over_angle, over_time
+    _, rest = _best_line(uniform, 1.0, run.rate)
+    return Order(run.joint_names[joint], found), over_angle, 1.0 - rest / energy
 
 
 def _parts(run: Run, failure: Event | Block) -> list[slice]:
@@ -185,10 +187,13 @@ def _pieces(wave: Array, angle: Array, speed: Array, slowest: float) -> Iterator
             yield Piece(wave[first:last], turned, sign * speed[first:last], weight)
 
 
-def _explained(
+def _best_line(
     pieces: list[Piece], fastest: float, rate: float, *, fewest: float = 0.0, periods: float = 0.0
 ) -> tuple[float, float]:
-    """The order that explains most, in periods per turn, 0 without periods enough; its share."""
+    """The order that explains most, in periods per turn, and the energy that it leaves.
+
+    The order is 0 without periods enough.
+    """
     step = fastest / rate / FINER
     longest = max(piece.angle[-1] for piece in pieces)
     size = 1 << math.ceil(math.log2(PADDED * longest / step + 1.0))
@@ -224,8 +229,4 @@ def _explained(
             size = 2.0 * (weight * wave) @ line.conj() / (weight @ speed)
             left = wave - (size * line).real
         rest += float(weight @ np.square(left))
-    return best, 1.0 - rest / _energy(pieces)
-
-
-def _energy(pieces: list[Piece]) -> float:
-    return sum(float(piece.weight @ np.square(piece.wave)) for piece in pieces)
+    return best, rest
