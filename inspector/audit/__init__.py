@@ -201,9 +201,9 @@ def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = Non
     reach = bandwidth(part)
     edges = np.flatnonzero(np.diff(np.concatenate(([True], run.mask, [True]))))
     lengths = np.diff(edges)[::2] / run.rate  # of its gaps
-    jitter, noted = None, run.meta.get("jitter")
-    match [noted.get(key) for key in ("rms", "max")] if isinstance(noted, Mapping) else []:
-        case [float(rms), float(largest)]:
+    jitter = None
+    match run.meta.get("jitter"):
+        case {"rms": float(rms), "max": float(largest)}:
             jitter = rms, largest
     return Audit(
         rate=run.rate,
