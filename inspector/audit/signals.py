@@ -431,13 +431,17 @@ def placeholder(run: Run) -> str:
     A velocity that was differentiated from desired positions is none if their quantisation steps
     alone make more than 0.05 rad/s of it.
     """
-    desired = run.velocity_desired
+    desired, target = run.velocity_desired, run.position_desired
     if desired is None or not desired.size:
         return ""
     if any(np.any(desired[rows]) for rows in pieces(desired)):
         return _coarse(run)
-    if _changes(run):
-        return "the desired velocity is zero throughout while the desired position changes"
+    if target is not None:
+        parts = (target[rows][run.mask[rows]] for rows in pieces(target))
+        found = [(p.min(axis=0, initial=np.inf), p.max(axis=0, initial=-np.inf)) for p in parts]
+        low, high = np.min([low for low, _ in found], 0), np.max([high for _, high in found], 0)
+        if (high - low).max() > CHANGE:
+            return "the desired velocity is zero throughout while the desired position changes"
     if _moves(run):
         return (
             "the desired velocity is zero throughout while joints move at more than"
@@ -452,16 +456,6 @@ def without_placeholder(run: Run) -> tuple[Run, str]:
         return run, ""
     said = f"{clause[0].upper()}{clause[1:]}: it was left out."
     return replace(run, velocity_desired=None), said
-
-
-def _changes(run: Run) -> bool:
-    """Whether the desired position changes."""
-    if run.position_desired is None:
-        return False
-    parts = (run.position_desired[rows][run.mask[rows]] for rows in pieces(run.position_desired))
-    found = [(p.min(axis=0, initial=np.inf), p.max(axis=0, initial=-np.inf)) for p in parts]
-    low, high = np.min([low for low, _ in found], 0), np.max([high for _, high in found], 0)
-    return bool((high - low).max() > CHANGE)
 
 
 def _coarse(run: Run) -> str:
