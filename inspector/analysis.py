@@ -18,12 +18,7 @@ from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.audit.signals import without_placeholder
 from inspector.errors import IGNORED, InspectorError, Status, Unknown
 from inspector.levels import FLOOR_DB, STEP, velocity_levels
-from inspector.library import (
-    CannotTellError,
-    Library,
-    label_run,
-    load_library,
-)
+from inspector.library import CannotTellError, Library, label_run, load_library
 from inspector.localisation import Localisation, extent, localise
 from inspector.localisation.order import Order, order
 from inspector.logs.clocks import without_hold
@@ -107,8 +102,7 @@ class Analysis:
         labels = self.labels
         if labels is None:
             return ()
-        apart = np.flatnonzero(labels.start[1:] > labels.stop[:-1]) + 1
-        groups = np.split(np.arange(len(labels)), apart)
+        groups = np.split(np.arange(len(labels)), np.flatnonzero(labels.apart) + 1)
         layers = [(float(labels.start[g[0]]), float(labels.stop[g[-1]]), "ok") for g in groups]
         alone = np.flatnonzero((labels.label == nc.UNKNOWN) & ~labels.flagged)
         middle = (labels.start[alone] + labels.stop[alone]) / 2
