@@ -113,13 +113,9 @@ class Analysis:
         names = np.full(len(edges) - 1, "", dtype=object)
         for start, stop, name in layers:
             names[np.searchsorted(edges, start) : np.searchsorted(edges, stop)] = name
-        changes = np.flatnonzero(np.append(True, names[1:] != names[:-1]))
-        stretches = zip(
-            edges[changes].tolist(),
-            edges[np.append(changes[1:], len(names))].tolist(),
-            names[changes].tolist(),
-            strict=True,
-        )
+        firsts = np.flatnonzero(np.append(True, names[1:] != names[:-1]))
+        starts, stops = edges[firsts].tolist(), edges[[*firsts[1:], len(names)]].tolist()
+        stretches = zip(starts, stops, names[firsts].tolist(), strict=True)
         return tuple(stretch for stretch in stretches if stretch[2])
 
     @property
@@ -342,21 +338,20 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
     moment of the run.
     """
     run = analysis.run
-    failures: Sequence[Event | Block] = analysis.findings or [
-        block for block in run.blocks if block.label != "ok"
-    ]
-    stretches = [(failure.label, failure.start, failure.stop) for failure in failures]
     begin, end = float(run.time[0]), float(run.time[-1])
+    annotated = [block for block in run.blocks if block.label != "ok"]
+    whole = [Block(begin, end, LOUDEST)]
+    failures: Sequence[Event | Block] = analysis.findings or annotated or whole
     starts, levels = analysis.vibration_level
     time = (starts + np.append(starts[1:], end + 1.0 / run.rate)) / 2
     level = np.nan_to_num(levels[:, 0], nan=FLOOR_DB)
     found = []
-    for label, start, stop in stretches or [(LOUDEST, begin, end)]:
-        inside = np.flatnonzero((time >= start - STEP / 2) & (time <= stop + STEP / 2))
+    for each in failures:
+        inside = np.flatnonzero((time >= each.start - STEP / 2) & (time <= each.stop + STEP / 2))
         if len(inside):
             peak = inside[level[inside].argmax()]
-            start, stop = max(start, begin), min(stop, end)
-            moment = Moment(label, start, stop, float(np.clip(time[peak], start, stop)))
+            start, stop = max(each.start, begin), min(each.stop, end)
+            moment = Moment(each.label, start, stop, float(np.clip(time[peak], start, stop)))
             found.append((float(level[peak]), moment))
     found.sort(key=lambda pair: -pair[0])
     return tuple(moment for _, moment in found[:MOST])
