@@ -108,27 +108,26 @@ def observable_classes(
 def _observability(
     label: str, bandwidth: Bandwidth, profile: Profile, library: Library, *, general: bool
 ) -> ClassObservability:
-    partly, whole = Observability.PARTLY, bandwidth.usable >= bandwidth.nyquist
-    edges = band_edges(profile)
+    edges, whole = band_edges(profile), bandwidth.usable >= bandwidth.nyquist
     wanted = OSCILLATIONS if label == "oscillations" else (edges[0], edges[-1])
     low, high = max(wanted[0], edges[0]), min(wanted[1], edges[-1], bandwidth.usable)
+    degree, needed, reason = Observability.PARTLY, None, bandwidth.limit
     if np.sum((edges[:-1] < high) & (edges[1:] <= high) & (edges[1:] > low)) < FEWEST:
+        degree = Observability.CANNOT_TELL
         needed = _rate_for(low, library) if whole else None
-        return ClassObservability(
-            label, Observability.CANNOT_TELL, needed=needed, reason=bandwidth.limit
-        )
-    if high < wanted[1]:
+        low = high = 0.0
+    elif high < wanted[1]:
         # A general model has the bands that the log has.
-        by_model = edges[-1] <= bandwidth.usable and not general
-        reason = f"the model of {profile.rate:g} Hz ends there" if by_model else bandwidth.limit
-        needed = _rate_for(wanted[1], library)
-        helps = whole and needed > 2 * bandwidth.nyquist
-        return ClassObservability(label, partly, low, high, needed if helps else None, reason)
-    if bandwidth.floor_from is not None and bandwidth.floor_from < high:
+        if edges[-1] <= bandwidth.usable and not general:
+            reason = f"the model of {profile.rate:g} Hz ends there"
+        rate = _rate_for(wanted[1], library)
+        needed = rate if whole and rate > 2 * bandwidth.nyquist else None
+    elif bandwidth.floor_from is not None and bandwidth.floor_from < high:
         floor, above = bandwidth.floor_amplitude, plain(bandwidth.floor_from)
         reason = f"{MASKED} below {floor:.2g} rad/s above {above} Hz"
-        return ClassObservability(label, partly, low, high, reason=reason)
-    return ClassObservability(label, Observability.OBSERVABLE, low, high)
+    else:
+        degree, reason = Observability.OBSERVABLE, ""
+    return ClassObservability(label, degree, low, high, needed, reason)
 
 
 def band_edges(profile: Profile) -> Array:
