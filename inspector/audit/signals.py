@@ -253,14 +253,13 @@ class Bandwidth:
 def bandwidth(run: Run) -> Bandwidth:
     """Measure the bandwidth of a run."""
     differentiator, hold = differentiator_of(run), hold_length(run.velocity, run.mask)
-    if run.position is not None and differentiator:
-        hold = max(hold, hold_length(run.position, run.mask))
+    signal = run.velocity
+    if run.position is not None and differentiator:  # [rad], the velocities came from these
+        signal, hold = run.position, max(hold, hold_length(run.position, run.mask))
     plain = Bandwidth(run.rate / 2, hold, differentiator)
     found = spectrum(run.velocity, run.rate, run.mask)
     if found is None or not found.total.any():
         return plain
-    # Of the positions, in [rad], if these were differentiated, else of the velocities, in [rad/s].
-    signal = run.position if differentiator and run.position is not None else run.velocity
     steps = np.array([step_of(values) for values in np.ascontiguousarray(valid(run, signal).T)])
     # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12, here of all
     # joints together.
