@@ -223,7 +223,7 @@ def _warnings(run: Run, reach: Bandwidth) -> Iterator[str]:
         yield f"{clause}: it is left out"
     for copy in copies(run):
         whose = "all joints" if len(copy.joints) == len(run.joint_names) else ", ".join(copy.joints)
-        samples = f"{abs(copy.lag)} sample{'' if abs(copy.lag) == 1 else 's'}"
+        samples = counted(abs(copy.lag), "sample")
         when = f", {samples} {'later' if copy.lag > 0 else 'earlier'}" if copy.lag else ""
         yield f"measured {copy.signal} of {whose} is the desired one{when}: one is a copy"
     if reach.hold > 1:
