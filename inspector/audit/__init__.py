@@ -81,13 +81,15 @@ def observable_classes(
     except nc.ModelsError as error:
         models = library.values()
         known = [each.recipe if isinstance(each, nc.General) else each.profile for each in models]
-        labels, reason = [name for each in known for name in each.classes], str(error)
+        labels = dict.fromkeys(name for each in known for name in each.classes if name != "ok")
+        reason = str(error)
         if not isinstance(error, nc.MissingSignalError):
             rates = [LOWEST if isinstance(each, nc.LogBands) else each.rate for each in known]
             lowest = min(rates, default=None)
             reason = f"{rate:g} Hz is below the rate of every model"
     else:
-        labels, profile = list(chosen.classes), chosen.profile
+        labels = dict.fromkeys(name for name in chosen.classes if name != "ok")
+        profile = chosen.profile
         gaps = np.flatnonzero(np.concatenate(([True], ~valid, [True])))
         needed = max(profile.duration, SHORTEST)
         reason = f"no stretch of {needed:g} s without a gap"
@@ -96,12 +98,10 @@ def observable_classes(
             return tuple(
                 _observability(label, bandwidth, profile, library, general=general)
                 for label in labels
-                if label != "ok"
             )
     return tuple(
         ClassObservability(label, Observability.CANNOT_TELL, needed=lowest, reason=reason)
-        for label in dict.fromkeys(labels)
-        if label != "ok"
+        for label in labels
     )
 
 
@@ -311,9 +311,8 @@ def summary(audit: Audit, *, classes: bool = True) -> tuple[str, ...]:
             limited.setdefault(_limit(each, audit.bandwidth), []).append(each.label)
     clauses = [f"{lead}{_and(labels)} {rest}" for (lead, rest), labels in limited.items()]
     if classes and audit.classes:
-        sentence = (
-            "; ".join(clauses) or f"the log can show {_and([c.label for c in audit.classes])}"
-        )
+        shown = _and([each.label for each in audit.classes])
+        sentence = "; ".join(clauses) or f"the log can show {shown}"
         lines.append(f"{sentence[0].upper()}{sentence[1:]}.")
     if warnings := "; ".join(audit.warnings):
         lines.append(f"Warnings: {warnings}{'' if warnings.endswith('?') else '.'}")
