@@ -127,12 +127,15 @@ def test_ripple_is_found_through_turning_back_and_beside_gaps():
     assert order(gap, long).periods_per_turn == pytest.approx(160, rel=0.01)
 
 
-def test_a_finding_in_a_gap_or_of_a_joint_at_rest_has_no_order():
+def test_a_finding_in_a_gap_or_of_a_joint_at_rest_or_of_a_base_alone_has_no_order():
     valid = (TIME < 0.2) | (TIME >= 2.0)
     assert order(run_with(ripple(0.05), valid=valid), FINDING) is None
     rest = np.zeros((len(TIME), 2))
     still = run_with(0.0, velocity=rest + tone(0.01)[:, None], velocity_desired=rest, position=rest)
     assert best_lines(still, FINDING) == (None, 0.0, 0.0)
+    shaken, none = tone(0.05)[:, None] * np.ones(6), rest[:, :0]
+    alone = Run(time=TIME, joint_names=(), velocity=none, position=none, base_velocity=shaken)
+    assert order(alone, FINDING) is None
 
 
 def test_a_finding_that_is_shorter_than_a_part_or_a_run_is_no_error():

@@ -81,11 +81,11 @@ def best_lines(
     """The best order of the joint that vibrates most, and what it and a frequency explain.
 
     Both are shares of the joint's vibration above 10 Hz: of the velocity, less the desired one if
-    there is one. No frequency is sought if an order explains less than ``least``; without vibration
-    or motion there is none.
+    there is one. No frequency is sought if an order explains less than ``least``; without vibration,
+    motion or joints there is none.
     """
     parts = _parts(run, failure)
-    if not parts:
+    if not parts or not run.joint_names:
         return None, 0.0, 0.0
     half = max(1, round(SMOOTH * run.rate / 2))  # samples beside the middle of a moving mean
     waves = []
