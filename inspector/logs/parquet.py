@@ -169,8 +169,9 @@ def unpacked_size(path: Path, columns: Collection[str]) -> tuple[int, int]:
         length = int.from_bytes(data[-8:-4], "little")
         if data[-4:] != MAGIC or length > min(LARGEST_END, len(data) - 8):
             raise ValueError("its end is no table of columns")
+        data.seek(len(data) - 8 - length)
         try:
-            for group in _thrift(data, len(data) - 8 - length)[0][ROW_GROUPS]:
+            for group in _thrift(data)[ROW_GROUPS]:
                 numbers = 0
                 for about in (chunk[META_DATA] for chunk in group[COLUMNS]):
                     name = b".".join(about[PATH]).decode(errors="replace")
@@ -179,7 +180,9 @@ def unpacked_size(path: Path, columns: Collection[str]) -> tuple[int, int]:
                         stated += max(about[ALL_UNPACKED], 8 * about[VALUES])
                         held += sum(_pages(data, about))
                 width = max(width, numbers // max(1, group[ROWS]))
-        except IndexError as error:
+        except ValueError as error:
+            if data.tell() < len(data):
+                raise
             raise ValueError("a header is cut off") from error
         except (KeyError, TypeError, AttributeError) as error:
             raise ValueError("its end is no table of columns") from error
@@ -193,60 +196,49 @@ def _pages(data: mmap, about: dict[int, Any]) -> Iterator[int]:
         place = about[DICTIONARY_PAGE]
     stop = min(place + about[ALL_PACKED], len(data))
     while 0 <= place < stop:
-        header, place = _thrift(data, place)
+        data.seek(place)
+        header = _thrift(data)
         if min(header.get(UNPACKED, -1), header.get(PACKED, -1)) < 0:
             raise ValueError("a page has no size")
         yield header[UNPACKED]
-        place += header[PACKED]
+        place = data.tell() + header[PACKED]
 
 
-def _thrift(data: mmap, place: int, kind: int = STRUCT, depth: int = DEPTH) -> tuple[Any, int]:
-    """A value, and where it ends; a struct is its fields by their numbers."""
+def _thrift(data: mmap, kind: int = STRUCT, depth: int = DEPTH) -> Any:
+    """The value at the place of the file, which moves on; a struct is its fields by number."""
     if not depth:
         raise ValueError("a header is nested too deeply")
     if kind in (TRUE, FALSE, BYTE):  # of lists; those of structs are in their heads
-        return data[place], place + 1
-    if kind == DOUBLE:
-        return None, place + 8
+        return data.read_byte()
     if kind in NUMBERS:
-        number, place = _varint(data, place)
-        return (number >> 1) ^ -(number & 1), place
-    if kind == BINARY:
-        size, place = _varint(data, place)
-        return data[place : place + size], place + size
+        number = _varint(data)
+        return (number >> 1) ^ -(number & 1)
+    if kind in (DOUBLE, BINARY):
+        return data.read(8 if kind == DOUBLE else min(_varint(data), len(data)))
     if kind in (LIST, SET):
-        count, kind = data[place] >> 4, data[place] & 15
-        place += 1
-        if count == 15:
-            count, place = _varint(data, place)
+        count, kind = divmod(data.read_byte(), 16)
+        count = _varint(data) if count == 15 else count
         if count > len(data):
             raise ValueError("a header has a list of more than there is")
-        items = []
-        for _ in range(count):
-            item, place = _thrift(data, place, kind, depth - 1)
-            items.append(item)
-        return items, place
+        return [_thrift(data, kind, depth - 1) for _ in range(count)]
     if kind != STRUCT:
         raise ValueError(f"a header has a field of kind {kind}")
     fields: dict[int, Any] = {}
     name = 0
-    while head := data[place]:
-        name, place, kind = name + (head >> 4), place + 1, head & 15
-        if not head >> 4:
-            name, place = _thrift(data, place, NUMBERS[0])
-        fields[name] = kind == TRUE
-        if kind not in (TRUE, FALSE):
-            fields[name], place = _thrift(data, place, kind, depth - 1)
-    return fields, place + 1
+    while head := data.read_byte():
+        step, kind = divmod(head, 16)
+        name = name + step if step else _thrift(data, NUMBERS[0])
+        fields[name] = _thrift(data, kind, depth - 1) if kind not in (TRUE, FALSE) else kind == TRUE
+    return fields
 
 
-def _varint(data: mmap, place: int) -> tuple[int, int]:
+def _varint(data: mmap) -> int:
     number = 0
     for shift in range(0, 70, 7):
-        number |= (data[place] & 127) << shift
-        place += 1
-        if data[place - 1] < 128:
-            return number, place
+        byte = data.read_byte()
+        number |= (byte & 127) << shift
+        if byte < 128:
+            return number
     raise ValueError("a header has a number of more than 64 bits")
 
 
