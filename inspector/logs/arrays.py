@@ -135,16 +135,14 @@ def log_of(
         for n, each in arrays.items()
         if each.ndim == 1 and (column_signal(n, naming) or array_signal(n))
     }
+    arrays = _gathered(arrays, {entry.source for entry in options.entries})
     roles = _roles(arrays, mapped, naming)
     motion = [name for name, what in roles.items() if what in MOTION or name in mapped]
     if not motion:
         raise _nothing(path, every, not_read)
     if not stamps:
-        name, arrays = _time(arrays, options)
-        commands = [each for each, what in roles.items() if what == COMMAND]
-        arrays = _of_one_length(path, arrays, [*([name] if name else []), *motion], commands)
-        stamps = Stamps.counted(len(arrays[motion[0]]))
-        stamps = stamps_of(path, name, arrays[name], options.rate) if name else stamps
+        commands = [name for name, what in roles.items() if what == COMMAND]
+        stamps, arrays = _stamped(path, arrays, options, motion, commands)
         stamps = replace(stamps, stated=stated)
     time, samples = stamps.name, len(stamps.time)
     fields = [
@@ -156,13 +154,13 @@ def log_of(
             signal=what if what in (*SIGNALS, COMMAND) and name not in columns else "",
             source=path.name,
             # The second of two sides is a command beside the desired motion: ``cmd.q_d[0]``.
-            rank=0 if STATES.fullmatch(name) else 1 + says_twice(name),
+            rank=0 if STATES.fullmatch(name) or name not in every else 1 + says_twice(name),
         )
         for name, what in roles.items()
         if len(arrays[name]) == samples and name != time
     ]
     read = {time, *(each.name for each in fields)}
-    log = Log(
+    return Log(
         path,
         tuple(fields),
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
@@ -170,7 +168,6 @@ def log_of(
         suggested=tuple(_of_mujoco(arrays, roles)),
         time=time,
     )
-    return gathered(log, options)
 
 
 def _of_samples(arrays: Arrays) -> Arrays:
@@ -182,24 +179,20 @@ def _of_samples(arrays: Arrays) -> Arrays:
     }
 
 
-def gathered(log: Log, options: ReadOptions) -> Log:
-    """Log of a table with the columns of MuJoCo's state as arrays; itself if it has none."""
-    mapped = {entry.source for entry in options.entries}
-    found: dict[str, dict[int, Field]] = {}
-    for each in log.fields:
-        if match := CELLS.fullmatch(each.name):
-            found.setdefault(match["array"].lower(), {})[int(match["number"])] = each
-    groups = {n: g for n, g in found.items() if not mapped & {c.name for c in g.values()}}
-    if not {QPOS, QVEL} & set(groups):
-        return log
-    columns = {id(each) for members in groups.values() for each in members.values()}
-    fields = [each for each in log.fields if id(each) not in columns]
-    arrays = {n: np.hstack([g[number].values for number in sorted(g)]) for n, g in groups.items()}
-    roles = {name: meaning(name) for name in arrays}
-    for name, values in arrays.items():
-        signal, stamps = COMMAND if roles[name] == COMMAND else "", log.fields[0].stamps
-        fields.append(Field(name, values, stamps, signal=signal, source=log.path.name))
-    return replace(log, fields=tuple(fields), suggested=tuple(_of_mujoco(arrays, roles)))
+def _gathered(arrays: Arrays, mapped: set[str]) -> Arrays:
+    """Arrays of MuJoCo's state in place of the columns of a table that hold its numbers."""
+    found: dict[str, dict[int, str]] = {}
+    for match in filter(None, map(CELLS.fullmatch, arrays)):
+        found.setdefault(match["array"].lower(), {})[int(match["number"])] = match[0]
+    whole = {
+        array: np.column_stack([arrays[cells[number]] for number in sorted(cells)])
+        for array, cells in found.items()
+        if not mapped & {*cells.values()} and len({len(arrays[n]) for n in cells.values()}) == 1
+    }
+    if not {QPOS, QVEL} & {*whole}:
+        return arrays
+    single = {name for array in whole for name in found[array].values()}
+    return {name: each for name, each in arrays.items() if name not in single} | whole
 
 
 def floats(values: NDArray[Any]) -> Real:
@@ -240,12 +233,11 @@ def stated_rate(items: Mapping[str, Any]) -> tuple[str, float | None]:
 
 def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
     """Meaning of the arrays, without those for which another one stands."""
-    roles = {name: "" if name in mapped else meaning(name) for name in arrays}
-    for name, each in arrays.items():  # columns that name their joint
-        if name not in mapped and not roles[name] and each.ndim == 1:
-            roles[name] = (column_signal(name, naming) or ("",))[0]
-        elif roles[name] == COMMAND and each.ndim == 1:
-            roles[name] = ""
+    roles = {}
+    for name, each in arrays.items():
+        roles[name] = "" if name in mapped else meaning(name)
+        if each.ndim == 1 and name not in mapped and roles[name] in ("", COMMAND):
+            roles[name] = (column_signal(name, naming) or ("",))[0]  # which names its joint
     robots = {match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
     chosen = "robot" if "robot" in robots else min(robots, default="")
     first: dict[str, str] = {}  # of MuJoCo's arrays the one of the shortest name
@@ -261,32 +253,29 @@ def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
     }
 
 
-def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
-    """Name of the array with the stamps, empty without; a part of one is an array then."""
-    source = options.time
-    name, part = (source, slice(None)) if source in arrays else Entry("", "", source).part()
-    if name in arrays:
-        values = arrays[name].reshape(len(arrays[name]), -1)[:, part]
-        if values.size:
-            return source, {**arrays, source: values[:, 0]}
-    return options.stamps_in([name for name, each in arrays.items() if each.ndim == 1]), arrays
-
-
-def _of_one_length(
-    path: Path, arrays: Arrays, names: Sequence[str], commands: Sequence[str]
-) -> Arrays:
-    """Arrays of as many samples as stamps; of one state more than actions the last is left out."""
-    lengths = {len(arrays[name]) for name in (*names, *commands)}
-    if max(lengths) - min(lengths) == 1:
-        longest = max(lengths)
+def _stamped(
+    path: Path, arrays: Arrays, options: ReadOptions, motion: Sequence[str], commands: Sequence[str]
+) -> tuple[Stamps, Arrays]:
+    """Stamps, and arrays of as many samples; of one state more than actions, without the last."""
+    source = options.time  # which may be a part of an array
+    array, part = (source, slice(None)) if source in arrays else Entry("", "", source).part()
+    if array in arrays and (stamps := arrays[array].reshape(len(arrays[array]), -1)[:, part]).size:
+        name, arrays = source, {**arrays, source: stamps[:, 0]}
+    else:
+        name = options.stamps_in([name for name, each in arrays.items() if each.ndim == 1])
+    wanted = [*([name] if name else []), *motion]
+    lengths = {len(arrays[each]) for each in (*wanted, *commands)}
+    longest = max(lengths)
+    if longest - min(lengths) == 1:
         arrays = {n: each[:-1] if len(each) == longest else each for n, each in arrays.items()}
-    samples = len(arrays[names[0]])
-    for name in names:
-        each = arrays[name]
-        if len(each) != samples:
-            problem = f"{name!r} has shape {each.shape}; expected {samples} samples, as stamps"
-            raise LogError(path, f"{problem}, along its first axis")
-    return arrays
+    samples = len(arrays[wanted[0]])
+    for each in wanted:
+        if len(arrays[each]) != samples:
+            problem = f"{each!r} has shape {arrays[each].shape}; expected {samples} samples"
+            raise LogError(path, f"{problem}, as stamps, along its first axis")
+    if not name:
+        return Stamps.counted(samples), arrays
+    return stamps_of(path, name, arrays[name], options.rate), arrays
 
 
 def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
@@ -356,22 +345,21 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of an archive, an array alone, or a MATLAB file of version 5."""
     with path.open("rb") as stream:
         is_matlab = stream.read(len(MATLAB)) == MATLAB
-    held = _variables if is_matlab else _arrays
-    arrays, run = held(path), None
+    arrays, run = _variables(path) if is_matlab else _arrays(path), None
 
     def listing() -> tuple[str, ...]:
         return tuple(f"{name}  {each.dtype} {each.shape}" for name, each in arrays.items())
 
     if is_matlab:
-        return LogReader(
-            "MATLAB 5", ("",), lambda _: log_of_variables(path, held(path), options), listing
-        )
+        read = partial(log_of_variables, path, arrays, options)
+        return LogReader("MATLAB 5", ("",), lambda _: read(), listing)
     known = all(name in runfile.ARRAYS or name.startswith(runfile.STAGE) for name in arrays)
     if known and "time" in arrays and not (options.entries or options.units or options.joints):
         with suppress(RunError, TypeError):  # without uniform time it is resampled
             check_time(arrays["time"])
             run = partial(Run.load, path)
-    return LogReader("npz", (*episodes_of(arrays),), partial(_read, path, options), listing, run)
+    episodes = (*episodes_of(arrays),)
+    return LogReader("npz", episodes, partial(_read, path, arrays, options), listing, run)
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -390,8 +378,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     return {name: array[name] for name in names} if names else {ALONE: array}
 
 
-def _read(path: Path, options: ReadOptions, episode: str) -> Log:
-    arrays = _arrays(path)
+def _read(path: Path, arrays: Arrays, options: ReadOptions, episode: str) -> Log:
     texts = {name: each for name, each in arrays.items() if each.dtype.kind == "U"}
     measured, desired = (
         tuple(map(str, texts[name].ravel())) if name in texts else ()
@@ -411,7 +398,18 @@ HEADER = 128  # bytes before the first variable
 # Types of elements: a variable, one that is packed, and what a variable begins with.
 MATRIX, COMPRESSED, FLAGS, DIMENSIONS = 14, 15, 6, 5
 # Numbers by the type of their element, whatever the class of the variable is.
-STORED = ("", "i1", "u1", "i2", "u2", "i4", "u4", "f4", "", "f8", "", "", "i8", "u8")
+STORED = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}
 STRUCT, TEXT = 2, 4  # classes of variables
 NO_NUMBERS = (1, 3, 5, 16, 17, 18)  # classes of cells, objects, sparse matrices and functions
 COMPLEX = 0x800  # the flag of a variable with imaginary parts
@@ -447,15 +445,15 @@ def _variables(path: Path) -> dict[str, NDArray[Any]]:
     found: dict[str, NDArray[Any]] = {}
     with errors_of(path, (struct_error, ValueError)):  # such as of a shape that no array has
         for data in _unpacked_variables(path.read_bytes()):
-            texts = (part[1:] for part in _elements(data, 8, len(data)) if part[0] in (1, 2))
-            name = data[slice(*next(texts, (0, 0)))].decode("latin1")
+            texts = (bytes(content) for kind, content in _elements(data) if kind in (1, 2))
+            name = next(texts, b"").decode("latin1")
             if name and not name.startswith("__"):
-                found |= _numbers_in(data, 8, len(data), name)
+                found |= _numbers_in(data, name)
     return found
 
 
-def _unpacked_variables(data: bytes) -> Iterator[bytes]:
-    """The variables of a file, each with its tag."""
+def _unpacked_variables(data: bytes) -> Iterator[memoryview]:
+    """The elements of each variable of a file."""
     if data[126:128] != b"IM":
         raise ArchiveError("a MATLAB file of another byte order; save it again with MATLAB")
     place, total = HEADER, 0
@@ -477,50 +475,50 @@ def _unpacked_variables(data: bytes) -> Iterator[bytes]:
                 check_unpacked(total, len(data))
             element = b"".join(pieces)
         if unpack_from("<I", element) == (MATRIX,):
-            yield element
+            yield memoryview(element)[8:]
 
 
-def _elements(data: bytes, place: int, stop: int) -> Iterator[tuple[int, int, int]]:
-    """Type, start and end of each element: small ones have their data in their tag."""
-    while place + 8 <= stop:
+def _elements(data: memoryview) -> Iterator[tuple[int, memoryview]]:
+    """Type and content of each element: small ones have their content in their tag."""
+    place = 0
+    while place + 8 <= len(data):
         kind, size = unpack_from("<II", data, place)
         start = place + 8
         following = start + size + (-size % 8)
         if kind >> 16:
             kind, size, start, following = kind & 0xFFFF, kind >> 16, place + 4, place + 8
-        if start + size > stop:
+        if start + size > len(data):
             raise ArchiveError("damaged: an element is longer than its variable")
-        yield kind, start, start + size
+        yield kind, data[start : start + size]
         place = following
 
 
 def _numbers_in(
-    data: bytes, place: int, stop: int, name: str, depth: int = DEPTH
+    data: memoryview, name: str, depth: int = DEPTH
 ) -> Iterator[tuple[str, NDArray[Any]]]:
     """Arrays of numbers in a variable, of the sizes that it states."""
-    parts = [*_elements(data, place, stop)]
-    if not parts:
+    parts = [*_elements(data)]
+    kinds = [kind for kind, _ in parts[:2]]
+    if not depth or len(parts) < 3 or kinds != [FLAGS, DIMENSIONS]:
         return
-    flags, dims = NO_NUMBERS[0], tuple[Any, ...]()
-    if depth and len(parts) > 2 and (parts[0][0], parts[1][0]) == (FLAGS, DIMENSIONS):
-        (flags,) = unpack_from("<I", data, parts[0][1])
-        dims = unpack_from(f"<{(parts[1][2] - parts[1][1]) // 4}i", data, parts[1][1])
+    (flags,) = unpack_from("<I", parts[0][1])
+    dims = unpack_from(f"<{len(parts[1][1]) // 4}i", parts[1][1])
     kind, count = flags & 0xFF, prod(dims)
     if kind in NO_NUMBERS or min(dims, default=0) < 0:
         return
     if kind == STRUCT and count == 1 and len(parts) > 4:
-        (length,) = unpack_from("<i", data, parts[3][1])
-        names = data[slice(*parts[4][1:])]
+        (length,) = unpack_from("<i", parts[3][1])
+        names = bytes(parts[4][1])
         fields = (names[at : at + length] for at in range(0, len(names), max(1, length)))
-        for field, part in zip(fields, parts[5:], strict=False):
+        for field, (_, content) in zip(fields, parts[5:], strict=False):
             text = field.partition(bytes(1))[0].decode("latin1")
-            yield from _numbers_in(data, *part[1:], f"{name}/{text}", depth - 1)
+            yield from _numbers_in(content, f"{name}/{text}", depth - 1)
     elif kind != STRUCT:
-        size = sum(end - start for _, start, end in parts[3:])
-        stored, start, end = (*parts, (1, stop, stop))[3]
-        dtype = np.dtype(dict(enumerate(STORED)).get(stored) or "i1")
+        size = sum(len(content) for _, content in parts[3:])
+        stored, content = (*parts, (1, data[:0]))[3]
+        dtype = np.dtype(STORED.get(stored, "i1"))
         plain = kind != TEXT and not flags & COMPLEX
-        if count > size or (plain and count * dtype.itemsize != end - start):
+        if count > size or (plain and count * dtype.itemsize != len(content)):
             raise ArchiveError(f"damaged: a variable states {count} numbers and holds {size} bytes")
         if plain and len(dims) <= 2:
-            yield name, np.ndarray(dims, dtype, data, start, order="F")
+            yield name, np.ndarray(dims, dtype, content, order="F")
