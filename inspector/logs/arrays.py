@@ -287,18 +287,17 @@ def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
             yield Entry("velocity", "", names[QVEL])
         return
     qpos, width = flat[QPOS], flat[QPOS].shape[1]
-    count = width - flat[QVEL].shape[1] if QVEL in flat else 1
-    floating, place = list[int](), 0  # first columns of free joints: x, y, z and a quaternion
-    while len(floating) < count and place + 7 <= width:
+
+    def is_free(place: int) -> bool:
+        """Whether a joint is free from there on: x, y, z and a quaternion."""
         length = np.linalg.norm(qpos[:, place + 3 : place + 7], axis=1)
-        is_free = bool((np.abs(length - 1) < 0.01).all())
-        floating += [place] * is_free
-        place += 7 if is_free else 1
-    if QVEL not in flat and floating != [0]:
-        floating = []  # four numbers of norm 1 among joints may be chance
-    base = floating[:1] == [0]
-    stop = next((place for place in floating if place > 0), width)
-    first = 7 * base
+        return place + 7 <= width and bool((np.abs(length - 1) < 0.01).all())
+
+    count = width - flat[QVEL].shape[1] if QVEL in flat else 1
+    base = count > 0 and is_free(0)
+    # Without velocities, four numbers of norm 1 among joints may be chance.
+    others = range(7 * base, width - 6) if QVEL in flat and count > base else ()
+    stop, first = next(filter(is_free, others), width), 7 * base
     if base:
         yield Entry("base_pose", "wxyz", f"{names[QPOS]}[0:7]")
     if stop > first:

@@ -275,7 +275,7 @@ def check_joints(joints: Sequence[str], robot: str | None) -> tuple[str, ...]:
 def named(run: Run) -> Run:
     """Give joints that a run numbers, since its file does not name them, its robot's names."""
     names = _named(run.joint_names, known_limits(run.robot)[0])
-    if names == run.joint_names or len(names) != len(run.joint_names):
+    if names == run.joint_names:
         return run
     same = run.desired_joint_names == run.joint_names
     desired = names if same else run.desired_joint_names
@@ -301,6 +301,7 @@ FOLLOWS, SLOPES = 0.9, (0.5, 2.0)
 STILL, NEARBY = 1e-3, 0.1
 UNITS = ("radians", "degrees")  # of angles
 RATES = (1e-3, 1e9)  # rates that a log may be said to have, in [Hz]
+LISTS = {"joints", "topics", "columns"}  # options with any number of names
 
 # Conventions of a base: the order of its quaternion; the axes of its velocity, which for MuJoCo are
 # the world's for the linear part and the body's for the angular one. The first is the run's.
@@ -362,14 +363,13 @@ class ReadOptions:
 
     def for_columns(self, path: Path, names: Sequence[str]) -> "ReadOptions":
         """Options whose patterns are replaced by the columns that they fit."""
-        single = [entry for entry in self.entries if not entry.is_pattern]
-        patterns = [entry for entry in self.entries if entry.is_pattern]
-        taken = {entry.source for entry in single}
-        targets = {entry.target: entry for entry in single}
+        targets = {entry.target: entry for entry in self.entries if not entry.is_pattern}
+        patterns = (entry for entry in self.entries if entry.is_pattern)
         # `{joint}_cmd` is more specific than `{joint}`, which fits all that is left.
         for entry in sorted(patterns, key=lambda each: -len(each.source)):
             before, _, after = entry.source.partition(JOINT)
             form = re.compile(f"{re.escape(before)}(.+){re.escape(after)}")
+            taken = {each.source for each in targets.values()}
             free = {n: match[1] for n in names if n not in taken and (match := form.fullmatch(n))}
             if not free:
                 problem = f"the pattern {entry.target}={entry.source} fits no column that is free"
@@ -380,8 +380,7 @@ class ReadOptions:
                     both = f"{other.source!r} and {name!r} are both mapped to {new.target}"
                     raise LogError(path, f"{both}; map one of them")
                 targets[new.target] = new
-                taken.add(name)
-        return replace(self, entries=tuple(targets.values())) if patterns else self
+        return replace(self, entries=tuple(targets.values()))
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -395,8 +394,9 @@ class ReadOptions:
             if unknown := sorted(set(saved) - known):
                 names = ", ".join(sorted(known))
                 raise OptionError(f"unknown setting {unknown[0]!r}; there are {names}, map")
-            sources = {target: _setting(target, source) for target, source in entries.items()}
-            parsed = parse_mapping(f"{target}={source}" for target, source in sources.items())
+            parsed = parse_mapping(
+                [f"{name}={_setting(name, each)}" for name, each in entries.items()]
+            )
             settings = {name: _setting(name, value) for name, value in saved.items()}
             return cls(**settings, entries=parsed)
         except OSError as error:
@@ -415,7 +415,7 @@ class ReadOptions:
         lines = [f'format = "{FORMAT}"']
         for each in fields(self):
             value = getattr(self, each.name)
-            if each.name != "entries" and value is not False and value not in (None, "", ()):
+            if each.name != "entries" and value != each.default:
                 lines.append(f"{each.name} = {toml(value)}")
         if self.entries:
             lines += ["", "[map]"]
@@ -463,7 +463,7 @@ def read_options(
     """Options of reading a log, combined with a saved mapping."""
     before = ReadOptions.load(Path(saved)) if saved else ReadOptions()
     given = {name: value for name, value in options.items() if value is not None}
-    for name in {"joints", "topics", "columns"} & set(given):
+    for name in LISTS & {*given}:
         given[name] = tuple(given[name])
     if "robot" in given:
         given["robot"] = str(given["robot"])
@@ -475,13 +475,12 @@ def read_options(
 
 def _setting(name: str, value: Any) -> Any:
     """Setting of a saved mapping, its type checked."""
-    lists = name in ("joints", "topics", "columns")
-    numbers: tuple[type, ...] = (int, float) if name in ("rate", "offset") else (str,)
-    wanted = (list,) if lists else (bool,) if name == "force" else numbers
-    correct = isinstance(value, wanted) and isinstance(value, bool) == (name == "force")
-    if not correct or (lists and not all(isinstance(each, str) for each in value)):
+    numbers = dict.fromkeys(("rate", "offset"), (int, float))
+    kinds = {"force": (bool,), **numbers, **dict.fromkeys(LISTS, (list,))}
+    is_text = not isinstance(value, list) or all(isinstance(each, str) for each in value)
+    if type(value) not in kinds.get(name, (str,)) or not is_text:
         raise InspectorError(f"{name} = {toml_shown(value)} is of another type than expected")
-    return tuple(value) if lists else value
+    return tuple(value) if name in LISTS else value
 
 
 # Columns of signals
@@ -515,23 +514,29 @@ def tracks_of(
     log: Log, options: ReadOptions, robot: Robot | None
 ) -> tuple[tuple[Track, ...], tuple[str, ...], tuple[str, ...]]:
     """Tracks of a log, what is not read, and remarks; the mapping goes before names of columns."""
-    log, converted = _without_units(log, options)
+    factors = {} if options.units else {each.name: factor_of(each.name) for each in log.fields}
+    converted = {name: without_unit(name)[1] for name, factor in factors.items() if factor != 1.0}
+    in_si = (
+        replace(each, values=each.values * factors[each.name]) if each.name in converted else each
+        for each in log.fields
+    )
+    log = replace(log, fields=tuple(in_si))
     names = [each.name for each in log.fields]
     options = options.for_columns(log.path, [name for name in names if name != log.time])
     joints = robot.joint_names if robot else ()
     naming = Naming.of((each.name for each in log.fields if _is_column(each)), joints)
-    found, unknown = _of_robot([*_choices(log, options, naming, options.joints or joints)], robot)
-    kept = _unique(log, found)
+    known, unknown = _of_robot([*_choices(log, options, naming, options.joints or joints)], robot)
+    kept = _unique(log, known)
     if not any(choice.signal.startswith(("position", "velocity")) for choice in kept):
         raise no_motion(log.path, [*names, *log.not_read])
     targets, problem = _targets(log, kept)
     kept += targets
     remarks = [*_taken(log, kept), *problem]
-    read = {id(choice.field) for choice in kept}
-    not_read = tuple(each.name for each in log.fields if id(each) not in read)
-    for unit, of_unit in converted.items():
-        if taken := [name for name in of_unit if name not in not_read]:
-            remarks.append(f"{listed(taken)}: converted from {unit}, as their names say")
+    read = {choice.field for choice in kept}
+    not_read = tuple(each.name for each in log.fields if each not in read)
+    for unit in dict.fromkeys(unit for name, unit in converted.items() if name not in not_read):
+        taken = [n for n, other in converted.items() if other == unit and n not in not_read]
+        remarks.append(f"{listed(taken)}: converted from {unit}, as their names say")
     if naming.qd_is_desired:
         remarks.append("qd is the desired position, since dq is the velocity (else --map)")
     if naming.remark and any(c.by == "name" and c.field.name in naming.bare for c in kept):
@@ -539,19 +544,6 @@ def tracks_of(
     if unknown and robot:
         remarks.append(f"left out, not joints of {robot.name!r}: {listed(unknown)}")
     return (*_base_tracks(log, kept), *_joint_tracks(kept)), (*log.not_read, *not_read), (*remarks,)
-
-
-def _without_units(log: Log, options: ReadOptions) -> tuple[Log, dict[str, list[str]]]:
-    """Log with columns in the units of a run, and the names of the others by their unit."""
-    found: dict[str, list[str]] = {}
-    converted = []
-    for each in log.fields:
-        factor = factor_of(each.name)
-        if factor != 1.0 and not options.units:
-            found.setdefault(without_unit(each.name)[1], []).append(each.name)
-            each = replace(each, values=each.values * factor)
-        converted.append(each)
-    return replace(log, fields=tuple(converted)), found
 
 
 def _is_column(each: Field) -> bool:
@@ -580,25 +572,25 @@ def _choices(
     mapped = set()
     for entry in (*options.entries, *suggested):
         name, part = (entry.source, slice(None)) if entry.source in by_name else entry.part()
-        if name not in by_name:
+        if (field := by_name.get(name)) is None:
             continue
-        width = by_name[name].values.shape[1]
+        width = field.values.shape[1]
         start, stop, _ = part.indices(width)
         if name != entry.source and (start >= stop or (part.stop or 0) > width):
             raise LogError(log.path, f"{entry.source!r}: {name!r} has {width} columns")
-        mapped.add(id(by_name[name]))
+        mapped.add(field)
         if entry.joint and entry.signal in JOINT_SIGNALS and stop - start != 1:
             problem = f"{entry.source!r} has {stop - start} columns, {entry.target} is one"
             raise LogError(log.path, f"{problem}; name it as {name}[0]")
         if entry.signal != "time":
             by = "options" if entry in options.entries else "format"
-            whole = by_name[name], slice(start, stop), entry.signal, entry.joint, entry.source, by
-            yield from _columns(log, _Choice(*whole), options, joints)
+            choice = _Choice(field, slice(start, stop), *entry, by)
+            yield from _columns(log, choice, options, joints)
     known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
     named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
     numbered = {number_of(joint): joint for joint in reversed(named)}
     for each in log.fields:
-        if id(each) not in mapped and each.name != options.time:
+        if each not in mapped and each.name != options.time:
             signal, joint = _meaning(each, naming, numbered, joints)
             if signal and signal != COMMAND:
                 choice = _Choice(each, slice(0, each.values.shape[1]), signal, joint, each.name)

@@ -31,22 +31,20 @@ TIME_UNITS = {
 }
 # Quantity and size, in [rad], [rad/s], [m] or [m/s], of units, as names of columns have them.
 UNITS = {
-    **dict.fromkeys(("rad", "radians"), ("position", 1.0)),
-    **dict.fromkeys(("deg", "degree", "degrees", "°"), ("position", pi / 180)),
-    "mrad": ("position", 1e-3),
-    **dict.fromkeys(("rev", "turns"), ("position", 2 * pi)),
-    "m": ("position", 1.0),
-    "mm": ("position", 1e-3),
-    **dict.fromkeys(("rad/s", "rad/sec", "rad_s", "rads", "radps"), ("velocity", 1.0)),
-    **dict.fromkeys(
-        ("deg/s", "deg/sec", "deg_s", "degs", "degps", "dps", "°/s"), ("velocity", pi / 180)
-    ),
-    "mrad/s": ("velocity", 1e-3),
-    **dict.fromkeys(("rpm", "rev/min"), ("velocity", pi / 30)),
-    **dict.fromkeys(("rev/s", "turns/s"), ("velocity", 2 * pi)),
-    "m/s": ("velocity", 1.0),
-    "mm/s": ("velocity", 1e-3),
-    **dict.fromkeys(("nm", "n m", "n*m", "n.m", "n·m", "n", "a"), ("effort", 1.0)),
+    unit: (quantity, size)
+    for quantity, size, units in (
+        ("position", 1.0, "rad,radians,m"),
+        ("position", 1e-3, "mrad,mm"),
+        ("position", pi / 180, "deg,degree,degrees,°"),
+        ("position", 2 * pi, "rev,turns"),
+        ("velocity", 1.0, "rad/s,rad/sec,rad_s,rads,radps,m/s"),
+        ("velocity", 1e-3, "mrad/s,mm/s"),
+        ("velocity", pi / 180, "deg/s,deg/sec,deg_s,degs,degps,dps,°/s"),
+        ("velocity", pi / 30, "rpm,rev/min"),
+        ("velocity", 2 * pi, "rev/s,turns/s"),
+        ("effort", 1.0, "nm,n m,n*m,n.m,n·m,n,a"),
+    )
+    for unit in units.split(",")
 }
 # ``Time [sec]``, ``timestamp_ms``, ``Joint1 Velocity (deg/s)``, ``q1_deg``.
 UNIT = (
@@ -181,7 +179,7 @@ def _bare(
     found: dict[str, tuple[str, str, str]] = {}  # signal, joint, and what says so
     for column in columns:
         name, unit = without_unit(column)
-        if column in named or len(name) > LONGEST or _fits(NOT_MOTION, name):
+        if column in named or _fits(NOT_MOTION, name):
             continue
         if not (joints or re.search(BARE_HINT, name, re.IGNORECASE)):
             continue
@@ -235,7 +233,7 @@ def _key(joint: str | int) -> str | int:
 
 def without_unit(name: str) -> tuple[str, str]:
     """Name of a column, and the unit at its end in small letters, or an empty text."""
-    match = _fits(UNIT, name.strip()) if len(name) <= LONGEST else None
+    match = _fits(UNIT, name.strip())
     unit = (match["bracketed"] or match["suffix"]).strip().lower() if match else ""
     if match and (unit in UNITS or unit in TIME_UNITS):
         return match["name"].rstrip(), unit
@@ -298,14 +296,13 @@ def says_twice(column: str) -> bool:
 
 def time_column(names: Sequence[str]) -> str:
     """Name of the column or array that holds the stamps; empty if there is none."""
-    found: dict[str, str] = {}
+    found: dict[tuple[bool, int], str] = {}
     for name in names:
         if match := _fits(TIME, without_unit(name)[0]):
             word = re.sub("[_ ](?=stamp)", "", match["name"].lower())
-            plain = "/" not in name and "." not in name
-            found.setdefault(word if plain else f"{word} of a record", name)
-    wanted = (*TIMES, *(f"{word} of a record" for word in TIMES))
-    return next((found[word] for word in wanted if word in found), "")
+            of_record = "/" in name or "." in name
+            found.setdefault((of_record, TIMES.index(word)), name)
+    return found[min(found)] if found else ""
 
 
 def listed(names: Sequence[str]) -> str:
