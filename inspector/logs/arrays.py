@@ -238,18 +238,16 @@ def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
         roles[name] = "" if name in mapped else meaning(name)
         if each.ndim == 1 and name not in mapped and roles[name] in ("", COMMAND):
             roles[name] = (column_signal(name, naming) or ("",))[0]  # which names its joint
-    robots = {match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
-    chosen = "robot" if "robot" in robots else min(robots, default="")
-    first: dict[str, str] = {}  # of MuJoCo's arrays the one of the shortest name
-    for name in sorted(roles, key=len):
-        if roles[name] in (QPOS, QVEL, FORCE):
-            first.setdefault(roles[name], name)
+    states = {name: match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
+    robot = "robot" if "robot" in states.values() else min(states.values(), default="")
+    # Of MuJoCo's arrays the one of the shortest name is read, the first of equals.
+    first = {roles[name]: name for name in sorted(roles, key=len)[::-1]}
     return {
         name: what
         for name, what in roles.items()
         if what != COPY
-        and first.get(what, name) == name
-        and (name in mapped or not (match := STATES.fullmatch(name)) or match["robot"] == chosen)
+        and (what not in (QPOS, QVEL, FORCE) or first[what] == name)
+        and (name in mapped or states.get(name, robot) == robot)
     }
 
 
@@ -280,7 +278,7 @@ def _stamped(
 
 def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
     """Mapping of MuJoCo's state: a floating base, then joints, up to an object that floats."""
-    names = {what: name for name, what in reversed([*roles.items()]) if what in (QPOS, QVEL, FORCE)}
+    names = {what: name for name, what in roles.items() if what in (QPOS, QVEL, FORCE)}
     flat = {what: arrays[name].reshape(len(arrays[name]), -1) for what, name in names.items()}
     if QPOS not in flat:
         if QVEL in flat:
