@@ -120,7 +120,6 @@ def log_of(
     joints: Mapping[str, tuple[str, ...]] | None = None,
     stamps: Stamps | None = None,
     not_read: Sequence[str] = (),
-    remarks: tuple[str, ...] = (),
 ) -> Log:
     """Log of the arrays of one episode.
 
@@ -164,7 +163,6 @@ def log_of(
         path,
         tuple(fields),
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
-        remarks=remarks,
         suggested=tuple(_of_mujoco(arrays, roles)),
         time=time,
     )
@@ -256,7 +254,7 @@ def _stamped(
 ) -> tuple[Stamps, Arrays]:
     """Stamps, and arrays of as many samples; of one state more than actions, without the last."""
     source = options.time  # which may be a part of an array
-    array, part = (source, slice(None)) if source in arrays else Entry("", "", source).part()
+    array, part = Entry("time", "", source).part(arrays)
     if array in arrays and (stamps := arrays[array].reshape(len(arrays[array]), -1)[:, part]).size:
         name, arrays = source, {**arrays, source: stamps[:, 0]}
     else:

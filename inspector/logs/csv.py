@@ -121,14 +121,10 @@ def _read(path: Path, options: ReadOptions) -> Log:
             problem = f"column {header[place]!r} is empty in {share:.0%} of the rows; {how}"
             raise LogError(path, problem, rows[int(np.argmax(lacking))])
     read = {time, rest, *wanted}
-    return log_of(
-        path,
-        {header[place]: values[:, at] for at, place in enumerate(wanted)},
-        options,
-        stamps=stamps,
-        not_read=[n for place, n in enumerate(header) if n and place not in read],
-        remarks=layout.remarks,
-    )
+    not_read = [n for place, n in enumerate(header) if n and place not in read]
+    arrays = {header[place]: values[:, at] for at, place in enumerate(wanted)}
+    log = log_of(path, arrays, options, stamps=stamps, not_read=not_read)
+    return replace(log, remarks=layout.remarks)
 
 
 # Header and columns

@@ -6,7 +6,7 @@ the names of columns. One column is chosen for each signal of each joint.
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from decimal import Decimal
@@ -201,10 +201,10 @@ class Entry(NamedTuple):
         """Whether it maps all columns that its source fits."""
         return JOINT in self.joint
 
-    def part(self) -> tuple[str, slice]:
-        """Name of the array in the source, and its columns."""
+    def part(self, whole: Container[str] = ()) -> tuple[str, slice]:
+        """Name of the array in the source, and its columns; all of one that is ``whole``."""
         match = PART.fullmatch(self.source)
-        if match is None or not match["columns"]:
+        if match is None or not match["columns"] or self.source in whole:
             return self.source, slice(None)
         first, colon, last = match["columns"].partition(":")
         start = int(first or 0)
@@ -487,10 +487,10 @@ def _setting(name: str, value: Any) -> Any:
 
 
 class _Choice(NamedTuple):
-    """A column chosen for a signal of a joint, or columns for one of the base."""
+    """A column chosen for a signal of a joint, or the first of columns for one of the base."""
 
     field: Field
-    columns: slice
+    column: int
     signal: str
     joint: str  # or the convention of a base
     source: str  # the entry of a mapping, or the name of the field
@@ -502,12 +502,12 @@ class _Choice(NamedTuple):
         if self.field.joints and not self.field.stamps.rows:
             return f"{self.field.name} of {self.joint}"
         alone = self.field.values.shape[1] == 1
-        return self.field.name if alone else f"{self.field.name}[{self.columns.start}]"
+        return self.field.name if alone else f"{self.field.name}[{self.column}]"
 
     @property
     def values(self) -> Real:
         """Shape (samples, columns)."""
-        return self.field.values[:, self.columns]
+        return self.field.values[:, self.column : self.column + WIDTHS.get(self.signal, 1)]
 
 
 def tracks_of(
@@ -571,21 +571,21 @@ def _choices(
     ]
     mapped = set()
     for entry in (*options.entries, *suggested):
-        name, part = (entry.source, slice(None)) if entry.source in by_name else entry.part()
+        name, part = entry.part(by_name)
         if (field := by_name.get(name)) is None:
             continue
         width = field.values.shape[1]
-        start, stop, _ = part.indices(width)
-        if name != entry.source and (start >= stop or (part.stop or 0) > width):
+        columns = range(width)[part]
+        if name != entry.source and (not columns or (part.stop or 0) > width):
             raise LogError(log.path, f"{entry.source!r}: {name!r} has {width} columns")
         mapped.add(field)
-        if entry.joint and entry.signal in JOINT_SIGNALS and stop - start != 1:
-            problem = f"{entry.source!r} has {stop - start} columns, {entry.target} is one"
+        if entry.joint and entry.signal in JOINT_SIGNALS and len(columns) != 1:
+            problem = f"{entry.source!r} has {len(columns)} columns, {entry.target} is one"
             raise LogError(log.path, f"{problem}; name it as {name}[0]")
         if entry.signal != "time":
             by = "options" if entry in options.entries else "format"
-            choice = _Choice(field, slice(start, stop), *entry, by)
-            yield from _columns(log, choice, options, joints)
+            choice = _Choice(field, columns.start, *entry, by)
+            yield from _columns(log, choice, len(columns), options, joints)
     known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
     named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
     numbered = {number_of(joint): joint for joint in reversed(named)}
@@ -593,8 +593,8 @@ def _choices(
         if each not in mapped and each.name != options.time:
             signal, joint = _meaning(each, naming, numbered, joints)
             if signal and signal != COMMAND:
-                choice = _Choice(each, slice(0, each.values.shape[1]), signal, joint, each.name)
-                yield from _columns(log, choice, options, joints)
+                choice, width = _Choice(each, 0, signal, joint, each.name), each.values.shape[1]
+                yield from _columns(log, choice, width, options, joints)
 
 
 def _meaning(
@@ -616,20 +616,19 @@ def _meaning(
 
 
 def _columns(
-    log: Log, whole: _Choice, options: ReadOptions, joints: Sequence[str]
+    log: Log, first: _Choice, width: int, options: ReadOptions, joints: Sequence[str]
 ) -> Iterator[_Choice]:
     """Columns of a field: of one joint, of the base with its convention, or one for each joint."""
-    field, part, signal = whole.field, whole.columns, whole.signal
-    width = part.stop - part.start
+    field, signal = first.field, first.signal
     what = f"{field.name!r} has {width} columns"
     if signal in BASE_SIGNALS and width != WIDTHS[signal]:
         raise LogError(log.path, f"{what}, a {signal} has {WIDTHS[signal]}")
-    if signal in BASE_SIGNALS or whole.joint:
-        yield whole
+    if signal in BASE_SIGNALS or first.joint:
+        yield first
         return
-    names: Sequence[str] = ()
-    if len(field.joints) in (width, field.values.shape[1]):
-        names = field.joints if len(field.joints) == width else field.joints[part]
+    names: Sequence[str] = field.joints if len(field.joints) == width else ()
+    if not names and len(field.joints) == field.values.shape[1]:
+        names = field.joints[first.column : first.column + width]
     if not names or len(options.joints) == width:
         names = joints
         other = options.joints and len(names) != width and not signal.endswith("_desired")
@@ -641,8 +640,8 @@ def _columns(
                 f" (--map {signal}={field.name}[0:{len(names)}]) or name all (--joints)",
             )
     names = names or unnamed(width)
-    for column, name in zip(range(part.start, part.stop), names[:width], strict=True):
-        yield whole._replace(columns=slice(column, column + 1), joint=name)
+    for column, name in enumerate(names[:width], start=first.column):
+        yield first._replace(column=column, joint=name)
 
 
 def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice], list[str]]:
@@ -696,10 +695,9 @@ def _targets(log: Log, choices: Sequence[_Choice]) -> tuple[list[_Choice], list[
         same = each.stamps is position.stamps
         if count := followed(each.values, position.values) if same else 0:
             part = "" if count == each.values.shape[1] else f"[0:{count}]"
-            whole = _Choice(each, slice(0), "position_desired", "", f"{each.name}{part}", "format")
             return [
-                whole._replace(columns=slice(at, at + 1), joint=position.joints[at])
-                for at in range(count)
+                _Choice(each, column, "position_desired", joint, f"{each.name}{part}", "format")
+                for column, joint in enumerate(position.joints[:count])
             ], []
     place = next(each.source for each in choices if each.signal == "position")
     return [], [
@@ -744,21 +742,19 @@ def _taken(log: Log, choices: Sequence[_Choice]) -> Iterator[str]:
 
 def _joint_tracks(choices: Sequence[_Choice]) -> Iterator[Track]:
     """Tracks, each of the columns of one signal that share their stamps."""
-    together: dict[tuple[str, int], list[_Choice]] = {}
+    together: dict[tuple[str, Stamps], list[_Choice]] = {}
     for choice in choices:
         if choice.signal in JOINT_SIGNALS:
-            together.setdefault((choice.signal, id(choice.field.stamps)), []).append(choice)
-    for (signal, _), members in together.items():
+            together.setdefault((choice.signal, choice.field.stamps), []).append(choice)
+    for (signal, stamps), members in together.items():
         values = members[0].field.values
-        columns = [each.columns.start for each in members]
+        columns = [each.column for each in members]
         if any(each.field.values is not values for each in members):
             values = np.hstack([each.values for each in members])
         elif columns != list(range(values.shape[1])):  # else no copy: a long log is large
             values = values[:, columns]
-        joints, labels = (
-            tuple(each) for each in zip(*((m.joint, m.label) for m in members), strict=True)
-        )
-        yield Track(signal, joints, labels, members[0].field.stamps, values)
+        labels = tuple(each.label for each in members)
+        yield Track(signal, tuple(each.joint for each in members), labels, stamps, values)
 
 
 def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
