@@ -101,26 +101,26 @@ def _read(path: Path, options: ReadOptions) -> Log:
     with _opened(path) as stream:
         layout = _layout(path, stream, options)
         header = layout.header
-        time, rest = _times(header, options)
-        names = [name for place, name in enumerate(header) if name and place not in (time, rest)]
+        times = _times(header, options)
+        names = [name for place, name in enumerate(header) if name and place not in times]
         options = options.for_columns(path, names)
-        wanted = _wanted(path, layout, time, rest, options)
-        rows, values, cells = _table(path, stream, layout, wanted, (time, rest))
+        wanted = _wanted(path, layout, times, options)
+        rows, values, cells = _table(path, stream, layout, wanted, times)
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
-    if time is None:
-        stamps = replace(Stamps.counted(len(rows)), rows=rows)
-    else:  # absolute stamps exceed the precision of a float
-        exact = _decimals(path, header[time], cells, rows)
+    stamps = replace(Stamps.counted(len(rows)), rows=rows)
+    if times:  # absolute stamps exceed the precision of a float
+        time = header[times[0]]
+        exact = _decimals(path, time, cells, rows)
         since = np.array([float(stamp - exact[0]) for stamp in exact])
         unit = "" if _date(cells[0]) is None else "seconds"
-        stamps = stamps_since(path, header[time], exact[0], since, options.rate, rows, unit)
+        stamps = stamps_since(path, time, exact[0], since, options.rate, rows, unit)
     for place, lacking in zip(wanted, np.isnan(values).T, strict=True):
         if SPARSE <= (share := lacking.mean()) < 1:
             how = "columns with another clock must be in a separate log (--desired)"
             problem = f"column {header[place]!r} is empty in {share:.0%} of the rows; {how}"
             raise LogError(path, problem, rows[int(np.argmax(lacking))])
-    read = {time, rest, *wanted}
+    read = {*times, *wanted}
     not_read = [n for place, n in enumerate(header) if n and place not in read]
     arrays = {header[place]: values[:, at] for at, place in enumerate(wanted)}
     log = log_of(path, arrays, options, stamps=stamps, not_read=not_read)
@@ -209,21 +209,17 @@ def _clean(cells: Sequence[str]) -> tuple[str, ...]:
     return (*(() if marked_alone else (first,)), *(name.strip() for name in cells[1:]))
 
 
-def _times(header: Sequence[str], options: ReadOptions) -> tuple[int | None, int | None]:
-    """Places of the stamps, and of the nanoseconds beside whole seconds, as ROS has them."""
+def _times(header: Sequence[str], options: ReadOptions) -> tuple[int, ...]:
+    """Place of the stamps, and of the nanoseconds beside whole seconds, as ROS has them."""
     if not (name := options.stamps_in(header)):
-        return None, None
-    rest = None
-    if seconds := SECONDS.fullmatch(name):
-        places = {each.lower(): place for place, each in enumerate(header)}
-        words = (f"{seconds['record']}{word}".lower() for word in NANOSECONDS)
-        rest = next((places[word] for word in words if word in places), None)
-    return header.index(name), rest
+        return ()
+    seconds = SECONDS.fullmatch(name)
+    words = [f"{seconds['record']}{word}".lower() for word in NANOSECONDS if seconds]
+    rest = [place for place, each in enumerate(header) if each.lower() in words]
+    return header.index(name), *rest[-1:]
 
 
-def _wanted(
-    path: Path, layout: Layout, time: int | None, rest: int | None, options: ReadOptions
-) -> list[int]:
+def _wanted(path: Path, layout: Layout, times: Sequence[int], options: ReadOptions) -> list[int]:
     """Places of the columns that are read."""
     header, row = layout.header, layout.row or None
     if len(header) > limit("columns"):
@@ -236,9 +232,9 @@ def _wanted(
     wanted = [
         place
         for place, name in enumerate(header)
-        if place not in (time, rest) and (name in mapped or may_hold(name, naming))
+        if place not in times and (name in mapped or may_hold(name, naming))
     ]
-    for place in [*wanted, *([] if time is None else [time])]:
+    for place in (*wanted, *times[:1]):
         if header.count(header[place]) > 1:
             raise LogError(path, f"two columns are named {header[place]!r}", row)
     if not wanted:
@@ -250,11 +246,7 @@ def _wanted(
 
 
 def _table(
-    path: Path,
-    stream: TextIO,
-    layout: Layout,
-    wanted: Sequence[int],
-    time: tuple[int | None, int | None],
+    path: Path, stream: TextIO, layout: Layout, wanted: Sequence[int], times: Sequence[int]
 ) -> tuple["array[int]", Array, list[str]]:
     """Line numbers, numbers and stamps of all rows."""
     rows, table, stamps = array("q"), array("d"), list[str]()
@@ -262,7 +254,7 @@ def _table(
     names = [layout.header[place] for place in wanted]
     for _ in range(layout.skip):
         stream.readline(LONGEST_LINE)
-    first, at, rest = layout.skip, *time
+    first, (at, rest) = layout.skip, (*times, None, None)[:2]
     large = False  # once: a small file is read before pyarrow is imported
     while text := _piece(path, stream):
         lines = text.count("\n")
