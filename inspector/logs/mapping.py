@@ -525,8 +525,8 @@ def tracks_of(
     options = options.for_columns(log.path, [name for name in names if name != log.time])
     joints = robot.joint_names if robot else ()
     naming = Naming.of((each.name for each in log.fields if _is_column(each)), joints)
-    known, unknown = _of_robot([*_choices(log, options, naming, options.joints or joints)], robot)
-    kept = _unique(log, known)
+    found, left_out = _of_robot([*_choices(log, options, naming, options.joints or joints)], robot)
+    kept = _unique(log, found)
     if not any(choice.signal.startswith(("position", "velocity")) for choice in kept):
         raise no_motion(log.path, [*names, *log.not_read])
     targets, problem = _targets(log, kept)
@@ -541,9 +541,8 @@ def tracks_of(
         remarks.append("qd is the desired position, since dq is the velocity (else --map)")
     if naming.remark and any(c.by == "name" and c.field.name in naming.bare for c in kept):
         remarks.append(naming.remark)
-    if unknown and robot:
-        remarks.append(f"left out, not joints of {robot.name!r}: {listed(unknown)}")
-    return (*_base_tracks(log, kept), *_joint_tracks(kept)), (*log.not_read, *not_read), (*remarks,)
+    tracks = (*_base_tracks(log, kept), *_joint_tracks(kept))
+    return tracks, (*log.not_read, *not_read), (*remarks, *left_out)
 
 
 def _is_column(each: Field) -> bool:
@@ -586,33 +585,30 @@ def _choices(
             by = "options" if entry in options.entries else "format"
             choice = _Choice(field, columns.start, *entry, by)
             yield from _columns(log, choice, len(columns), options, joints)
-    known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
-    named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
+    unmapped = [each for each in log.fields if each not in mapped and each.name != options.time]
+    for choice in _by_name(log, unmapped, naming, joints):
+        yield from _columns(log, choice, choice.field.values.shape[1], options, joints)
+
+
+def _by_name(
+    log: Log, fields: Sequence[Field], naming: Naming, joints: Sequence[str]
+) -> Iterator[_Choice]:
+    """Fields whose signal the format or their names tell, and the joint of a column of one."""
+    columns = {
+        e: what for e in log.fields if _is_column(e) and (what := column_signal(e.name, naming))
+    }
+    named = [joint for _, joint in columns.values() if isinstance(joint, str)]
     numbered = {number_of(joint): joint for joint in reversed(named)}
-    for each in log.fields:
-        if each not in mapped and each.name != options.time:
-            signal, joint = _meaning(each, naming, numbered, joints)
-            if signal and signal != COMMAND:
-                choice, width = _Choice(each, 0, signal, joint, each.name), each.values.shape[1]
-                yield from _columns(log, choice, width, options, joints)
-
-
-def _meaning(
-    each: Field, naming: Naming, numbered: Mapping[int | None, str], joints: Sequence[str]
-) -> tuple[str, str]:
-    """Signal of a field by the format or by its name, and the joint if it is a column of one."""
-    known = column_signal(each.name, naming) if _is_column(each) else None
-    if known is None:
-        signal = each.signal or array_signal(each.name) or ""
-        unnamed = _is_column(each) and signal in JOINT_SIGNALS and not naming.alone
-        return "" if unnamed else signal, ""
-    signal, joint = known
-    number, first = number_of(joint), naming.first
-    if number is not None and joint not in joints and first <= number < first + len(joints):
-        return signal, joints[number - first]
-    if isinstance(joint, int):
-        return signal, numbered.get(joint, f"joint_{joint}")
-    return signal, joint
+    for each in fields:
+        signal, joint = columns.get(each) or (each.signal or array_signal(each.name), "")
+        number = number_of(joint)
+        if number is not None and joint not in joints and 0 <= number - naming.first < len(joints):
+            joint = joints[number - naming.first]
+        elif isinstance(joint, int):
+            joint = numbered.get(joint, f"joint_{joint}")
+        unnamed = not joint and _is_column(each) and signal in JOINT_SIGNALS and not naming.alone
+        if signal and signal != COMMAND and not unnamed:
+            yield _Choice(each, 0, signal, joint, each.name)
 
 
 def _columns(
@@ -645,7 +641,7 @@ def _columns(
 
 
 def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice], list[str]]:
-    """Columns of joints of the robot, and the names of the others."""
+    """Columns of joints of the robot, and a remark on the others."""
     if robot is None:
         return choices, []
     known, unknown = list[_Choice](), list[_Choice]()
@@ -657,7 +653,8 @@ def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice
         wrong = unknown
     if wrong:
         raise WrongRobotError(wrong[0].joint, robot.name, robot.joint_names)
-    return known, list(dict.fromkeys(each.joint for each in unknown))
+    names = listed([*dict.fromkeys(each.joint for each in unknown)])
+    return known, [f"left out, not joints of {robot.name!r}: {names}"] if unknown else []
 
 
 def _unique(log: Log, choices: Sequence[_Choice]) -> list[_Choice]:
