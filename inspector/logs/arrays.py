@@ -59,11 +59,6 @@ TABLE: tuple[tuple[str, str], ...] = (
     # The state before the first step, and the observations once more, a step later:
     # Isaac Lab, robomimic, D4RL, ManiSkill.
     (r"(initial_state|next_obs|next_observations|env_states)/.*", COPY),
-    # Isaac Lab's recorder, with further terms
-    (r"states/articulation/[^/]+/joint_position", "position"),
-    (r"states/articulation/[^/]+/joint_velocity", "velocity"),
-    (r"states/articulation/[^/]+/joint_position_target", "position_desired"),
-    (r"states/articulation/[^/]+/joint_velocity_target", "velocity_desired"),
     # robomimic and robosuite; LIBERO
     (r"(.*/)?robot\d+_joint_pos", "position"),
     (r"(.*/)?robot\d+_joint_vel", "velocity"),
@@ -82,7 +77,7 @@ TABLE: tuple[tuple[str, str], ...] = (
     (r"processed_actions", COMMAND),
     (r"(.*/)?(ctrl|actions?|(joint_)?targets?|commands?)", COMMAND),
 )
-# Isaac Lab's scene: several things may have joints.
+# What Isaac Lab records of a scene, in which several things may have joints.
 STATES = re.compile(r"states/articulation/(?P<robot>[^/]+)/(?P<what>.+)")
 # Flags of D4RL and Gymnasium: the last step of an episode has one.
 EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
