@@ -40,6 +40,7 @@ from inspector.logs.names import (
     JOINT_SIGNALS,
     SIGNALS,
     TIMES,
+    Meaning,
     Naming,
     array_signal,
     column_signal,
@@ -124,13 +125,10 @@ def log_of(
     options = options.for_columns(path, [*arrays])
     mapped = options.mapped
     naming = Naming.of((n for n, e in arrays.items() if e.ndim == 1), options.known_joints)
-    columns = {  # that say in their names what they hold
-        n
-        for n, each in arrays.items()
-        if each.ndim == 1 and (column_signal(n, naming) or array_signal(n))
-    }
+    named = {n: column_signal(n, naming) for n, each in arrays.items() if each.ndim == 1}
+    columns = {n for n, what in named.items() if what or array_signal(n)}  # that say what they hold
     arrays = _gathered(arrays, {entry.source for entry in options.entries})
-    roles = _roles(arrays, mapped, naming)
+    roles = _roles(arrays, mapped, named)
     motion = [name for name, what in roles.items() if what in MOTION or name in mapped]
     if not motion:
         raise _nothing(path, every, not_read)
@@ -224,13 +222,13 @@ def stated_rate(items: Mapping[str, Any]) -> tuple[str, float | None]:
     return "", None
 
 
-def _roles(arrays: Arrays, mapped: set[str], naming: Naming) -> dict[str, str]:
+def _roles(arrays: Arrays, mapped: set[str], named: Mapping[str, Meaning | None]) -> dict[str, str]:
     """Meaning of the arrays, without those for which another one stands."""
     roles = {}
-    for name, each in arrays.items():
+    for name in arrays:
         roles[name] = "" if name in mapped else meaning(name)
-        if each.ndim == 1 and name not in mapped and roles[name] in ("", COMMAND):
-            roles[name] = (column_signal(name, naming) or ("",))[0]  # which names its joint
+        if name in named and name not in mapped and roles[name] in ("", COMMAND):
+            roles[name] = (named[name] or ("",))[0]  # of a column, which names its joint
     states = {name: match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
     robot = "robot" if "robot" in states.values() else min(states.values(), default="")
     # Of MuJoCo's arrays the one of the shortest name is read, the first of equals.
