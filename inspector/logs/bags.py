@@ -22,7 +22,7 @@ from functools import cache
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, BinaryIO, TypeAlias, TypeVar
 
 import lz4.frame
 import numpy as np
@@ -38,6 +38,8 @@ from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, e
 from inspector.logs.names import listed
 from inspector.text import counted, natural
 from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
+
+T = TypeVar("T")
 
 SQL_ERRORS = (sqlite3.Error, UnicodeError)  # its words may quote bytes that are no text
 # Errors that rosbags lets through on messages that are damaged.
@@ -243,16 +245,48 @@ LATEST = 2**62  # stamps lie before, in [ns]; differences of later ones are no 6
 Message: TypeAlias = tuple[str, int, bytes]
 
 
-@dataclass
-class Bag:
-    """What a bag holds, once all of it is read."""
+# What opens a compressed stream, by the name that bags have for it.
+METHODS: dict[str, Callable[[BinaryIO], Any]] = {
+    "bz2": bz2.open,
+    "lz4": lz4.frame.open,
+    "zstd": lambda packed: ZstdDecompressor().stream_reader(packed, read_across_frames=True),
+}
+ZSTD = b"\x28\xb5\x2f\xfd"  # the first bytes of a file or a message that was compressed whole
 
-    topics: dict[str, Topic] = field(default_factory=dict)
-    times: list[int] = field(default_factory=list)  # of the first and the last message, in [ns]
-    lost: list[str] = field(default_factory=list)  # a sentence each
+
+class Bag:
+    """What a bag holds, once all of it is read; unpacks its parts, within a limit on all of it."""
+
+    def __init__(self, path: Path) -> None:
+        self.topics: dict[str, Topic] = {}
+        self.times: list[int] = []  # of the first and the last message, in [ns]
+        self.lost: list[str] = []  # a sentence each
+        files = [each for each in path.iterdir() if each.is_file()] if path.is_dir() else [path]
+        self._packed, self._unpacked = sum(each.stat().st_size for each in files), 0
 
     def __str__(self) -> str:
         return f"the bag has {listed([*map(str, self.topics.values())]) or 'no topics'}"
+
+    def pieces(self, method: str, stream: BinaryIO) -> Iterator[bytes]:
+        """What a stream unpacks to, by one of ``METHODS``; damage raises an error of its own."""
+        with METHODS[method](stream) as unpacked:
+            while piece := unpacked.read(PIECE):
+                self._unpacked += len(piece)
+                check_unpacked(self._unpacked, self._packed)
+                yield piece
+
+    def chunk(self, method: str, data: bytes) -> bytes:
+        """Unpack a chunk."""
+        return b"".join(self.pieces(method, BytesIO(data))) if method in METHODS else data
+
+    def message(self, data: bytes) -> bytes:
+        """Unpack a message; nothing is left of one that is damaged."""
+        try:
+            return self.chunk("zstd", data)
+        except ArchiveError:
+            raise
+        except Exception:  # each compressor has errors of its own
+            return b""
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
@@ -266,9 +300,9 @@ def _listing(path: Path) -> tuple[str, ...]:
     seconds = (bag.times[-1] - bag.times[0]) * 1e-9 if bag.times else 0.0
     for name, topic in sorted(bag.topics.items()):
         rate = f"{topic.count / seconds:.6g} Hz" if topic.count > 1 and seconds else ""
-        words = (name, topic.type, counted(topic.count, "message"), rate)
         read = "read" if topic.type in MOTION else "not read"
-        rows.append("  ".join(filter(None, (*words, read))))
+        words = (name, topic.type, counted(topic.count, "message"), rate, read)
+        rows.append("  ".join(filter(None, words)))
     return (*rows, *bag.lost)
 
 
@@ -301,10 +335,9 @@ def _read(path: Path, options: ReadOptions) -> Log:
 
 def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
     """Contents of a bag, read through; readers have the messages of topics with wanted names."""
-    bag, unpack = Bag(), Unpacker(path)
-    taken = odd = 0
+    bag, taken, odd = Bag(path), 0, 0
     with errors_of(path):
-        for each in _records(path, bag.lost, unpack):
+        for each in _records(path, bag):
             if isinstance(each, Topic):
                 bag.topics.setdefault(each.name, each)
                 continue
@@ -317,7 +350,7 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
                 bag.times[:] = min(known), max(known)
             if wanted(name) and topic.type in MOTION:
                 if data.startswith(ZSTD) and not topic.ros1:
-                    data = unpack.message(data)
+                    data = bag.message(data)
                 if data and abs(received) < LATEST:
                     topic.add(path, received, data)
                     taken += 1
@@ -332,73 +365,30 @@ def _scanned(path: Path, wanted: Callable[[str], bool]) -> Bag:
     return bag
 
 
-# Chunks, unpacked piece by piece
-
-
-# What opens a compressed stream, by the name that bags have for it.
-METHODS: dict[str, Callable[[BinaryIO], Any]] = {
-    "bz2": bz2.open,
-    "lz4": lz4.frame.open,
-    "zstd": lambda packed: ZstdDecompressor().stream_reader(packed, read_across_frames=True),
-}
-ZSTD = b"\x28\xb5\x2f\xfd"  # the first bytes of a file or a message that was compressed whole
-
-
-class Unpacker:
-    """Unpacks chunks, messages and files of a bag, within the limit on all of it."""
-
-    def __init__(self, path: Path) -> None:
-        files = [each for each in path.iterdir() if each.is_file()] if path.is_dir() else [path]
-        self._packed, self._unpacked = sum(each.stat().st_size for each in files), 0
-
-    def pieces(self, method: str, stream: BinaryIO) -> Iterator[bytes]:
-        """What a stream unpacks to, by one of ``METHODS``; damage raises an error of its own."""
-        with METHODS[method](stream) as unpacked:
-            while piece := unpacked.read(PIECE):
-                self._unpacked += len(piece)
-                check_unpacked(self._unpacked, self._packed)
-                yield piece
-
-    def chunk(self, method: str, data: bytes) -> bytes:
-        """Unpack a chunk."""
-        return b"".join(self.pieces(method, BytesIO(data))) if method in METHODS else data
-
-    def message(self, data: bytes) -> bytes:
-        """Unpack a message; nothing is left of one that is damaged."""
-        try:
-            return self.chunk("zstd", data)
-        except ArchiveError:
-            raise
-        except Exception:  # each compressor has errors of its own
-            return b""
-
-
 # Record by record
 
 
-def _records(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Message]:
-    """Topics and messages of a bag's files, in their order; appends what was lost."""
+def _records(path: Path, bag: Bag) -> Iterator[Topic | Message]:
+    """Topics and messages of a bag's files, in their order; tells the bag what was lost."""
     every = sorted(path.iterdir(), key=lambda file: natural(file.name)) if path.is_dir() else [path]
     with TemporaryDirectory() as folder:
-        files = [(file, _head(file)) for file in every]
-        for place, (file, head) in enumerate(files):
-            if head.startswith(ZSTD):
-                target = Path(folder) / file.stem
+        known = []
+        for file in every:
+            if (head := _head(file)).startswith(ZSTD):
+                packed, file = file, Path(folder) / file.stem
                 try:
-                    with file.open("rb") as packed, target.open("wb") as stream:
-                        stream.writelines(unpack.pieces("zstd", packed))
+                    with packed.open("rb") as source, file.open("wb") as target:
+                        target.writelines(bag.pieces("zstd", source))
                 except ArchiveError:
                     raise
                 except Exception as error:  # of the compressor
-                    lost.append(f"the bag is damaged or cut off ({one_line(error)})")
-                files[place] = target, _head(target)
-        known = [
-            (file, magic) for file, head in files for magic in RECORDS if head.startswith(magic)
-        ]
+                    bag.lost.append(f"the bag is damaged or cut off ({one_line(error)})")
+                head = _head(file)
+            known += [(file, magic) for magic in RECORDS if head.startswith(magic)]
         if len({magic for _, magic in known}) > 1:
             raise LogError(path, "holds files of several kinds of bags; name one of them")
         for file, magic in known:
-            yield from RECORDS[magic](file, lost, unpack)
+            yield from RECORDS[magic](file, bag)
 
 
 def _head(path: Path) -> bytes:
@@ -410,51 +400,54 @@ def _head(path: Path) -> bytes:
     return b""
 
 
-def _mcap(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Message]:
-    schemas: dict[int, Schema] = {}
+def _intact(stream: BinaryIO, records: Iterator[T], bag: Bag) -> Iterator[T]:
+    """Records that are read from a stream, to where it ends or is damaged."""
+    place = stream.tell()
+    try:
+        for record in records:
+            yield record
+            place = stream.tell()
+    except ArchiveError:
+        raise
+    except CRCValidationError as error:  # all messages have been read by then
+        bag.lost.append(f"some of what was read is damaged ({error})")
+    except Exception as error:  # of compressors, of struct and of text, too
+        where = f"from byte {place} on ({one_line(error)})"
+        bag.lost.append(f"the bag is damaged or cut off {where}")
+
+
+def _mcap(path: Path, bag: Bag) -> Iterator[Topic | Message]:
+    schemas: dict[int, str] = {}
     channels: dict[int, str] = {}
-    size, place = path.stat().st_size, 0  # no record is longer than its file
+    size = path.stat().st_size  # no record is longer than its file
     with path.open("rb") as stream:
         reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=size)
-        try:
-            for record in reader.records:
-                for each in _unchunked(record, lost, unpack):
-                    if isinstance(each, Schema):
-                        schemas[each.id] = each
-                    elif isinstance(each, Channel):
-                        channels[each.id] = each.topic
-                        schema = schemas.get(each.schema_id)
-                        yield Topic(each.topic, schema.name if schema else "")
-                    elif isinstance(each, McapMessage) and each.channel_id in channels:
-                        yield channels[each.channel_id], each.log_time, each.data
-                place = stream.tell()
-        except ArchiveError:
-            raise
-        except CRCValidationError as error:  # all messages have been read by then
-            lost.append(f"some of what was read is damaged ({error})")
-        except Exception as error:  # the library lets errors of struct and of text through
-            lost.append(_from(place, error))
+        for record in _intact(stream, reader.records, bag):
+            for each in _unchunked(record, bag):
+                if isinstance(each, Schema):
+                    schemas[each.id] = each.name
+                elif isinstance(each, Channel):
+                    channels[each.id] = each.topic
+                    yield Topic(each.topic, schemas.get(each.schema_id, ""))
+                elif isinstance(each, McapMessage) and each.channel_id in channels:
+                    yield channels[each.channel_id], each.log_time, each.data
 
 
-def _from(place: int, error: Exception) -> str:
-    return f"the bag is damaged or cut off from byte {place} on ({one_line(error)})"
-
-
-def _unchunked(record: McapRecord, lost: list[str], unpack: Unpacker) -> list[McapRecord]:
+def _unchunked(record: McapRecord, bag: Bag) -> list[McapRecord]:
     """The records of a chunk, or the record itself."""
     if not isinstance(record, Chunk):
         return [record]
     try:
-        raw = unpack.chunk(record.compression, record.data)
+        raw = bag.chunk(record.compression, record.data)
         return breakup_chunk(replace(record, compression="", data=raw), validate_crc=True)
     except ArchiveError:
         raise
     except Exception:  # each compressor has errors of its own
-        lost.append(f"a chunk of {len(record.data)} bytes is damaged and left out")
+        bag.lost.append(f"a chunk of {len(record.data)} bytes is damaged and left out")
         return []
 
 
-def _sqlite(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Message]:
+def _sqlite(path: Path, bag: Bag) -> Iterator[Topic | Message]:
     """Topics, then messages in the order of their rows, to where a page is missing.
 
     The last page may be cut off, and SQLite reads zeros for the rest of it: messages are held
@@ -466,7 +459,7 @@ def _sqlite(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | M
             try:
                 database.execute("SELECT name FROM sqlite_master").fetchone()
             except SQL_ERRORS as error:
-                lost.append(f"the bag is damaged or cut off ({one_line(error)})")
+                bag.lost.append(f"the bag is damaged or cut off ({one_line(error)})")
             (page,) = database.execute("PRAGMA page_size").fetchone()
             database.execute("PRAGMA writable_schema = ON")  # else SQLite refuses such a file
             names = {}
@@ -485,16 +478,19 @@ def _sqlite(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | M
                     size -= len(held[0][2])
                     yield held.popleft()
         except SQL_ERRORS as error:
-            lost.append(f"the bag ends here, {len(held)} messages may be cut ({one_line(error)})")
+            cut = f"{len(held)} messages may be cut ({one_line(error)})"
+            bag.lost.append(f"the bag ends here, {cut}")
             held.clear()
     yield from held
 
 
-def _ros1(path: Path, lost: list[str], unpack: Unpacker) -> Iterator[Topic | Message]:
+def _ros1(path: Path, bag: Bag) -> Iterator[Topic | Message]:
     """Topics and messages, including those in chunks."""
     names: dict[bytes, str] = {}
     with path.open("rb") as stream:
-        for header, data in _ros1_records(stream, lost, unpack):
+        stream.readline()
+        records = _ros1_records(stream, path.stat().st_size, bag)
+        for header, data in _intact(stream, records, bag):
             number, time = header.get("conn", b""), header.get("time", b"")
             if header.get("op") == CONNECTION and "topic" in header:
                 name = header["topic"].decode(errors="replace")
@@ -513,28 +509,18 @@ MESSAGE, BEGIN, CHUNK, CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
 
 
 def _ros1_records(
-    stream: BinaryIO, lost: list[str], unpack: Unpacker
+    stream: BinaryIO, size: int, bag: Bag | None
 ) -> Iterator[tuple[dict[str, bytes], bytes]]:
-    size = stream.seek(0, 2)
-    stream.seek(0)
-    stream.readline()
-    while (place := stream.tell()) < size:
-        try:
-            header, data = _fields(_sized(stream)), _sized(stream)
-            records = [(header, data)]
-            if header["op"] == BEGIN and header["index_pos"] == bytes(8):
-                lost.append("the bag is damaged or cut off: it has no index")
-            if header["op"] == CHUNK:
-                chunk = unpack.chunk(header["compression"].decode(), data)
-                inner, records = BytesIO(chunk), []
-                while inner.tell() < len(chunk):
-                    records.append((_fields(_sized(inner)), _sized(inner)))
-        except ArchiveError:
-            raise
-        except Exception as error:  # each compressor has errors of its own
-            lost.append(_from(place, error))
-            return
-        yield from records
+    """Header and data of each record of a bag, or of a chunk of it, which has no bag."""
+    while stream.tell() < size:
+        header, data = _fields(_sized(stream)), _sized(stream)
+        if bag and header["op"] == BEGIN and header["index_pos"] == bytes(8):
+            bag.lost.append("the bag is damaged or cut off: it has no index")
+        if bag and header["op"] == CHUNK:
+            chunk = bag.chunk(header["compression"].decode(), data)
+            yield from [*_ros1_records(BytesIO(chunk), len(chunk), None)]  # all, or it is damaged
+        else:
+            yield header, data
 
 
 def _sized(stream: BinaryIO) -> bytes:
@@ -555,10 +541,8 @@ def _fields(header: bytes) -> dict[str, bytes]:
     return fields
 
 
-# Reads topics and messages to where the file ends or is damaged; appends what was lost.
-Records: TypeAlias = Callable[[Path, list[str], Unpacker], Iterator[Topic | Message]]
-# What reads the records of a file, by its first bytes.
-RECORDS: dict[bytes, Records] = {
+# What reads the topics and messages of a file to where it ends or is damaged, by its first bytes.
+RECORDS: dict[bytes, Callable[[Path, Bag], Iterator[Topic | Message]]] = {
     b"\x89MCAP0\r\n": _mcap,
     b"SQLite format 3\x00": _sqlite,
     b"#ROSBAG V2.0": _ros1,
