@@ -9,7 +9,6 @@ A zero-order hold is a slow signal that was sampled faster by holding its values
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
-from functools import partial
 from itertools import pairwise
 from math import log
 from pathlib import Path
@@ -137,18 +136,14 @@ def in_seconds(path: Path, tracks: Sequence[Track], options: ReadOptions) -> lis
             found = rate_of(known, velocity.of(shared))
         elif shared and _may_be_milliseconds(stamps, options):
             found = rate_of(position.of(shared), velocity.of(shared))
-    timed = {
-        id(stamps): _timed(path, stamps, options, found)
-        for stamps in clocks_of(tracks)
-        if stamps.unit == SAMPLES
-    }
-    if found is None or timed:
-        return on_clocks(tracks, timed)
-    for stamps in clocks_of(tracks):
-        if abs(found * float(np.median(np.diff(stamps.time))) / 1000 - 1) <= DISAGREE:
-            own = replace(stamps, start=stamps.start / 1000, time=stamps.time / 1000)
-            why = f"at {found:g} Hz positions and velocities fit, if stamps are in milliseconds"
-            timed[id(stamps)] = replace(own, unit="milliseconds", remark=why)
+    clocks = clocks_of(tracks)
+    timed = {each: _timed(path, each, options, found) for each in clocks if each.unit == SAMPLES}
+    if found is not None and not timed:
+        why = f"at {found:g} Hz positions and velocities fit, if stamps are in milliseconds"
+        for each in clocks:
+            if abs(found * float(np.median(np.diff(each.time))) / 1000 - 1) <= DISAGREE:
+                own = replace(each, start=each.start / 1000, time=each.time / 1000)
+                timed[each] = replace(own, unit="milliseconds", remark=why)
     return on_clocks(tracks, timed)
 
 
@@ -212,44 +207,44 @@ def slope(steps: Real, speed: Real) -> tuple[float, float]:
 
 def clocks_of(tracks: Sequence[Track]) -> list[Stamps]:
     """The stamps of tracks, each once: some share them."""
-    return [*{id(track.stamps): track.stamps for track in tracks}.values()]
+    return [*dict.fromkeys(track.stamps for track in tracks)]
 
 
-def on_clocks(tracks: Sequence[Track], changed: Mapping[int, Stamps]) -> list[Track]:
-    """Tracks with other stamps in place of some, which their identities tell."""
-    return [replace(track, stamps=changed.get(id(track.stamps), track.stamps)) for track in tracks]
+def on_clocks(tracks: Sequence[Track], changed: Mapping[Stamps, Stamps]) -> list[Track]:
+    """Tracks with other stamps in place of some."""
+    return [replace(track, stamps=changed.get(track.stamps, track.stamps)) for track in tracks]
 
 
-def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], str]:
+def ordered(path: Path, tracks: Sequence[Track]) -> tuple[list[Track], str]:
     """Tracks, which share stamps as before, without samples out of order, and a remark."""
-    kept: dict[int, tuple[Stamps, Mask]] = {}
-    places: list[float] = []
-    for track in {id(track.stamps): track for track in tracks}.values():
-        stamps, time = track.stamps, track.stamps.time
+    found, places = list(tracks), list[float]()
+    for stamps in clocks_of(tracks):
+        time = stamps.time
         latest = np.maximum.accumulate(time)
         keep = np.concatenate(([True], time[1:] > latest[:-1]))
         wrong = np.flatnonzero(~keep)
-        if len(wrong) and len(wrong) >= MOST_UNORDERED * len(time):
+        if not len(wrong):
+            continue
+        if len(wrong) >= MOST_UNORDERED * len(time):
             first = int(wrong[0])
             after, before = (
                 stamps.start + Decimal(str(t)) for t in (time[first], latest[first - 1])
             )
             how = "stands still" if after == before else "runs backwards"
+            track = next(track for track in tracks if track.stamps is stamps)
             raise track.fault(path, f"time {how}: {after} comes after {before}", first)
-        if len(wrong):
-            places += latest[wrong - 1].tolist()
-            rows = None if stamps.rows is None else np.asarray(stamps.rows)[keep].tolist()
-            stamps = replace(stamps, time=time[keep], rows=rows)
-        kept[id(track.stamps)] = stamps, keep
+        places += latest[wrong - 1].tolist()
+        rows = None if stamps.rows is None else np.asarray(stamps.rows)[keep].tolist()
+        own = replace(stamps, time=time[keep], rows=rows)
+        for place, track in enumerate(found):
+            if track.stamps is stamps:
+                missing = None if track.missing is None else track.missing[keep]
+                values = track.values[keep]
+                found[place] = replace(track, stamps=own, values=values, missing=missing)
     if not places:
-        return tuple(tracks), ""
-    found = []
-    for track in tracks:
-        stamps, keep = kept[id(track.stamps)]
-        missing = None if track.missing is None else track.missing[keep]
-        found.append(replace(track, stamps=stamps, values=track.values[keep], missing=missing))
+        return found, ""
     what = f"{counted(len(places), 'sample')} whose stamps are not later than all before left out"
-    return tuple(found), f"{what}, the first {places[0]:.6g} s into the log"
+    return found, f"{what}, the first {places[0]:.6g} s into the log"
 
 
 # Signals on one uniform time base
@@ -296,24 +291,22 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
         if valid.all() and places[-1] - places[0] == len(places) - 1:
             return track.values[places[0] : places[-1] + 1]  # no copy of a long log
         return np.where(valid[:, None], track.values[places], 0.0)
-    stretches = track.stamps.clock.stretches
-    between = partial(resample, track.stamps.time, between=stretches, slack=slack)
-    if track.signal == "base_pose":
-        pose = np.asarray(track.values, dtype=np.float64)
-        pose = np.hstack((pose[:, :3], continuous_quaternions(pose[:, 3:])))
-        found, _ = between(pose, instants)
+    known, stretches = track.stamps.time, track.stamps.clock.stretches
+    every, is_pose = track.values, track.signal == "base_pose"
+    if is_pose:
+        turns = np.asarray(every[:, 3:], dtype=np.float64)
+        every = np.hstack((every[:, :3], continuous_quaternions(turns)))
+    found = np.empty((len(instants), every.shape[1]))
+    block = max(1, BLOCK // len(known))
+    for first in range(0, found.shape[1], block):
+        part = slice(first, first + block)
+        values, angles = np.asarray(every[:, part], dtype=np.float64), track.angles[part]
+        if any(angles):
+            values = np.where(angles, np.unwrap(values, axis=0), values)
+        found[:, part], _ = resample(known, values, instants, between=stretches, slack=slack)
+    if is_pose:
         length = np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
         found[:, 3:] /= np.where(length > 0, length, 1.0)
-    else:
-        found = np.empty((len(instants), track.values.shape[1]))
-        block = max(1, BLOCK // len(track.stamps.time))
-        for first in range(0, found.shape[1], block):
-            part = slice(first, first + block)
-            values = np.asarray(track.values[:, part], dtype=np.float64)
-            angles = track.angles[part]
-            if any(angles):
-                values = np.where(angles, np.unwrap(values, axis=0), values)
-            found[:, part], _ = between(values, instants)
     found[~valid] = 0.0
     return found
 
@@ -340,47 +333,40 @@ HOW = "specify --offset SECONDS, which is added to the desired stamps"
 
 
 def synchronise(
-    path: Path,
-    tracks: Sequence[Track],
-    main: Track,
-    *,
-    rate: float | None = None,
-    offset: float | None = None,
-) -> tuple[list[Track], str, dict[str, float]]:
+    path: Path, tracks: Sequence[Track], main: Track, options: ReadOptions
+) -> tuple[list[Track], str, float | None]:
     """Tracks on the measured motion's clock, which starts at 0; a remark; the offset, if any."""
     start = main.stamps.start
     clocks = {
-        id(stamps): replace(
+        stamps: replace(
             stamps,
             start=start,
             time=stamps.time + float(stamps.start - start),
-            rate=rate if stamps is main.stamps else None,
+            rate=options.rate if stamps is main.stamps else None,
         )
         for stamps in clocks_of(tracks)
     }
-    clocked = on_clocks(tracks, clocks)
-    measured = {id(track.stamps) for track in tracks if not track.is_desired}
-    others = [stamps for stamps in clocks_of(tracks) if id(stamps) not in measured]
-    own = [clocks[id(stamps)] for stamps in others]
-    main_time = clocks[id(main.stamps)].time
-    if all(np.array_equal(stamps.time, main_time) for stamps in own):
-        return clocked, "", {}
-    if offset is not None:
-        seconds, said = offset, f"offset {offset:+g} s, as given"
+    measured = {track.stamps for track in tracks if not track.is_desired}
+    own = {stamps: each for stamps, each in clocks.items() if stamps not in measured}
+    time = clocks[main.stamps].time
+    if all(np.array_equal(each.time, time) for each in own.values()):
+        return on_clocks(tracks, clocks), "", None
+    if (offset := options.offset) is not None:
+        said = f"offset {offset:+g} s, as given"
     else:
-        overlap = own[0].time[0] <= main_time[-1] and main_time[0] <= own[0].time[-1]
-        apart = "" if overlap else f"{no_overlap(others[0], main.stamps)}, and "
-        seconds, said = _estimated(path, clocked, own, apart)
-        if seconds == 0.0:
-            return clocked, said, {}
-    moved = {id(each): replace(each, time=each.time + seconds) for each in own}
-    return on_clocks(clocked, moved), said, {"seconds": seconds}
+        logged, first = next(iter(own.items()))
+        overlap = first.time[0] <= time[-1] and time[0] <= first.time[-1]
+        apart = "" if overlap else f"{no_overlap(logged, main.stamps)}, and "
+        offset, said = _estimated(path, on_clocks(tracks, clocks), [*own.values()], apart)
+    if offset is not None:
+        clocks |= {stamps: replace(each, time=each.time + offset) for stamps, each in own.items()}
+    return on_clocks(tracks, clocks), said, offset
 
 
 def _estimated(
     path: Path, tracks: Sequence[Track], own: Sequence[Stamps], apart: str
-) -> tuple[float, str]:
-    """Offset of the desired clock, 0 if it stays, and a remark; clocks ``apart`` need one."""
+) -> tuple[float | None, str]:
+    """Offset of the desired clock, None if it stays, and a remark; clocks ``apart`` need one."""
     measured = {track.signal: track for track in reversed(tracks) if not track.is_desired}
     desired = {track.quantity: track for track in reversed(tracks) if track.stamps in own}
     pairs = (
@@ -392,7 +378,7 @@ def _estimated(
     found = next(filter(None, (_estimate(*pair) for pair in pairs)), None)
     unknown = "no joint moves in both"
     if not found and not apart:
-        return 0.0, ""
+        return None, ""
     if found:
         seconds, correlation, next_best, change = found
         said = f"offset {seconds:+.4f} s (correlation {correlation:.2f}, next best {next_best:.2f})"
@@ -400,13 +386,13 @@ def _estimated(
             drifts = f"; the clocks drift: it is {change:+.4f} s larger in the second half"
             drifts = drifts if abs(change) >= DRIFT else ""
             if abs(seconds) <= LAG:
-                return 0.0, f"{said}: a controller's lag, the stamps are not changed{drifts}"
+                return None, f"{said}: a controller's lag, the stamps are not changed{drifts}"
             return seconds, f"{said}: its stamps are shifted by that{drifts}"
         unknown = f"the offset cannot be estimated ({said})"
     if apart:
         raise LogError(path, f"{apart}{unknown}; {HOW}")
     assumed = "its clock is assumed to be the measured one's, since"
-    return 0.0, f"{assumed} {unknown}; {HOW}"
+    return None, f"{assumed} {unknown}; {HOW}"
 
 
 def no_overlap(desired: Stamps, measured: Stamps) -> str:
@@ -476,8 +462,9 @@ def _correlation(one: Array, other: Array) -> Array:
     lags = np.arange(1 - width, count)
     crossed = fft.irfft(product.sum(axis=0), length)[lags]
     start, stop = np.maximum(lags, 0), np.minimum(lags + width, count)
-    sums = (np.cumsum((each**2).sum(axis=0)) for each in (one, other))
-    of_one, of_other = (np.concatenate(([0.0], each)) for each in sums)
+    of_one, of_other = (
+        np.append(0.0, np.cumsum(np.square(each).sum(axis=0))) for each in (one, other)
+    )
     energy = (of_one[stop] - of_one[start]) * (of_other[stop - lags] - of_other[start - lags])
     tiny = np.finfo(np.float64).tiny
     found = crossed / np.sqrt(np.maximum(energy, max(1e-9 * energy.max(), tiny)))

@@ -56,8 +56,8 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
         remarks.append(f"logged once only, left out: {listed(once)}")
     tracks = [t for each in tracks if (t := _finite(path, each, remarks)) is not None]
     tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks)
-    increasing, order = clocks.ordered(path, tracks)
-    tracks = _without_frozen(increasing, remarks)
+    tracks, order = clocks.ordered(path, tracks)
+    tracks = _without_frozen(tracks, remarks)
     return replace(
         log,
         fields=(),
@@ -65,7 +65,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
         names=(*(each.name for each in log.fields), *log.not_read),
         not_read=not_read,
         remarks=(*([order] if order else []), *remarks),
-        meta={**log.meta, **({"units": options.units} if options.units else {})},
+        meta=dict(log.meta) | ({"units": options.units} if options.units else {}),
         in_degrees=in_degrees,
     )
 
@@ -151,29 +151,30 @@ FROZEN_HOLDS = 5.0  # the same as a multiple of the time for which it holds valu
 FROZEN_WAY = 0.05  # least way that joints should have gone in that time, in [rad] or [m]
 
 
-def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
+def _without_frozen(tracks: list[Track], remarks: list[str]) -> list[Track]:
     """Tracks whose samples are missing where all rows are one, and joints should move."""
-    found = list(tracks)
     for stamps in clocks.clocks_of(tracks):
         ours = [track for track in tracks if track.stamps is stamps and track.joints]
         measured = [track for track in ours if not track.is_desired]
-        if "position" not in {track.signal for track in measured}:
+        if not any(track.signal == "position" for track in measured):
             continue
         rows = [(track.values[1:] == track.values[:-1]).all(axis=1) for track in measured]
-        same = np.logical_and.reduce(rows)
         frozen = np.zeros(len(stamps.time), dtype=bool)
-        for first, last, speed in _repeats(stamps.time, same, ours):
+        for first, last, speed in _repeats(stamps.time, np.logical_and.reduce(rows), ours):
             frozen[first + 1 : last + 1] = True
             at = stamps.time[first] - stamps.time[0]
             remarks.append(
                 f"{last - first} samples from {at:.6g} s on repeat one, while joints should move"
                 f" at {speed:.2g} rad/s: the log froze, marked as not valid"
             )
-        for place, track in enumerate(found):
-            if frozen.any() and track.stamps is stamps:
-                missing = frozen if track.missing is None else track.missing | frozen
-                found[place] = replace(track, missing=missing)
-    return found
+        if frozen.any():
+            tracks = [
+                replace(t, missing=frozen if t.missing is None else t.missing | frozen)
+                if t.stamps is stamps
+                else t
+                for t in tracks
+            ]
+    return tracks
 
 
 def _repeats(time: Array, same: Mask, tracks: Sequence[Track]) -> Iterator[tuple[int, int, float]]:
@@ -394,9 +395,7 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
         logs[:] = _with_desired(*logs)
     main = _main(logs[0], options)
     every = [track for log in logs for track in log.tracks]
-    tracks, said, offset = clocks.synchronise(
-        logs[-1].path, every, main, rate=options.rate, offset=options.offset
-    )
+    tracks, said, offset = clocks.synchronise(logs[-1].path, every, main, options)
     del every
     remarks = [*_remarks(logs, tracks)]
     remarks += [f"{logs[-1].path.name}: {said}"] if said else []
@@ -413,18 +412,14 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
         "start": f"{start.normalize():f}",
         "jitter": {"rms": own.clock.jitter_rms, "max": own.clock.jitter_max},
     }
-    meta |= {"offset": offset} if offset else {}
+    meta |= {} if offset is None else {"offset": {"seconds": offset}}
     covered, slack = float(own.time[-1]), UNIFORM / own.clock.rate
     logs.clear()
     del tracks, main  # each signal is freed when it has been resampled
     parts: dict[str, Track] = {}
     while kept:
         track = kept.pop(0)
-        track = replace(track, values=clocks.resampled(time, valid, track, slack))
-        if before := parts.get(track.signal):
-            values = np.hstack((before.values, track.values))
-            track = replace(before, joints=before.joints + track.joints, values=values)
-        parts[track.signal] = track
+        _add(parts, replace(track, values=clocks.resampled(time, valid, track, slack)))
     signals, differentiated, told = _signals_of(parts, time - time[0], valid)
     meta |= {"differentiated": differentiated} if differentiated else {}
     run = Run(time=time - time[0], valid=valid, robot=options.robot or None, meta=meta, **signals)
@@ -434,6 +429,14 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     if start:
         remarks.append(f"time starts at 0; the first stamp, {meta['start']} s, is in meta")
     return Imported(run, (*remarks, *told), name)
+
+
+def _add(parts: dict[str, Track], track: Track) -> None:
+    """Add a track to the parts of a run, to the joints that its signal has there."""
+    if before := parts.get(track.signal):
+        values = np.hstack((before.values, track.values))
+        track = replace(before, joints=before.joints + track.joints, values=values)
+    parts[track.signal] = track
 
 
 def _check_mapping(logs: Sequence[Log], options: ReadOptions) -> None:
@@ -487,20 +490,19 @@ def _remarks(logs: Sequence[Log], tracks: Sequence[Track]) -> Iterator[str]:
     places = iter(tracks)
     for log in logs:
         name = log.path.name
-        first: dict[int, Track] = {}
-        for track in (next(places) for _ in log.tracks):
-            first.setdefault(id(track.stamps), track)
-        for track in first.values():
-            whose = f"{name}, {track.signal}" if len(first) > 1 else name
-            stamps, clock = track.stamps, track.stamps.clock
+        own = [next(places) for _ in log.tracks]
+        every = clocks.clocks_of(own)
+        for stamps in every:
+            signal = next(track.signal for track in own if track.stamps is stamps)
+            whose = f"{name}, {signal}" if len(every) > 1 else name
+            clock = stamps.clock
             if stamps.unit != "seconds":
                 yield f"{whose}: stamps are in {stamps.unit}"
             if stamps.remark:
                 yield f"{whose}: {stamps.remark}"
             if not clock.uniform:
-                from_ = (
-                    f"stamps of {clock.nominal:g} Hz, jitter {clock.jitter_rms * 1e3:.3g} ms rms"
-                )
+                jitter = f"jitter {clock.jitter_rms * 1e3:.3g} ms rms"
+                from_ = f"stamps of {clock.nominal:g} Hz, {jitter}"
                 lost = _lost(clock.nominal, clock.rate)
                 yield f"{whose}: resampled to {clock.rate:g} Hz ({from_}){lost}"
             if clock.gaps:
@@ -533,9 +535,7 @@ def _signals_of(
         logged = parts[velocity].joints if velocity in parts else ()
         if missing := tuple(joint for joint in joints if joint not in logged):
             slopes = joint_velocity(time, parts[position].of(missing), valid)
-            if logged:
-                slopes = np.hstack((parts[velocity].values, slopes))
-            parts[velocity] = replace(parts[position], joints=logged + missing, values=slopes)
+            _add(parts, replace(parts[position], signal=velocity, joints=missing, values=slopes))
             of_joints = f" of {', '.join(missing)}" if logged else ""
             differentiated[velocity] = METHOD + of_joints
             remarks.append(f"{velocity}{of_joints}: differentiated from positions ({METHOD})")
@@ -587,14 +587,11 @@ class LimitWatch:
         known, _ = known_limits(robot)
         self._joints, self._robot = tuple(joints), robot
         self._limits = [known.get(joint, Limits()) for joint in joints]
-        lower, upper, velocity = (
-            np.array([(each.lower, each.upper, each.velocity) for each in self._limits])
-            .reshape(-1, 3)
-            .T
-        )
+        lower = np.array([each.lower for each in self._limits])
+        upper = np.array([each.upper for each in self._limits])
         span = upper - lower
         slack = np.where(np.isfinite(span), FAR_POSITION * span, 0.0)
-        fast = FAR_VELOCITY * velocity
+        fast = FAR_VELOCITY * np.array([each.velocity for each in self._limits])
         self._bounds = {"position": (lower - slack, upper + slack), "velocity": (-fast, fast)}
         self._counts = {name: np.zeros(len(joints), dtype=int) for name in self._bounds}
         self._farthest = {name: np.zeros(len(joints)) for name in self._bounds}
