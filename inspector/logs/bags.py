@@ -29,7 +29,6 @@ import numpy as np
 from mcap.records import Channel, Chunk, McapRecord, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zstandard import ZstdDecompressor
 
@@ -42,11 +41,6 @@ from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 T = TypeVar("T")
 
 SQL_ERRORS = (sqlite3.Error, UnicodeError)  # its words may quote bytes that are no text
-# Errors that rosbags lets through on messages that are damaged.
-DAMAGE = (
-    *(ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, RecursionError),
-    *(struct.error, SyntaxError, TypeError, ValueError, SerdeError),
-)
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
 
@@ -54,14 +48,14 @@ STATE = "control_msgs/msg/JointTrajectoryControllerState"
 COMMANDED = ("command", "desired", "target", "reference", "setpoint")
 ARRAYS = ("position", "velocity", "effort")
 POINT = {"positions": "position", "velocities": "velocity", "effort": "effort"}
-# Signal and rank of the arrays in the stages of a controller's state.
+# Signal and rank of the arrays in the stages of a controller's state, and of those of a base.
 CONTROLLED = {
     f"{stage}/{name}": (f"{signal}{'_desired' * desired}", 1 - desired)
     for stage, desired in (("reference", 1), ("desired", 1), ("feedback", 0), ("actual", 0))
     for name, signal in POINT.items()
     if not (desired and signal == "effort")
 }
-BASE_WIDTHS = {"pose": 7, "twist": 6}
+BASE = {"pose": ("base_pose", 0), "twist": ("base_velocity", 0)}
 RECORDER = "the messages have no stamps, those of the recorder are used"
 
 
@@ -134,10 +128,7 @@ def _of_odometry(message: Any) -> Row:
 MOTION: Mapping[str, tuple[Callable[[Any], Row], Mapping[str, tuple[str, int]]]] = {
     JOINT_STATE: (_of_state, {name: (name, 0) for name in ARRAYS}),
     STATE: (_of_controller, CONTROLLED),
-    "nav_msgs/msg/Odometry": (
-        _of_odometry,
-        {"pose": ("base_pose", 0), "twist": ("base_velocity", 0)},
-    ),
+    "nav_msgs/msg/Odometry": (_of_odometry, BASE),
 }
 
 
@@ -179,7 +170,7 @@ class Topic:
         rows = {
             name: np.asarray(numbers, dtype=np.float64)
             for name, numbers in found.items()
-            if len(numbers) == BASE_WIDTHS.get(name, len(joints)) > 0
+            if name in BASE or len(numbers) == len(joints) > 0
         }
         key = frozenset(joints), tuple(rows)
         if key not in self.groups:
@@ -200,7 +191,7 @@ class Topic:
             parse = store.deserialize_ros1 if self.ros1 else store.deserialize_cdr
             try:
                 message = parse(data, self.type)
-            except DAMAGE as error:
+            except Exception as error:  # of a message that is damaged, rosbags lets any through
                 problem = one_line(error)
                 continue
             self.versions = (version,)
