@@ -250,13 +250,12 @@ def ordered(path: Path, tracks: Sequence[Track]) -> tuple[list[Track], str]:
 # Signals on one uniform time base
 
 
-def common_time(tracks: Sequence[Track], main: Track) -> tuple[Array, Mask]:
+def common_time(tracks: Sequence[Track], main: Stamps) -> tuple[Array, Mask]:
     """Uniform time that all tracks cover, in [s], and whether it is outside of all gaps."""
-    clock, known = main.stamps.clock, main.stamps.time
+    clock, time = main.clock, main.time
     slack = UNIFORM / clock.rate  # tolerance for rounding at the last sample
-    time = known
     if not clock.uniform:
-        time = np.arange(int(known[-1] * clock.rate + UNIFORM) + 1) / clock.rate
+        time = np.arange(int(time[-1] * clock.rate + UNIFORM) + 1) / clock.rate
     starts = max(track.stamps.time[0] for track in tracks) - slack
     stops = min(track.stamps.time[-1] for track in tracks) + slack
     time = time[(time >= starts) & (time <= stops)]

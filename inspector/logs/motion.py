@@ -18,7 +18,7 @@ import numpy as np
 from inspector.errors import LogError
 from inspector.logs import clocks
 from inspector.logs.mapping import UNIFORM, Log, ReadOptions, Track, known_limits, tracks_of
-from inspector.logs.names import listed
+from inspector.logs.names import BASE_SIGNALS, listed
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
 from noisemodel.robot import Limits
@@ -72,12 +72,12 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
 
 def _refuse_quaternion(path: Path, tracks: Sequence[Track], options: ReadOptions) -> None:
     """Refuse four columns such as q0 to q3 that are one rotation, and no joints."""
+    given = options.columns or any(each.signal == "position" for each in options.entries)
     for track in tracks:
         names = [re.fullmatch(r"q_?\[?[wxyz\d]\]?", label.lower()) for label in track.labels]
-        given = options.columns or any(each.signal == "position" for each in options.entries)
         if track.signal == "position" and len(names) == 4 and all(names) and not given:
             norm = np.linalg.norm(np.asarray(track.values, dtype=np.float64), axis=1)
-            if np.isfinite(norm).all() and (np.abs(norm - 1) < 1e-3).all():
+            if (np.abs(norm - 1) < 1e-3).all():
                 how = "if they are joints, name them: --map position.JOINT=COLUMN"
                 problem = f"{listed(track.labels)} hold a quaternion (their norm is 1), not joints"
                 raise LogError(path, f"{problem}; {how}")
@@ -234,22 +234,20 @@ def _in_si(
     found: list[Track] = []
     for track in tracks:
         # A gripper is logged by LeRobot as a share of its way.
-        gripper = [bool(re.search("gripper|finger", joint)) for joint in track.joints]
-        angles = np.array([not (log.units and each) for each in gripper])
-        if units == "degrees" and not angles.all():
-            names = listed([*compress(track.joints, ~angles)])
+        gripper = [bool(log.units and re.search("gripper|finger", joint)) for joint in track.joints]
+        if units == "degrees" and any(gripper):
+            names = listed([*compress(track.joints, gripper)])
             remark = f"left out, since grippers have no angles: {names}"
             remarks += [] if remark in remarks else [remark]
-            if not angles.any():
+            if all(gripper):
                 continue
-            track = _columns(track, angles)
-        angular = _angular(track, kinds)
+            track = _columns(track, ~np.array(gripper))
+        angular, is_position = _angular(track, kinds), track.quantity == "position"
         if angular.any() and (units == "degrees" or track.quantity in in_degrees):
             values = np.where(angular, np.deg2rad(track.values), track.values)
             track = replace(track, values=values)
         if not units:
-            _refuse_degrees(log.path, track, kinds)
-        is_position = track.quantity == "position"
+            _refuse_degrees(log.path, track, angular, kinds)
         found.append(replace(track, angles=(angular & is_position).tolist()))
     return found, in_degrees
 
@@ -315,14 +313,13 @@ def _ratio(position: Track, velocity: Track) -> float:
     return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
 
 
-def _refuse_degrees(path: Path, track: Track, kinds: Mapping[str, str]) -> None:
-    if track.quantity not in LARGEST:
-        return
-    for place in np.flatnonzero(_angular(track, kinds)).tolist():
-        if kinds.get(track.joints[place]) == "continuous" and track.quantity == "position":
-            continue
+def _refuse_degrees(path: Path, track: Track, angular: Mask, kinds: Mapping[str, str]) -> None:
+    """Refuse angles that are too large for radians; continuous joints may turn as they like."""
+    is_position = track.quantity == "position"
+    for place in np.flatnonzero(angular).tolist():
         beyond = np.abs(track.values[:, place]) > LARGEST[track.quantity]
-        if beyond.any():
+        turns = is_position and kinds.get(track.joints[place]) == "continuous"
+        if beyond.any() and not turns:
             sample = int(np.argmax(beyond))
             held = f"column {track.labels[place]!r} holds {track.values[sample, place]:g}"
             raise track.fault(path, f"{held}, too much for radians; {HINT}", sample)
@@ -396,12 +393,11 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     main = _main(logs[0], options)
     every = [track for log in logs for track in log.tracks]
     tracks, said, offset = clocks.synchronise(logs[-1].path, every, main, options)
-    del every
     remarks = [*_remarks(logs, tracks)]
     remarks += [f"{logs[-1].path.name}: {said}"] if said else []
-    own = next(t.stamps for t in tracks if t.signal == main.signal and t.joints == main.joints)
+    own = tracks[every.index(main)].stamps
     kept = _without_held_targets(tracks, remarks)
-    time, valid = clocks.common_time(kept, next(track for track in kept if track.stamps is own))
+    time, valid = clocks.common_time(kept, own)
     if len(time) < 2 or not valid.any():
         others = [each.stamps for each in tracks if each.stamps is not own]
         raise LogError(logs[-1].path, clocks.no_overlap(others[-1] if others else own, own))
@@ -415,11 +411,12 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     meta |= {} if offset is None else {"offset": {"seconds": offset}}
     covered, slack = float(own.time[-1]), UNIFORM / own.clock.rate
     logs.clear()
-    del tracks, main  # each signal is freed when it has been resampled
+    del every, tracks, main  # each signal is freed when it has been resampled
     parts: dict[str, Track] = {}
     while kept:
         track = kept.pop(0)
-        _add(parts, replace(track, values=clocks.resampled(time, valid, track, slack)))
+        track = replace(track, values=clocks.resampled(time, valid, track, slack))
+        _add(parts, track)
     signals, differentiated, told = _signals_of(parts, time - time[0], valid)
     meta |= {"differentiated": differentiated} if differentiated else {}
     run = Run(time=time - time[0], valid=valid, robot=options.robot or None, meta=meta, **signals)
@@ -442,11 +439,10 @@ def _add(parts: dict[str, Track], track: Track) -> None:
 def _check_mapping(logs: Sequence[Log], options: ReadOptions) -> None:
     """Refuse a mapping of a column that none of the logs has."""
     names = {name for log in logs for name in log.names}
+    times = {log.time for log in logs}
     for entry in options.entries:
         known = entry.is_pattern or entry.source in names or entry.part()[0] in names
-        if entry.signal == "time":
-            known = any(entry.source == log.time for log in logs)
-        if not known:
+        if not (entry.source in times if entry.signal == "time" else known):
             problem = f"there is no column {entry.source!r} to map"
             raise LogError(logs[0].path, f"{problem}; it has {listed(logs[0].names)}")
 
@@ -547,9 +543,7 @@ def _signals_of(
                 remarks.append(f"{signal}: left out, missing for {', '.join(lacking)}")
             else:
                 signals[signal] = parts[signal].of(joints)
-    for name in ("base_pose", "base_velocity"):
-        if name in parts:
-            signals[name] = parts[name].values
+    signals |= {name: parts[name].values for name in BASE_SIGNALS if name in parts}
     if "base_pose" in signals and "base_velocity" not in signals:
         signals["base_velocity"] = base_velocity(time, signals["base_pose"], valid)
         differentiated["base_velocity"] = METHOD
@@ -654,10 +648,9 @@ def derived(run: Run, signal: str) -> bool:
 
 def contradictions(run: Run) -> Iterator[str]:
     """Clauses on velocities that are not the slopes of their positions."""
-    ways = None if run.position is None or derived(run, "velocity") else _ways(run)
-    if ways is None:
+    if run.position is None or derived(run, "velocity"):
         return
-    way, summed = ways
+    way, summed = _ways(run, run.position)
     own, other = np.square(way).sum(axis=0), np.square(summed).sum(axis=0)
     both, clear = (way * summed).sum(axis=0), own > 0
     if not clear.any():
@@ -693,20 +686,18 @@ def _joints(run: Run, chosen: Mask) -> str:
     return "all joints" if len(names) == len(run.joint_names) > 1 else listed(names)
 
 
-def _ways(run: Run) -> tuple[Array, Array] | None:
+def _ways(run: Run, position: Real) -> tuple[Array, Array]:
     """Changes of positions, and integrals of velocities, over stretches without a gap."""
-    assert run.position is not None
     length = max(2, round(STRETCH * run.rate))
     starts = np.arange(0, len(run.time) - length, length)
     gaps = np.concatenate(([0], np.cumsum(~run.mask)))
     starts = starts[gaps[starts + length + 1] == gaps[starts]]
-    if not len(starts):
-        return None
-    way = run.position[starts + length].astype(np.float64) - run.position[starts]
-    whole = run.velocity[: len(run.time) // length * length]
-    sums = whole.reshape(-1, length, way.shape[1]).sum(axis=1, dtype=np.float64)[starts // length]
+    way = position[starts + length].astype(np.float64) - position[starts]
+    count = len(run.time) // length
+    whole = run.velocity[: count * length].reshape(count, length, way.shape[1])
+    sums = whole.sum(axis=1, dtype=np.float64)[starts // length]
     ends = (run.velocity[starts + length].astype(np.float64) - run.velocity[starts]) / 2
     summed = (sums + ends) / run.rate  # trapezoids
     turn = 2 * np.pi  # of an angle that wraps: it stays within a turn, and jumps
-    wraps = np.abs(np.ptp(run.position, axis=0) - turn) < 0.1 * turn
+    wraps = np.abs(np.ptp(position, axis=0) - turn) < 0.1 * turn
     return np.where(wraps, way - turn * np.round((way - summed) / turn), way), summed
