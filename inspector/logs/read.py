@@ -263,9 +263,8 @@ def open_source(source: Source, reading: Reading | None = None) -> Opened:
     if robot or reading.without_robot:
         run = replace(run, robot=robot or None)
     by_robot = named(run)
-    if by_robot is run:
-        return Opened(run, "", source)
-    return Opened(by_robot, f"joints are not named: taken for {_listed(by_robot)}", source)
+    told = "" if by_robot is run else f"joints are not named: taken for {_listed(by_robot)}"
+    return Opened(by_robot, told, source)
 
 
 def sources(
