@@ -43,93 +43,82 @@ T = TypeVar("T")
 SQL_ERRORS = (sqlite3.Error, UnicodeError)  # its words may quote bytes that are no text
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
+ODOMETRY = "nav_msgs/msg/Odometry"
 
 # A JointState topic with one of these in its name holds desired motion.
 COMMANDED = ("command", "desired", "target", "reference", "setpoint")
 ARRAYS = ("position", "velocity", "effort")
 POINT = {"positions": "position", "velocities": "velocity", "effort": "effort"}
-# Signal and rank of the arrays in the stages of a controller's state, and of those of a base.
-CONTROLLED = {
-    f"{stage}/{name}": (f"{signal}{'_desired' * desired}", 1 - desired)
-    for stage, desired in (("reference", 1), ("desired", 1), ("feedback", 0), ("actual", 0))
-    for name, signal in POINT.items()
-    if not (desired and signal == "effort")
+# By the type of messages, signal and rank of each of its arrays.
+MOTION: Mapping[str, Mapping[str, tuple[str, int]]] = {
+    JOINT_STATE: {name: (name, 0) for name in ARRAYS},
+    STATE: {
+        f"{stage}/{name}": (f"{signal}{'_desired' * desired}", 1 - desired)
+        for stage, desired in (("reference", 1), ("desired", 1), ("feedback", 0), ("actual", 0))
+        for name, signal in POINT.items()
+        if not (desired and signal == "effort")
+    },
+    ODOMETRY: {"pose": ("base_pose", 0), "twist": ("base_velocity", 0)},
 }
-BASE = {"pose": ("base_pose", 0), "twist": ("base_velocity", 0)}
 RECORDER = "the messages have no stamps, those of the recorder are used"
 
 
 # Messages of bytes
 
 
-def _state(joints: tuple[str, ...], others: tuple[str, ...] = (), last: str = "") -> str:
-    """Definition of a controller's state with these stages."""
-    point, multi = (f"trajectory_msgs/{each}JointTrajectoryPoint" for each in ("", "MultiDOF"))
+def _state(stages: tuple[str, ...], *, multi: bool = False, scaled: bool = False) -> str:
+    """Definition of a controller's state with these stages; ``multi`` of joints of any kind."""
+    point = "JointTrajectoryPoint"
     lines = ["std_msgs/Header header", "string[] joint_names"]
-    lines += [f"{point} {name}" for name in joints]
-    lines += ["string[] multi_dof_joint_names"] * bool(others)
-    lines += [f"{multi} multi_dof_{name}" for name in others]
-    return "\n".join([*lines, last])
+    lines += [f"trajectory_msgs/{point} {name}" for name in stages]
+    if multi:
+        lines.append("string[] multi_dof_joint_names")
+        lines += [f"trajectory_msgs/MultiDOF{point} multi_dof_{name}" for name in stages]
+    return "\n".join([*lines, "float64 speed_scaling_factor" * scaled])
 
 
 OLD = ("desired", "actual", "error")
 NEW = ("reference", "feedback", "error", "output")
+BOTH = (*NEW, "desired", "actual")
 # Versions of a controller's state: which one a bag has, its messages tell by their length.
 STATES = (
-    _state(NEW, NEW, "float64 speed_scaling_factor"),
-    _state((*NEW, *OLD[:2]), (*NEW, *OLD[:2])),
-    _state(OLD, OLD),
+    _state(NEW, multi=True, scaled=True),
+    _state(BOTH, multi=True),
+    _state(OLD, multi=True),
     _state(OLD),
     _state(NEW),
-    _state((*NEW, *OLD[:2])),
-    _state(NEW, (), "float64 speed_scaling_factor"),
+    _state(BOTH),
+    _state(NEW, scaled=True),
 )
 
 
 @cache  # a store takes 20 ms to make
-def _store(kind: str, definition: str, ros1: bool) -> Any:
+def _store(state: str, ros1: bool) -> Any:
+    """Types of messages, a controller's state by one of its definitions."""
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-    if definition and kind not in store.types:
-        store.register(get_types_from_msg(definition, kind))
+    if state:
+        store.register(get_types_from_msg(state, STATE))
     return store
 
 
-# What a message tells: joints, and numbers by the array's name.
-Row: TypeAlias = tuple[tuple[str, ...], Mapping[str, Any]]
-
-
-def _of_state(message: Any) -> Row:
-    """Row of a ``sensor_msgs/JointState``."""
-    return tuple(message.name), {name: getattr(message, name) for name in ARRAYS}
-
-
-def _of_controller(message: Any) -> Row:
-    """Row of a controller's state; of the two names of a stage the one that is not empty."""
+def _row(kind: str, message: Any) -> tuple[tuple[str, ...], Mapping[str, Any]]:
+    """What a message tells: joints, none of a base, and numbers by the array's name."""
+    if kind == JOINT_STATE:
+        return tuple(message.name), {name: getattr(message, name) for name in ARRAYS}
+    if kind == ODOMETRY:  # pose of the base in the world, velocity in body axes
+        pose, twist = message.pose.pose, message.twist.twist
+        place, turn = pose.position, pose.orientation
+        numbers = [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
+        velocity = [getattr(part, axis) for part in (twist.linear, twist.angular) for axis in "xyz"]
+        return (), {"pose": numbers, "twist": velocity}
     parts: dict[str, Any] = {}
     for stages in (("reference", "desired"), ("feedback", "actual")):
-        for stage in stages:
+        for stage in stages:  # of the two names of a stage the one that is not empty
             point = getattr(message, stage, None)
             if point is not None and (len(point.positions) or len(point.velocities)):
                 parts |= {f"{stage}/{name}": getattr(point, name, ()) for name in POINT}
                 break
     return tuple(message.joint_names), parts
-
-
-def _of_odometry(message: Any) -> Row:
-    """Row of a ``nav_msgs/Odometry``: pose of the base in the world, velocity in body axes."""
-    pose, twist = message.pose.pose, message.twist.twist
-    place, turn = pose.position, pose.orientation
-    numbers = [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
-    velocity = [getattr(part, axis) for part in (twist.linear, twist.angular) for axis in "xyz"]
-    return (), {"pose": numbers, "twist": velocity}
-
-
-# By the type of messages, the row of a message, and signal and rank of each of its arrays.
-MOTION: Mapping[str, tuple[Callable[[Any], Row], Mapping[str, tuple[str, int]]]] = {
-    JOINT_STATE: (_of_state, {name: (name, 0) for name in ARRAYS}),
-    STATE: (_of_controller, CONTROLLED),
-    "nav_msgs/msg/Odometry": (_of_odometry, BASE),
-}
 
 
 # Topics
@@ -165,12 +154,12 @@ class Topic:
     def add(self, path: Path, received: int, data: bytes) -> None:
         """Add a message that was received at a time in [ns]."""
         message = self._decoded(path, data)
-        joints, found = MOTION[self.type][0](message)
+        joints, found = _row(self.type, message)
         # Arrays with another length than the joints are ignored.
         rows = {
             name: np.asarray(numbers, dtype=np.float64)
             for name, numbers in found.items()
-            if name in BASE or len(numbers) == len(joints) > 0
+            if self.type == ODOMETRY or len(numbers) == len(joints) > 0
         }
         key = frozenset(joints), tuple(rows)
         if key not in self.groups:
@@ -187,7 +176,7 @@ class Topic:
         """A message, by the version of its type that fits, which all others then have."""
         problem = ""
         for version in self.versions if self.type == STATE else ("",):
-            store = _store(self.type, version, self.ros1)
+            store = _store(version, self.ros1)
             parse = store.deserialize_ros1 if self.ros1 else store.deserialize_cdr
             try:
                 message = parse(data, self.type)
@@ -200,7 +189,7 @@ class Topic:
 
     def fields(self) -> Iterator[Field]:
         """Fields of the messages."""
-        signals = MOTION[self.type][1]
+        signals = MOTION[self.type]
         if self.type == JOINT_STATE and any(word in self.name.lower() for word in COMMANDED):
             signals = {name: (f"{name}_desired", 1) for name in ("position", "velocity")}
         for group in self.groups.values():
