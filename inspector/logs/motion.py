@@ -64,7 +64,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
         tracks=tuple(tracks),
         names=(*(each.name for each in log.fields), *log.not_read),
         not_read=not_read,
-        remarks=(*([order] if order else []), *remarks),
+        remarks=tuple(filter(None, (order, *remarks))),
         meta=dict(log.meta) | ({"units": options.units} if options.units else {}),
         in_degrees=in_degrees,
     )
@@ -182,7 +182,7 @@ def _repeats(time: Array, same: Mask, tracks: Sequence[Track]) -> Iterator[tuple
     edges = np.flatnonzero(np.diff(np.concatenate(([False], same, [False]))))
     if not len(edges):
         return
-    changes = time[np.flatnonzero(np.concatenate(([True], ~same)))]
+    changes = time[np.concatenate(([True], ~same))]
     usual = float(np.median(np.diff(changes))) if len(changes) > 1 else 0.0
     for first, last in edges.reshape(-1, 2).tolist():
         length = float(time[last] - time[first])
