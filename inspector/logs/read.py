@@ -286,7 +286,7 @@ def sources(
         also_reading(new)
         for log in new:
             episodes: Iterable[str] = ("",)
-            if _is_folder(log) or not _is_npz(log):
+            if not _is_npz(log):
                 try:
                     episodes = readers_of(log, reading)
                 except (InspectorError, NoiseModelError):
@@ -364,7 +364,7 @@ def _listed(run: Run) -> str:
 
 def _run_file(path: Path, reading: Reading) -> Run | None:
     """The run of a run file; None of another log, or if it has to be read as one."""
-    if _is_folder(path) or not _is_npz(path):
+    if not _is_npz(path):
         return None
     if _is_archive(path):
         options = reading.options
@@ -385,7 +385,8 @@ def _run_file(path: Path, reading: Reading) -> Run | None:
 
 
 def _is_npz(path: Path) -> bool:
-    return path.suffix.lower() == ".npz" or _is_archive(path)
+    """Whether a file holds, or should hold, an archive of arrays."""
+    return not _is_folder(path) and (path.suffix.lower() == ".npz" or _is_archive(path))
 
 
 def _is_archive(path: Path) -> bool:
