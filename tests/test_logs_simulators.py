@@ -14,6 +14,7 @@ from inspector import read_log, read_logs
 from inspector.errors import LogError
 from inspector.logs.clocks import rate_of
 from inspector.logs.mapping import followed
+from inspector.logs.read import open_source, sources
 
 STEPS = 400
 FITS = "at which positions and velocities fit; --rate sets another"
@@ -297,6 +298,8 @@ def test_d4rls_episodes_are_told_apart_by_their_ends(tmp_path):
     }
     for path in (hdf5(tmp_path / "pen.hdf5", arrays), savez(tmp_path / "pen.npz", **arrays)):
         first, second = read_logs(path)
+        again = [open_source(source).run.velocity for source in sources([path])[0]]
+        assert [*map(len, again)] == [150, 250]
         assert (first.name, second.name) == ("pen-0", "pen-1")
         assert np.array_equal(first.run.position, position[:150])
         assert np.array_equal(second.run.velocity, velocity[150:])

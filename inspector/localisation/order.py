@@ -81,8 +81,8 @@ def best_lines(
     """The best order of the joint that vibrates most, and what it and a frequency explain.
 
     Both are shares of the joint's vibration above 10 Hz: of the velocity, less the desired one if
-    there is one. No frequency is sought if an order explains less than ``least``; without vibration,
-    motion or joints there is none.
+    there is one. No frequency is sought if an order explains less than ``least``; without joints,
+    vibration or motion there is none.
     """
     parts = _parts(run, failure)
     if not parts or not run.joint_names:

@@ -37,6 +37,7 @@ from inspector.logs.mapping import (
     no_motion,
 )
 from inspector.logs.names import (
+    EPISODE_ENDS,
     JOINT_SIGNALS,
     SIGNALS,
     TIMES,
@@ -80,8 +81,6 @@ TABLE: tuple[tuple[str, str], ...] = (
 )
 # What Isaac Lab records of a scene, in which several things may have joints.
 STATES = re.compile(r"states/articulation/(?P<robot>[^/]+)/(?P<what>.+)")
-# Flags of D4RL and Gymnasium: the last step of an episode has one.
-EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
 # Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``.
 CELLS = re.compile(
     r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?", re.IGNORECASE

@@ -22,6 +22,8 @@ TIME = (
     r"(?:.*[./])?(?:(?:elapsed|ros|rosbag|system|sys|robot|host|pc|unix|wall|sim|log)[_ ]?)?"
     r"(?P<name>__time|time[_ ]?stamp|time|stamp|t|ts|elapsed|secs?|seconds)"
 )
+# Flags of D4RL and Gymnasium: the last step of an episode has one.
+EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
 # Units of stamps, as names of columns have them.
 TIME_UNITS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), "seconds"),

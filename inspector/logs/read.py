@@ -24,7 +24,7 @@ from inspector.logs.mapping import (
     read_options,
 )
 from inspector.logs.motion import Imported, prepared, run_of
-from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
+from inspector.logs.names import BASE_SIGNALS, EPISODE_ENDS, JOINT_SIGNALS, listed
 from inspector.text import counted, printable
 from noisemodel import NoiseModelError, Robot, Run, RunFileError, runfile
 from noisemodel.files import also_reading
@@ -286,7 +286,7 @@ def sources(
         also_reading(new)
         for log in new:
             episodes: Iterable[str] = ("",)
-            if not _is_npz(log):
+            if not _is_npz(log) or _ends_episodes(log):
                 try:
                     episodes = readers_of(log, reading)
                 except (InspectorError, NoiseModelError):
@@ -374,7 +374,7 @@ def _run_file(path: Path, reading: Reading) -> Run | None:
             names = set(runfile.names_in(path))
         except (OSError, runfile.ArchiveError):
             names = {"time", "velocity"}  # `Run.load` says what is wrong
-        if "time" not in names or not names & {"velocity", "position"}:
+        if "time" not in names or not names & {"velocity", "position"} or _ends_episodes(path):
             return None  # arrays of a simulator
     try:
         return Run.load(path, on_demand=True)
@@ -387,6 +387,14 @@ def _run_file(path: Path, reading: Reading) -> Run | None:
 def _is_npz(path: Path) -> bool:
     """Whether a file holds, or should hold, an archive of arrays."""
     return not _is_folder(path) and (path.suffix.lower() == ".npz" or _is_archive(path))
+
+
+def _ends_episodes(path: Path) -> bool:
+    """Whether an archive holds arrays of several episodes, one after the other."""
+    try:
+        return any(name.lower() in EPISODE_ENDS for name in runfile.names_in(path))
+    except (OSError, runfile.ArchiveError):
+        return False
 
 
 def _is_archive(path: Path) -> bool:
