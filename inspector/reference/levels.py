@@ -15,6 +15,7 @@ from numpy import fft
 from numpy.typing import NDArray
 
 from noisemodel import Run
+from noisemodel.noise import in_both
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
@@ -75,9 +76,7 @@ class Levels:
     @property
     def first(self) -> NDArray[np.float32]:
         """Slow positions at the start of the run or stream, shape (joints,), in [rad] or [m]."""
-        if self.origin is not None:
-            return self.origin
-        return self.guide[0] if len(self.guide) else np.zeros(len(self.joints), np.float32)
+        return self.guide[0] if self.origin is None else self.origin
 
     @property
     def time(self) -> Array:
@@ -118,7 +117,7 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
     lost = np.add.reduceat((~run.mask).astype(np.int64), firsts) > 0
     # The filters still ring a frame after a gap.
     level[_framed(np.convolve(lost, np.ones(BINS + 1))[:count], frames) > 0] = np.nan
-    level[:, ~_has_desired(run), 1] = np.nan
+    level[:, np.setdiff1d(np.arange(len(run.joint_names)), _tracked(run)[0]), 1] = np.nan
     guide, guided_by = _guide(run, of_sample, count, lost)
     moved = _framed(_means(run.velocity, of_sample, count), frames) / BINS
     return Levels(
@@ -152,13 +151,13 @@ class LevelStream:
         robot: str = "",
         tell: Callable[[Levels], None] | None = None,
     ) -> None:
-        self._joints, self._rate, self._robot = joint_names, rate, robot
-        self._tell, self._frames = tell, 0
-        self._start: float | None = None
-        self._held: dict[str, NDArray[np.float32]] = {}
-        self._valid = np.zeros(0, dtype=bool)
+        self._joints, self._rate, self._robot, self._tell = joint_names, rate, robot, tell
+        self._names: tuple[str, ...] = ()  # of the signals that are held
+        # Samples that wait, shape (samples, signals, joints); NaN where they are not known.
+        self._held = np.empty((0, 0, 0), np.float32)
         self._before = 0  # bins of the samples held that were measured already
-        self._count = 0
+        self._start = 0.0  # time of the first sample
+        self._count = self._frames = 0  # of samples that came, of frames that are measured
         self._parts: list[Levels] = []
         self._origin: NDArray[np.float32] | None = None
         self.too_long = False
@@ -173,29 +172,38 @@ class LevelStream:
             valid: Which samples are known, shape (samples,).
             lost: How many samples are missing before each, shape (samples,).
         """
-        self._start = time if self._start is None else self._start
         # Positions tell the motion only where no desired velocity does.
-        names = ["velocity"]
-        names += [n for n in ("velocity_desired", "position") if n in signals][:1]
-        known = valid & np.isfinite(signals[names[-1]]).all(axis=1)
-        for first, stop in pairwise([0, *np.flatnonzero(lost[1:] > 0) + 1, len(valid)]):
-            self._add_gap(int(lost[first]), {n: signals[n].shape[1] for n in names})
-            self._add({n: signals[n][first:stop] for n in names}, known[first:stop])
+        guides = [name for name in ("velocity_desired", "position") if name in signals]
+        self._names = ("velocity", *guides[:1])
+        known = valid & np.isfinite(signals[self._names[-1]]).all(axis=1)
+        samples = np.stack([signals[name] for name in self._names], axis=1, dtype=np.float32)
+        samples[~known] = np.nan
+        if not self._count:
+            self._start, self._held = time, samples[:0]
+        for first, stop in pairwise([0, *np.flatnonzero(lost[1:] > 0) + 1, len(samples)]):
+            missing, piece = int(lost[first]), round(PIECE * self._rate)
+            if missing > LONGEST * self._rate:
+                self.too_long = True
+                self._start += (missing - piece) / self._rate
+                missing = piece
+            for done in range(0, missing, piece):
+                shape = min(piece, missing - done), *samples.shape[1:]
+                self._add(np.full(shape, np.nan, np.float32))
+            self._add(samples[first:stop])
 
     def finish(self) -> Levels | None:
         """Levels of what came; None of less than a frame, or of more than an hour.
 
         Of more than an hour, the last samples are told as those before were.
         """
-        if len(self._valid) > 1:
-            self._measure(len(self._valid), None)
+        if len(self._held) > 1:
+            self._measure(len(self._held), None)
         if self.too_long or not self._parts:
             return None
         return replace(self._joined(self._parts), duration=self._count / self._rate)
 
     def _joined(self, parts: Sequence[Levels]) -> Levels:
         """The last pieces as one."""
-        assert self._start is not None
         whole: dict[str, Any] = {
             name: np.concatenate([getattr(each, name) for each in parts])
             for name in ("level", "guide", "pace")
@@ -205,47 +213,33 @@ class LevelStream:
         duration = (frames + BINS - 1) * HOP
         return replace(parts[-1], start=start, duration=duration, origin=self._origin, **whole)
 
-    def _add_gap(self, lost: int, widths: Mapping[str, int]) -> None:
-        piece = round(PIECE * self._rate)
-        if lost > LONGEST * self._rate:
-            assert self._start is not None
-            self.too_long, self._start = True, self._start + (lost - piece) / self._rate
-            lost = piece
-        while lost:
-            count = min(lost, piece)
-            lost -= count
-            self._add({n: np.zeros((count, w)) for n, w in widths.items()}, np.zeros(count, bool))
-
-    def _add(self, signals: Mapping[str, Array], valid: NDArray[np.bool_]) -> None:
-        self._count += len(valid)
+    def _add(self, samples: NDArray[np.float32]) -> None:
+        self._count += len(samples)
         self.too_long = self.too_long or self._count > LONGEST * self._rate
         if self.too_long:
             self._parts = self._parts[-LATEST:]
-        for name, values in signals.items():
-            new = np.where(valid[:, None], values, 0.0).astype(np.float32)
-            self._held[name] = np.concatenate((self._held.get(name, new[:0]), new))
-        self._valid = np.concatenate((self._valid, valid))
+        self._held = np.concatenate((self._held, samples))
         bins, around = round(PIECE / HOP), round(SETTLING / HOP)
         # Filters need a second of samples to each side.
-        while len(self._valid) > (enough := self._samples(self._before + bins + BINS + around)):
+        while len(self._held) > (enough := self._samples(self._before + bins + BINS + around)):
             self._measure(enough, bins)
-            drop = self._samples(self._before + bins - around)
-            self._held = {name: values[drop:] for name, values in self._held.items()}
-            self._valid, self._before = self._valid[drop:], around
+            self._held = self._held[self._samples(self._before + bins - around) :]
+            self._before = around
 
     def _samples(self, bins: int) -> int:
         return int(np.ceil(bins * self._rate * HOP - 1e-9))
 
     def _measure(self, samples: int, frames: int | None) -> None:
         """Measure frames of the first samples that are held; all that there are if None."""
-        valid = self._valid[:samples]
-        signals: dict[str, Any] = {name: each[:samples] for name, each in self._held.items()}
+        held = self._held[:samples]
+        valid = np.asarray(np.isfinite(held).all(axis=(1, 2)))
+        signals = np.where(valid[:, None, None], held, np.float32(0.0)).transpose(1, 0, 2)
         run = Run(
             time=np.arange(samples) / self._rate,
             joint_names=self._joints,
             valid=valid if valid.any() else None,
             robot=self._robot or None,
-            **signals,
+            **dict(zip(self._names, signals, strict=True)),
         )
         found = levels(run)
         guide, level = found.guide, found.level
@@ -285,9 +279,9 @@ def _framed(binned: Array, frames: int) -> Array:
     return np.asarray(total[BINS : BINS + frames] - total[:frames])
 
 
-def _has_desired(run: Run) -> NDArray[np.bool_]:
-    known = () if run.velocity_desired is None else run.desired_joint_names
-    return np.array([joint in known for joint in run.joint_names], dtype=bool)
+def _tracked(run: Run) -> tuple[list[int], list[int]]:
+    """Columns of the joints with tracking errors, in measured and in desired velocities."""
+    return ([], []) if run.velocity_desired is None else in_both(run)
 
 
 def _energies(
@@ -328,15 +322,13 @@ def _response(
 
 def _signals(run: Run) -> Iterator[tuple[slice, Array]]:
     """Velocities, then tracking errors, less their first values, held over gaps, by piece."""
-    has = _has_desired(run)
-    order = [run.desired_joint_names.index(run.joint_names[joint]) for joint in np.flatnonzero(has)]
+    own, wanted = _tracked(run)
     first = last = np.empty(0)
     for rows in pieces(run.velocity):
         velocity = np.asarray(run.velocity[rows], dtype=np.float64)
         error = np.zeros_like(velocity)
-        if run.velocity_desired is not None and order:
-            desired = np.asarray(run.velocity_desired[rows], dtype=np.float64)
-            error[:, has] = velocity[:, has] - desired[:, order]
+        if run.velocity_desired is not None:
+            error[:, own] = velocity[:, own] - run.velocity_desired[rows][:, wanted]
         both = np.hstack((velocity, error))
         valid = run.mask[rows]
         if not len(first):
@@ -353,7 +345,6 @@ def _guide(
 ) -> tuple[Array, str]:
     """Mean slow positions in bins, and what they are."""
     signal = next(each for each in GUIDES if getattr(run, each) is not None)
-    names = run.desired_joint_names if signal.endswith("desired") else run.joint_names
     means = _means(getattr(run, signal), of_sample, count)
     known = np.flatnonzero(~lost)
     if len(known) and lost.any():
@@ -361,13 +352,13 @@ def _guide(
         means = np.stack([np.interp(every, known, column[known]) for column in means.T], axis=1)
     if signal.startswith("velocity"):
         means = np.cumsum(means, axis=0) * HOP
-    elif len(means):
+    else:
         means = np.unwrap(means, axis=0)
-    guide = np.zeros((count, len(run.joint_names)))
-    for place, joint in enumerate(run.joint_names):
-        if joint in names:
-            guide[:, place] = means[:, names.index(joint)]
-    return guide, GUIDES[signal]
+    if signal.endswith("desired"):
+        guide, (own, wanted) = np.zeros((count, len(run.joint_names))), in_both(run)
+        guide[:, own] = means[:, wanted]
+        means = guide
+    return means, GUIDES[signal]
 
 
 def _means(values: Real, of_sample: NDArray[np.int64], count: int) -> Array:
