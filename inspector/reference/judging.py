@@ -21,12 +21,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
-from typing import Any, NamedTuple, TypeAlias
+from functools import cached_property
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspector.reference.levels import HIGHEST, HOP, SIGNALS, Levels, Octaves
+from inspector.text import counted
 from inspector.verdict import Evidence, Finding
 from noisemodel.types import Array
 
@@ -80,9 +82,6 @@ class Kind(StrEnum):
     REPETITIONS = "repetitions"
     OTHER_MOTIONS = "other motions"
     GENERAL = "general"
-
-
-KINDS = tuple(Kind)
 
 
 @dataclass(frozen=True)
@@ -174,23 +173,15 @@ class Cells:
             tuple(o for o in run.octaves if by(o in each.octaves for each in others)),
         )
 
-    def unknown(self, frames: int) -> Real32:
-        """Levels of which nothing is known yet, shape (frames, joints, 2, octaves)."""
-        shape = (frames, len(self.joints), len(SIGNALS), len(self.octaves))
-        return np.full(shape, np.nan, dtype=np.float32)
-
     def of(self, run: Levels) -> Real32:
         """Levels of a run, shape (frames, joints, 2, octaves); NaN of those that it lacks."""
-        found = self.unknown(len(run.level))
-        joints = [each for each in self.joints if each in run.joints]
-        octaves = [each for each in self.octaves if each in run.octaves]
-
-        def places(of: Cells | Levels) -> tuple[NDArray[Any], ...]:
-            at = [of.joints.index(each) for each in joints]
-            return np.ix_(range(len(found)), at, (0, 1), [of.octaves.index(o) for o in octaves])
-
-        found[places(self)] = run.level[places(run)]
-        return found
+        if (self.joints, self.octaves) == (run.joints, run.octaves):
+            return run.level
+        joints = [run.joints.index(each) if each in run.joints else -1 for each in self.joints]
+        octaves = [run.octaves.index(o) if o in run.octaves else -1 for o in self.octaves]
+        # What it lacks is taken from one more joint or octave, at the end.
+        padded = np.pad(run.level, ((0, 0), (0, 1), (0, 0), (0, 1)), constant_values=np.nan)
+        return np.asarray(padded[:, joints][..., octaves])
 
     def noise(self, run: Levels) -> Array:
         """Level of a run's velocities, all joints and octaves, shape (frames,); NaN without any."""
@@ -207,12 +198,11 @@ class Comparison:
     octaves: Octaves  # [Hz]
     scenarios: tuple[str, ...]  # whose motion it is
     repetitions: int  # that these have
-    kind: NDArray[np.int8]  # evidence of each frame, as its place in `KINDS`, shape (frames,)
+    kind: NDArray[np.object_]  # evidence of each frame, a `Kind`, shape (frames,)
     # Exceedance of each cell, shape (frames, joints, 2, octaves), in [dB]; NaN without reference.
     over: Real32
     score: Array  # of each frame, in [dB]; NaN without reference
     margins: Mapping[Kind, Margin]
-    exceedances: tuple[Exceedance, ...]  # in order of time
     quieter: float  # than each repetition, in [dB]; 0 if it is not
     # Level of the noise of the quietest and of the loudest repetition at each frame, shape
     # (frames, 2), in [dB re 1 rad/s]; NaN without.
@@ -250,6 +240,36 @@ class Comparison:
         """Places of the joints that are most over the reference, in their order."""
         return sorted(np.argsort(-self.peaks, kind="stable")[:count].tolist())
 
+    @cached_property
+    def exceedances(self) -> tuple[Exceedance, ...]:
+        """Stretches that are over the margin, in order of time."""
+        run, cells = self.run, Cells(self.joints, self.octaves)
+        limits = {kind: margin.db for kind, margin in self.margins.items()}
+        limit = np.array([limits.get(kind, np.inf) for kind in self.kind])
+        loud = np.flatnonzero(np.nan_to_num(self.score, nan=-np.inf) > limit)
+        if not len(loud):
+            return ()
+        time, level, found = run.time, cells.of(run), list[Exceedance]()
+        for group in np.split(loud, np.flatnonzero(np.diff(loud) * HOP > GAP) + 1):
+            exceeded = np.nan_to_num(self.over[group], nan=-np.inf)
+            place = np.unravel_index(exceeded.argmax(), exceeded.shape)
+            frame, joint, signal, octave = map(int, place)
+            row = group[frame]
+            evidence = Evidence(
+                str(self.kind[row]),
+                round(float(exceeded.max()), 2),
+                round(float(time[row]), 4),
+                self.joints[joint],
+                SIGNALS[signal],
+                self.octaves[octave],
+                round(float(level[row, joint, signal, octave]), 2),
+            )
+            # A frame reaches 0.1 s to each side; what is loud in it begins about its middle.
+            start = max(run.start, time[group[0]] - HOP)
+            stop = min(run.start + run.duration, time[group[-1]] + HOP)
+            found.append(Exceedance(float(start), float(stop), evidence))
+        return tuple(found)
+
     @property
     def worst(self) -> float:
         """The largest score, in [dB]; NaN without any reference."""
@@ -257,7 +277,7 @@ class Comparison:
 
     def share(self, kind: Kind) -> float:
         """Share of the frames that have an evidence."""
-        return float(np.mean(self.kind == KINDS.index(kind))) if len(self.kind) else 0.0
+        return float(np.mean(self.kind == kind)) if len(self.kind) else 0.0
 
     def covered(self, event: Finding) -> bool:
         """Whether a reference covers all frames of a finding, in its joint and up to its band.
@@ -278,13 +298,13 @@ class Comparison:
         return bool(inside.any() and whole.all())
 
     def __str__(self) -> str:
-        number = f"{self.repetitions} repetition{'s' * (self.repetitions != 1)}"
+        number, names = counted(self.repetitions, "repetition"), " and ".join(self.scenarios)
         words = {
-            Kind.REPETITIONS: f"{number} of {' and '.join(self.scenarios)}",
+            Kind.REPETITIONS: f"{number} of {names}",
             Kind.OTHER_MOTIONS: "other motions of this robot",
             Kind.GENERAL: "the general model alone",
         }
-        shown = [kind for kind in KINDS if self.share(kind)]
+        shown = [kind for kind in Kind if self.share(kind)]
         by = {kind: f" ({self.margins[kind]})" if kind in self.margins else "" for kind in shown}
         return "; ".join(f"{self.share(kind):.0%} by {words[kind]}{by[kind]}" for kind in shown)
 
@@ -293,8 +313,8 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     """Compare a run with its reference."""
     known = [each for each in scenarios if robot_fits(run, each)]
     cells, remarks = _common(run, known, scenarios)
-    frames = len(run.guide)
-    over, kind = cells.unknown(frames), np.full(frames, KINDS.index(Kind.GENERAL), dtype=np.int8)
+    frames, over = len(run.guide), np.full_like(cells.of(run), np.nan)
+    kind = np.full(frames, Kind.GENERAL, dtype=object)
     margins: dict[Kind, Margin] = {}
     matched, aligned, told = _matching(run, known, cells.joints) if over.size else ([], [], [])
     remarks += told
@@ -302,7 +322,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     if aligned:
         quieter, band = _quieter(run, aligned, cells), _band(aligned, cells)
         over, covered = _over_repetitions(run, aligned, cells)
-        kind[covered] = KINDS.index(Kind.REPETITIONS)
+        kind[covered] = Kind.REPETITIONS
         margins[Kind.REPETITIONS] = margin_of([db for each in known for db in each.scores_db])
         longest = max(each.duration for each, _ in aligned)
         if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
@@ -310,15 +330,14 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
                 f"longer than its scenario, {run.duration:.1f} of {longest:.1f} s: the rest is"
                 " compared with other motions"
             )
-    left = np.flatnonzero(kind == KINDS.index(Kind.GENERAL))
+    left = np.flatnonzero(kind == Kind.GENERAL)
     others = _repetitions([each for each in known if each not in matched] or matched)
     if over.size and len(left) and others:
         found = _over_others(run, left, others, cells)
         covered = np.asarray(np.isfinite(found).any(axis=(1, 2, 3)))
         over[left[covered]] = found[covered]
-        kind[left[covered]] = KINDS.index(Kind.OTHER_MOTIONS)
+        kind[left[covered]] = Kind.OTHER_MOTIONS
         margins[Kind.OTHER_MOTIONS] = margin_of([db for each in known for db in each.elsewhere_db])
-    score = scores_of(over)
     return Comparison(
         run,
         cells.joints,
@@ -327,9 +346,8 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
         len(aligned),
         kind,
         over,
-        score,
+        scores_of(over),
         margins,
-        _exceedances(run, cells, over, score, kind, margins),
         quieter,
         band,
         tuple(remarks),
@@ -421,7 +439,7 @@ def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
 
 def share_of_motion(run: Levels, other: Levels) -> float:
     """Share of a run that lies on the motion of another."""
-    aligned = _aligned(run, [other], run.joints) if len(run.guide) and len(other.guide) else []
+    aligned = _aligned(run, [other], run.joints)
     return aligned[0][1].share if aligned else 0.0
 
 
@@ -473,14 +491,15 @@ def _over_repetitions(
     run: Levels, aligned: "Paths", cells: Cells
 ) -> tuple[Real32, NDArray[np.bool_]]:
     """Exceedance over the loudest repetition, NaN without one, and frames that one covers."""
-    loudest = cells.unknown(len(run.guide))
+    own = cells.of(run)
+    loudest = np.full_like(own, np.nan)
     for each, path in aligned:
         loud = _spread(cells.of(each))[path.frame]
         loud[~path.same] = np.nan
         np.fmax(loudest, loud, out=loudest)
         del loud  # as large as a run
     floor = _floor([each for each, _ in aligned], cells)
-    over = _raised(cells.of(run), floor) - _raised(loudest, floor)
+    over = _raised(own, floor) - _raised(loudest, floor)
     return over, np.any([path.same for _, path in aligned], axis=0)
 
 
@@ -496,56 +515,39 @@ def _over_others(
     Velocities contain the desired motion, which is another one: tracking errors count where they
     are known.
     """
-    found = cells.unknown(len(rows))
+    mine = cells.of(run)[rows]
+    found = np.full_like(mine, np.nan)
     shared = [j for j in cells.joints if all(j in each.joints for each in references)]
     frames = sum(len(each.guide) for each in references)
     if not shared or not frames:
         return found
     every = -(-frames // POOL)
-    near, close = _nearest(run, rows, references, shared, apart, every)
-    level = np.concatenate([_spread(cells.of(each))[::every] for each in references])
-    level[np.isnan(level)] = -np.inf
-    floor, mine = _floor(references, cells, OTHERS_FLOOR), cells.of(run)[rows]
-    at_once = max(1, ROWS // len(cells.joints))
-    for first in range(0, len(rows), at_once):
-        own = slice(first, first + at_once)
-        known = close[own, :, None, None, None]
-        loudest = np.where(known, level[near[own]], np.float32(-np.inf)).max(axis=1)
-        loudest[~np.isfinite(loudest)] = np.nan
-        found[own] = _raised(mine[own], floor) - _raised(loudest, floor)
-    tracked = np.isfinite(found[:, :, 1]).any(axis=(0, 2))
-    found[:, tracked, 0] = np.nan
-    return found
-
-
-def _nearest(
-    run: Levels,
-    rows: NDArray[np.int64],
-    references: Sequence[Levels],
-    joints: Sequence[str],
-    apart: float,
-    every: int,
-) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Of every so many-th moment of references, those of the nearest speeds, and which are near."""
     speed = np.concatenate(
-        [each.speed[::every, [each.joints.index(j) for j in joints]] for each in references]
+        [each.speed[::every, [each.joints.index(j) for j in shared]] for each in references]
     )
     time = np.concatenate([(each.time - each.start)[::every] for each in references])
+    level = np.concatenate([_spread(cells.of(each))[::every] for each in references])
     scale = speed.std(axis=0) + 0.05
-    wanted = run.speed[rows][:, [run.joints.index(j) for j in joints]] / scale
-    speed = speed / scale
-    near = np.empty((len(rows), min(NEAREST, len(speed))), dtype=np.int32)
-    close = np.empty(near.shape, dtype=bool)
+    wanted = run.speed[rows][:, [run.joints.index(j) for j in shared]] / scale
+    speed, when = speed / scale, run.time[rows] - run.start
+    floor, count = _floor(references, cells, OTHERS_FLOOR), min(NEAREST, len(speed))
     for first in range(0, len(rows), ROWS):
         own = slice(first, first + ROWS)
         part = wanted[own]
         square = (part**2).mean(1)[:, None] + (speed**2).mean(1) - 2 * part @ speed.T / len(scale)
         if apart:
-            when = run.time[rows[own]] - run.start
-            square[np.abs(when[:, None] - time) < apart] = np.inf
-        near[own] = np.argpartition(square, near.shape[1] - 1, axis=1)[:, :NEAREST]
-        close[own] = np.take_along_axis(square, near[own], axis=1) <= NEAR**2
-    return near, close
+            square[np.abs(when[own, None] - time) < apart] = np.inf
+        near = np.argpartition(square, count - 1, axis=1)[:, :count].copy()  # the rest is large
+        close = np.take_along_axis(square, near, axis=1) <= NEAR**2
+        loudest = np.full_like(mine[own], np.nan)
+        for place in range(count):  # one by one: levels of all of them are large
+            loud = level[near[:, place]]
+            loud[~close[:, place]] = np.nan
+            np.fmax(loudest, loud, out=loudest)
+        found[own] = _raised(mine[own], floor) - _raised(loudest, floor)
+    tracked = np.isfinite(found[:, :, 1]).any(axis=(0, 2))
+    found[:, tracked, 0] = np.nan
+    return found
 
 
 def _quieter(run: Levels, aligned: "Paths", cells: Cells) -> float:
@@ -561,45 +563,8 @@ def _quieter(run: Levels, aligned: "Paths", cells: Cells) -> float:
 
 def _band(aligned: "Paths", cells: Cells) -> Array:
     """Quietest and loudest repetition at each frame of the run, shape (frames, 2)."""
-    low = high = np.full(len(aligned[0][1].frame), np.nan)
-    for each, path in aligned:
-        noise = np.where(path.same, cells.noise(each)[path.frame], np.nan)
-        low, high = np.fmin(low, noise), np.fmax(high, noise)
-    return np.stack((low, high), axis=1)
-
-
-def _exceedances(
-    run: Levels,
-    cells: Cells,
-    over: Real32,
-    score: Array,
-    kind: NDArray[np.int8],
-    margins: Mapping[Kind, Margin],
-) -> tuple[Exceedance, ...]:
-    limit = np.array([margins[k].db if k in margins else np.inf for k in KINDS])[kind]
-    loud = np.flatnonzero(np.nan_to_num(score, nan=-np.inf) > limit)
-    if not len(loud):
-        return ()
-    time, level, found = run.time, cells.of(run), list[Exceedance]()
-    for group in np.split(loud, np.flatnonzero(np.diff(loud) * HOP > GAP) + 1):
-        exceeded = np.nan_to_num(over[group], nan=-np.inf)
-        place = np.unravel_index(exceeded.argmax(), exceeded.shape)
-        frame, joint, signal, octave = map(int, place)
-        row = group[frame]
-        evidence = Evidence(
-            KINDS[kind[row]].value,
-            round(float(exceeded.max()), 2),
-            round(float(time[row]), 4),
-            cells.joints[joint],
-            SIGNALS[signal],
-            cells.octaves[octave],
-            round(float(level[row, joint, signal, octave]), 2),
-        )
-        # A frame reaches 0.1 s to each side; what is loud in it begins about its middle.
-        start = max(run.start, time[group[0]] - HOP)
-        stop = min(run.start + run.duration, time[group[-1]] + HOP)
-        found.append(Exceedance(float(start), float(stop), evidence))
-    return tuple(found)
+    noise = [np.where(path.same, cells.noise(each)[path.frame], np.nan) for each, path in aligned]
+    return np.stack((np.fmin.reduce(noise), np.fmax.reduce(noise)), axis=1)
 
 
 # --- alignment
@@ -631,11 +596,12 @@ Paths: TypeAlias = list[tuple[Levels, Aligned]]
 def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> Paths:
     """Where the run lies in each of the others, by the joints that all have; nothing without one.
 
-    Positions count from zero if some are integrated.
+    What is shorter than a frame lies nowhere. Positions count from zero if some are integrated.
     """
+    others = [each for each in others if len(each.guide)]
     runs = (run, *others)
     shared = [j for j in joints if all(j in each.joints for each in runs)]
-    if not shared:
+    if not shared or not len(run.guide):
         return []
     places = [[each.joints.index(j) for j in shared] for each in runs]
     guides = [each.guide[:, at].astype(np.float64) for each, at in zip(runs, places, strict=True)]
