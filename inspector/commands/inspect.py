@@ -158,14 +158,9 @@ def _page(run: Path, output: Path, request: Request) -> None:
 
     require("a report")
     found, verdict, beside = _analysed(opened(run, request.reading), request)
-    html.write(
-        found,
-        output,
-        audit=text(found.name, found.audit),
-        verdict=verdict,
-        beside=beside,
-        overwrite=request.overwrite,
-    )
+    audit = text(found.name, found.audit)
+    page = html.page(found, audit=audit, verdict=verdict, beside=beside)
+    write_whole(output, page, overwrite=request.overwrite)
     typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
 
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -26,7 +25,7 @@ from inspector.reference.judging import Comparison
 from inspector.reference.verdicts import seen
 from inspector.report import annotated, facts, note, sentence, spoken
 from inspector.report.formats import COUNTED, case_of, groups, summary
-from inspector.report.picture import picture, require
+from inspector.report.picture import picture
 from inspector.text import counted, natural
 from inspector.verdict import Verdict, read_results
 from noisemodel.files import write_whole
@@ -70,12 +69,6 @@ section p { margin: .2rem 0; }
 svg { border: 1px solid var(--line); } circle { fill: #0072b2; } .step { color: #d55e00; }
 line { stroke: #d55e00; stroke-width: 2; stroke-dasharray: 6 4; }
 """
-
-
-def write(analysis: Analysis, path: Path, *, overwrite: bool = False, **shown: Any) -> None:
-    """Write the page of an inspected run, whole or not at all; see `page`."""
-    require("a report")
-    write_whole(path, page(analysis, **shown), overwrite=overwrite)
 
 
 def page(
