@@ -18,7 +18,6 @@ from inspector.library import Library, load_library
 from inspector.logs.read import left_out, sources
 from inspector.reference import store
 from inspector.reference.difference import Difference, difference
-from inspector.reference.difference import Gate as DifferenceGate
 from inspector.reference.verdicts import Gate, References, classes_found, still_absent
 from inspector.report.formats import DIFF_FORMATS, FORMATS, text
 from inspector.report.picture import over_reference, require
@@ -199,9 +198,14 @@ def diff(
         outputs[report] = partial(worst, folder=report)
     found = difference(reference, candidate, library, margin=margin, unknown=unknown, jobs=where)
     _name_failed(found.failed)
-    gate = DifferenceGate(fail_on != "worse", fail_on != "new", on_bad_input == "fail")
     drawn = report / PICTURE if report and any(row.worst for row in found.rows) else None
-    found = replace(found, gate=gate, picture=drawn)
+    found = replace(
+        found,
+        new_fails=fail_on != "worse",
+        worse_fails=fail_on != "new",
+        unread_fails=on_bad_input == "fail",
+        picture=drawn,
+    )
     shared.end(found.exit_status, shared.written(found, DIFF_FORMATS[format], outputs))
 
 

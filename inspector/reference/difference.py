@@ -5,7 +5,7 @@ verdict on it depends neither on the order of scenarios nor on their number.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -102,30 +102,24 @@ class Row:
         return tuple(each for each in self.findings if each.kind != RESOLVED)
 
 
-@dataclass(frozen=True)
-class Gate:
-    """What fails beside broken scenarios: new or louder findings, worse ones, files not read."""
-
-    new: bool = False
-    worse: bool = True
-    failed: bool = True  # they always do if there are no others
-
-
 @dataclass(frozen=True, eq=False)
 class Difference:
     """What became of all scenarios, the worst first."""
 
     rows: tuple[Row, ...]
-    failed: tuple[Verdict, ...] = ()  # on files that cannot be compared, or that show a bug
-    gate: Gate = field(default_factory=Gate)
-    margin: float = 0.0  # the least one, in [dB]
+    failed: tuple[Verdict, ...]  # on files that cannot be compared, or that show a bug
+    margin: float  # the least one, in [dB]
+    # What fails beside broken scenarios: new or louder findings, worse ones, files not read, which
+    # always do if there are no others.
+    new_fails: bool = False
+    worse_fails: bool = True
+    unread_fails: bool = True
     picture: Path | None = None  # of the worst scenario
 
     @property
     def outcome(self) -> Outcome:
         """The worst of all scenarios."""
-        outcomes = (row.outcome for row in self.rows)
-        return min(outcomes, key=ORDER.index, default=Outcome.INCONCLUSIVE)
+        return self.rows[0].outcome if self.rows else Outcome.INCONCLUSIVE
 
     @property
     def alone(self) -> tuple[Row, ...]:
@@ -134,8 +128,8 @@ class Difference:
 
     def status(self, row: Row) -> Status:
         """Whether a scenario fails."""
-        worse = row.outcome is Outcome.WORSE and self.gate.worse
-        if row.outcome in BROKEN or worse or (row.new and self.gate.new):
+        worse = row.outcome is Outcome.WORSE and self.worse_fails
+        if row.outcome in BROKEN or worse or (row.new and self.new_fails):
             return Status.FINDINGS
         return Status.CANNOT_TELL if row.outcome is Outcome.INCONCLUSIVE else Status.OK
 
@@ -147,7 +141,7 @@ class Difference:
         bad = [
             EXIT[each.status]
             for each in self.failed
-            if self.gate.failed or each.status is Status.INTERNAL_ERROR or not self.rows
+            if self.unread_fails or each.status is Status.INTERNAL_ERROR or not self.rows
         ]
         return worst_code([*told, *bad])
 
@@ -159,9 +153,9 @@ class _Run(NamedTuple):
     levels: Levels
     labels: Labels | None
 
-    def compare(self, name: str, scenarios: Sequence[Scenario]) -> tuple[Comparison, Verdict]:
-        """Compare it, as of a scenario, with the other side; and the verdict on it beside that."""
-        found = compare(replace(self.levels, name=name), scenarios)
+    def compare(self, scenarios: Sequence[Scenario]) -> tuple[Comparison, Verdict]:
+        """Compare it with the other side; and the verdict on it beside that."""
+        found = compare(self.levels, scenarios)
         other = Reference(self.verdict.path, tuple(scenarios))
         return found, beside(self.verdict, found, other, self.labels)
 
@@ -192,13 +186,12 @@ def difference(
             name = "".join(side)
     rows = _rows(sides[0], sides[1], margin)
     rows.sort(key=lambda row: (ORDER.index(row.outcome), not row.new, row.name))
-    result = Difference(tuple(rows), tuple(failed), margin=margin)
-    if all(sides) and len(result.alone) == len(rows):
+    if all(sides) and all(row.outcome in ALONE for row in rows):
         here, there = (", ".join(list(side)[:3]) for side in sides)
         raise InspectorError(
             f"{before} and {after} have no scenario in common by name ({here} and {there})"
         )
-    return result
+    return Difference(tuple(rows), tuple(failed), margin)
 
 
 def _classified(
@@ -234,7 +227,7 @@ def _rows(
             rows.append(Row(name, Outcome.MISSING, why, _paths(runs)))
     every = [scenario for each in known.values() for scenario in each]
     for name in [name for name in after if name not in before]:
-        verdicts = [each.compare(name, every)[1] for each in after[name]]
+        verdicts = [each.compare(every)[1] for each in after[name]]
         new, paths = tuple(_findings(verdicts, (), NEW)), _paths(after[name])
         rows.append(Row(name, Outcome.ADDED, "only after", (), paths, findings=new))
     return rows
@@ -248,9 +241,9 @@ def _row(
     least: float,
 ) -> Row:
     """Compare a scenario."""
-    found, verdicts = zip(*(each.compare(name, scenarios) for each in later), strict=True)
+    found, verdicts = zip(*(each.compare(scenarios) for each in later), strict=True)
     others = of_runs([each.levels for each in later])
-    back, were = zip(*(each.compare(name, others) for each in earlier), strict=True)
+    back, were = zip(*(each.compare(others) for each in earlier), strict=True)
     margin = max([least, *(each.margins[Kind.REPETITIONS].db for each in found if each.scenarios)])
     scores = [each.worst for each in found if each.scenarios and np.isfinite(each.worst)]
     changes = _changes(found)

@@ -43,6 +43,11 @@ REPEATED = r"\d+% by \d+ repetitions? of "  # what the line on the reference say
 AMOUNT = r"^\d+% (?=by )|^[\d.]+ dB (?=quieter)"
 # Onsets this close in repetitions are one row, in [s]: the hop of frames is 0.1 s or 0.2 s.
 TOGETHER = 0.25
+# What is written for characters that mean more: in GitHub's commands and their properties, in code
+# in a cell of Markdown, and outside of code.
+COMMAND = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
+PROPERTY = COMMAND | str.maketrans({":": "%3A", ",": "%2C"})
+CODE, HTML = str.maketrans({"|": "\\|", "`": "'"}), str.maketrans({"&": "&amp;", "<": "&lt;"})
 COUNTED = WORDS | {Status.FINDINGS: "with findings"}  # how people count them
 
 # What a case is as a test, by its element in JUnit XML.
@@ -165,25 +170,18 @@ def github(job: Job) -> str:
     shown = [*bad[: max(ANNOTATIONS // 2, ANNOTATIONS - len(failed))], *failed][:ANNOTATIONS]
     lines = [_annotation("error", case) for case in shown]
     lines += [_annotation("warning", case) for case in skipped[:ANNOTATIONS]]
-    lines += [f"::notice::{_escaped(job.remark)}"] if job.remark else []
+    lines += [f"::notice::{job.remark.translate(COMMAND)}"] if job.remark else []
     left = len(bad) + len(failed) - len(shown)
     more = f"; {left} more are not shown here" if left else ""
     if len(job.cases) > 1 or not lines:
-        lines += [f"::notice title=noise-inspector::{_escaped(job.summary)}{more}"]
+        lines += [f"::notice title=noise-inspector::{job.summary.translate(COMMAND)}{more}"]
     return "\n".join(lines)
 
 
 def _annotation(kind: str, case: Case) -> str:
-    file, name = (
-        _escaped(each).replace(":", "%3A").replace(",", "%2C")
-        for each in (str(case.path), case.name)
-    )
+    file, name = (each.translate(PROPERTY) for each in (str(case.path), case.name))
     title = "" if name == file else f",title={name}"
-    return f"::{kind} file={file}{title}::{_escaped(f'{case.status}: {case.told}')}"
-
-
-def _escaped(value: str) -> str:
-    return value.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return f"::{kind} file={file}{title}::{f'{case.status}: {case.told}'.translate(COMMAND)}"
 
 
 def sarif(job: Job) -> str:
@@ -277,16 +275,12 @@ def markdown(job: Job) -> str:
 
 def _cell(value: object) -> str:
     """A text that stays in its cell, and is no HTML."""
-    line = " ".join(str(value).split())
-    for mark, written in (("&", "&amp;"), ("<", "&lt;"), ("|", "\\|"), ("`", "'")):
-        line = line.replace(mark, written)
-    return line
+    return " ".join(str(value).split()).translate(CODE | HTML)
 
 
 def _code(path: object) -> str:
     """A path that stays in its cell."""
-    line = " ".join(str(path).split())
-    return f"`{line.replace('`', chr(39)).replace('|', chr(92) + '|')}`"
+    return f"`{' '.join(str(path).split()).translate(CODE)}`"
 
 
 def _cut(head: list[str], lines: list[str], room: int) -> list[str]:
@@ -404,7 +398,7 @@ def groups(verdicts: Iterable[Verdict], *, by_run: bool = False) -> list[tuple[l
     ]
 
 
-def table(rows: Sequence[Sequence[str]], gap: str = "   ") -> list[str]:
+def table(rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of cells, each column as wide as its widest cell.
 
     A row of fewer cells ends with a sentence, which may reach over the columns to its right.
@@ -415,7 +409,8 @@ def table(rows: Sequence[Sequence[str]], gap: str = "   ") -> list[str]:
     lines = []
     for cells in rows:
         pairs = zip(cells, widths, strict=False)
-        lines.append(gap.join(cell.ljust(width) for cell, width in pairs if width or cell).rstrip())
+        shown = [cell.ljust(width) for cell, width in pairs if width or cell]
+        lines.append("   ".join(shown).rstrip())
     return lines
 
 
@@ -677,7 +672,7 @@ def _diff_summary(found: Difference) -> str:
 
 def _of_difference(found: Difference) -> Job:
     """All scenarios as cases, and the files that cannot be compared."""
-    outcome = ERROR if found.gate.failed else SKIPPED
+    outcome = ERROR if found.unread_fails else SKIPPED
     cases = [_of_row(found, each) for each in found.rows]
     cases += [replace(case_of([each]), outcome=outcome, seconds=0.0) for each in found.failed]
     title, number = "Noise beside the runs before", _diff_counts(found)
