@@ -371,9 +371,8 @@ def leave_one_moment_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
     found = []
     for run in repetitions:
         cells, rows = Cells.shared(run, repetitions), np.arange(len(run.guide))
-        if cells.joints and cells.octaves and len(rows):
-            over = _over_others(run, rows, repetitions, cells, apart=APART)
-            found.append(_top(scores_of(over)))
+        over = _over_others(run, rows, repetitions, cells, apart=APART)
+        found.append(_top(scores_of(over)))
     return tuple(score for score in found if np.isfinite(score))
 
 

@@ -140,11 +140,11 @@ def junit(job: Job) -> str:
         lines = [case.message] if case.message and (case.sentences or not case.outcome) else []
         lines += case.notes
         if case.outcome:
-            sentences = case.sentences or (case.message,)
-            element = ET.SubElement(node, case.outcome, message=_plain("; ".join(sentences)))
+            element = ET.SubElement(node, case.outcome, message=_plain(case.told))
             if case.outcome != SKIPPED:
                 element.set("type", _plain(case.kind))
-            element.text = _plain("\n".join([*sentences, *filter(None, [case.trace])]))
+            parts = [*(case.sentences or [case.message]), *filter(None, [case.trace])]
+            element.text = _plain("\n".join(parts))
         if case.picture is not None:
             lines.append(f"[[ATTACHMENT|{case.picture}]]")
         if lines:
