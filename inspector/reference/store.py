@@ -332,11 +332,11 @@ def wanted_in(
     for run in runs:
         for event in events.get(run.run, ()):
             inside = (run.time >= event.start - TOLERANCE) & (run.time <= event.stop + TOLERANCE)
-            level = np.nan_to_num(run.level[inside], nan=LEAST_DB)
-            joint = run.joints[int(level.max(axis=(0, 2, 3)).argmax())] if level.size else ""
-            top = float(level.max(initial=LEAST_DB))
+            level = run.level[inside]
+            tops = np.fmax.reduce(level, axis=(0, 2, 3), initial=LEAST_DB)
+            joint = run.joints[int(tops.argmax())] if level.size else ""
             start, stop = event.start - run.start - TOLERANCE, event.stop - run.start + TOLERANCE
-            heard[run.name, event.label].append((start, stop, joint, top))
+            heard[run.name, event.label].append((start, stop, joint, float(tops.max())))
     found: dict[str, list[Expected]] = defaultdict(list)
     for (name, label), every in heard.items():
         for start, stop in union(np.array([each[:2] for each in every])).tolist():

@@ -132,16 +132,13 @@ def _root(run: Path, store: Path) -> Path | None:
     full, top = run.resolve(), store.resolve().parent
     if not full.is_relative_to(top):
         return None
-    parts = run.parts
-    depth = len(full.relative_to(top).parts)
-    return Path(*parts[: len(parts) - depth + 1]) if depth > 1 else run.parent
+    below = max(1, len(full.relative_to(top).parts) - 1)
+    return Path(*run.parts[: len(run.parts) - below])
 
 
 def _asked(scenario: Scenario, folder: Path, top: Path) -> bool:
     """Whether a folder should hold runs of a scenario: all of it, unless it is a part of it."""
-    if not folder.is_relative_to(top) or len(folder.relative_to(top).parts) < 2:
-        return True
-    inside = folder.relative_to(top).parts[1:]
+    inside = folder.relative_to(top).parts[1:] if folder.is_relative_to(top) else ()
     return all(
         Path(each.run).parts[-len(inside) - 1 : -1] == inside for each in scenario.repetitions
     )

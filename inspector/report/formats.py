@@ -214,8 +214,7 @@ def sarif(job: Job) -> str:
         "toolExecutionNotifications": notes,
     }
     driver = {"name": "noise-inspector", "version": program_version(), "rules": rules}
-    remark = {"remark": job.remark} if job.remark else {}
-    about = {"counts": job.counts, **remark}
+    about = {"counts": job.counts} | ({"remark": job.remark} if job.remark else {})
     run = {"tool": {"driver": driver}, "invocations": [invocation], "results": results}
     whole = {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [{**run, "properties": about}]}
     return json.dumps(whole, indent=2)
@@ -689,10 +688,9 @@ def _of_row(found: Difference, of: diff.Row) -> Case:
         lines = [of.reason, *(str(each) for each in of.changes[:1] if worse), *lines]
     fails = status is Status.FINDINGS
     others = [] if fails else [line for line in lines if line != of.reason]
-    worst = [path for path in of.after if of.worst and str(path) == of.worst.run.run]
     return Case(
         name=of.name,
-        path=(worst or of.after or of.before)[0],
+        path=Path(of.worst.run.run) if of.worst else (of.after or of.before)[0],
         status=of.outcome,
         words=of.outcome.upper() if fails else of.outcome,
         outcome=OUTCOMES[status],

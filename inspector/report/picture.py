@@ -14,7 +14,6 @@ from inspector.errors import InspectorError
 from inspector.levels import Scale, extremes, spectrogram
 from inspector.reference.judging import Comparison
 from inspector.report import classes_of, spoken
-from noisemodel.noise import decibel
 from noisemodel.types import Array
 
 if TYPE_CHECKING:
@@ -233,7 +232,7 @@ def _spectrum(axes: "Axes", analysis: Analysis) -> None:
     run, worst = analysis.run, worst_joint(analysis)
     fast = worst_signal(analysis, worst)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
-    level = np.where(spectrum.valid, 2 * decibel(spectrum.amplitude), np.nan)
+    level = np.where(spectrum.valid, spectrum.decibel, np.nan)
     scale = levels.SPECTRUM.following(spectrum.decibel)
     _heat(axes, spectrum.time, spectrum.frequency, level, scale)
     if len(spectrum.frequency) > 1:
