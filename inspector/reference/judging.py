@@ -622,12 +622,9 @@ def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:
     held = [np.pad(each / scale, ((PAD, PAD), (0, 0)), mode="edge") for each in repetitions]
     thin = int(np.ceil(np.sqrt(len(run) * max(map(len, held)) / LARGEST)))
     paths = _paths(run[::thin], [each[::thin] for each in held], -(-PAD // thin))
-    if thin > 1:
-        at = np.arange(len(run)) / thin
-        paths = [np.round(np.interp(at, np.arange(len(p)), p * thin)).astype(int) for p in paths]
-    found = []
-    for path, other, repetition in zip(paths, held, repetitions, strict=True):
-        path = np.clip(path, 0, len(other) - 1)
+    at, found = np.arange(len(run)) / thin, []
+    for thinned, other, repetition in zip(paths, held, repetitions, strict=True):
+        path = np.round(np.interp(at, np.arange(len(thinned)), thinned * thin)).astype(int)
         residual = np.abs(run - other[path]).max(axis=1)
         inside = (path >= PAD) & (path < PAD + len(repetition))
         residual[inside & ~_comparable(path)] = np.inf
