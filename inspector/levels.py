@@ -6,14 +6,14 @@ samples come in, it is fixed.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspector import colors
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating_pieces
-from noisemodel.runfile import rows_at_once
+from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask, Real
 
 STEP = 0.05  # time over which a level is taken, in [s]
@@ -159,15 +159,9 @@ def window_length(rate: float) -> int:
 
 def amplitudes(windows: Array) -> Array:
     """Amplitude spectra of Hann windows, each freed of its mean."""
-    hann = _hann(windows.shape[1])
+    hann = np.hanning(windows.shape[1] + 1)[:-1]  # periodic
     centred = windows - windows.mean(axis=1, keepdims=True)
     return np.asarray(np.abs(np.fft.rfft(centred * hann, axis=1))[:, 1:] * 2 / hann.sum())
-
-
-@lru_cache(maxsize=4)
-def _hann(length: int) -> Array:
-    """Periodic Hann window."""
-    return np.hanning(length + 1)[:-1]
 
 
 def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
@@ -179,19 +173,12 @@ def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
         return time, np.asarray(values, dtype=np.float64)
     size = -(-len(time) // (points // 2))
     starts = np.arange(0, len(time), size)
-    thin = np.empty((2 * len(starts), values.shape[1]))
-    many = size * max(1, rows_at_once(values) // size)
-    parts = [_buckets(values[first : first + many], size) for first in range(0, len(time), many)]
-    thin[0::2] = np.concatenate([least for least, _ in parts])
-    thin[1::2] = np.concatenate([greatest for _, greatest in parts])
+    thin = np.empty((len(starts), 2, values.shape[1]))
+    for rows in pieces(values, size):
+        buckets = slice(rows.start // size, -(-rows.stop // size))
+        series = np.ascontiguousarray(values[rows].T)  # several times as fast for a few of them
+        for which, extreme in enumerate((np.minimum, np.maximum)):
+            found = extreme.reduceat(series, starts[buckets] - rows.start, axis=1)
+            thin[buckets, which] = found.T
     halves = np.minimum(starts + size // 2, len(time) - 1)
-    return time[np.stack((starts, halves), axis=1).ravel()], thin
-
-
-def _buckets(values: Real, size: int) -> tuple[Real, Real]:
-    """Least and greatest values of the buckets of a piece, shape (buckets, series) each."""
-    whole = len(values) // size * size
-    parts = [values[:whole].reshape(-1, size, values.shape[1]), values[None, whole:]]
-    parts = [part for part in parts if part.size]
-    least = np.concatenate([part.min(axis=1) for part in parts])
-    return least, np.concatenate([part.max(axis=1) for part in parts])
+    return time[np.stack((starts, halves), axis=1).ravel()], thin.reshape(-1, values.shape[1])
