@@ -9,7 +9,7 @@ resumes there; a complete one is only read.
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import groupby
 from math import isnan, nan
@@ -21,10 +21,10 @@ import noisemodel as nm
 from inspector.analysis import extents
 from inspector.audit.signals import without_placeholder
 from inspector.errors import InspectorError, OptionError
-from inspector.library import lines, signals_of
+from inspector.library import Events, lines, signals_of
 from inspector.logs.clocks import without_hold
 from inspector.logs.mapping import check_joints
-from inspector.text import progress
+from inspector.text import counted, progress
 from inspector.verdict import resumed
 from noiseclassifier import Assessment
 from noiseclassifier.jsontext import from_json
@@ -47,8 +47,6 @@ from noisemodel.parallel import DIED, Jobs, in_order
 
 # A recording, and the run file that it is of.
 Read = tuple[nc.Recording | nc.Unanswered, nm.Run | None]
-# Findings by their frames, and from onset to end.
-Located = tuple[tuple[nc.Event, ...], tuple[nc.Event, ...]]
 ANY_RATE = "general"  # the profile of a model for any rate
 RATE = 10_000.0  # rate of a model of one rate unless another is given, in [Hz]
 MANY = 500  # logs above which a general model learns from a part of the quiet `ok` frames,
@@ -106,15 +104,16 @@ def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
     wanted = min(max(slower.rate, LOWEST), HIGHEST) if rate is None else rate
     held = rate is None or slower.rate >= rate * (1 - NOMINAL)
     chosen = slower if held else run
+    in_folder = path.parent.name == run.robot
+    name, facts = f"{run.robot}/{path.stem}" if in_folder else path.stem, _facts(run)
     if chosen.rate < wanted * (1 - NOMINAL):
-        reason = f"rate {chosen.rate:g} Hz < {wanted:g} Hz"
-        return nc.Unanswered(_name(path, run.robot), _facts(run), reason), None
+        return nc.Unanswered(name, facts, f"rate {chosen.rate:g} Hz < {wanted:g} Hz"), None
     lower = min(wanted, chosen.rate)
     decimated = nm.decimated(chosen, lower)
     if not (decimated.blocks or "events" in run.meta or bare_too):
         raise InspectorError(f"{path}: has no annotated blocks")
     found = nc.Recording(
-        name=_name(path, run.robot),
+        name=name,
         signal=signals_of(decimated),
         rate=lower,
         blocks=tuple(nc.Block(b.start, b.stop, b.label) for b in decimated.blocks),
@@ -122,7 +121,7 @@ def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
         valid=decimated.mask,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         events=_faults(path, chosen),
-        facts=_facts(run),
+        facts=facts,
     )
     return found, run
 
@@ -144,11 +143,6 @@ def _apart(
         name = f"{robot}/{folder}/{rest}" if rest else f"{one.name} ({folder})"
     taken.add(name)
     return one if name == one.name else replace(one, name=name)
-
-
-def _name(path: Path, robot: str | None) -> str:
-    """Name of a run file: with its robot before, if its folder is named so."""
-    return f"{robot}/{path.stem}" if path.parent.name == robot else path.stem
 
 
 def _facts(run: nm.Run) -> dict[str, str]:
@@ -190,31 +184,29 @@ def count(inputs: Sequence[Path]) -> int:
     )
 
 
-@dataclass(frozen=True)
-class LeftOut:
-    """Runs that a profile cannot be trained on."""
+def annotated(
+    found: Iterable[nc.Recording | nc.Unanswered], rate: float, left_out: dict[str, list[str]]
+) -> Iterator[nc.Recording]:
+    """Annotated recordings of a rate in [Hz]; names of the others come to ``left_out``, by reason.
 
-    runs: dict[str, list[str]] = field(default_factory=dict)  # their names, by reason
+    A profile cannot be trained on those.
+    """
+    for each in found:
+        if isinstance(each, nc.Recording) and each.blocks:
+            yield each
+            continue
+        below = isinstance(each, nc.Unanswered)
+        reason = f"below {rate:g} Hz" if below else "without annotated blocks"
+        left_out.setdefault(reason, []).append(each.name)
 
-    def without(
-        self, found: Iterable[nc.Recording | nc.Unanswered], profile: nc.Profile
-    ) -> Iterator[nc.Recording]:
-        """Recordings that have all signals of a profile, at its rate; notes the others."""
-        for each in found:
-            if isinstance(each, nc.Recording) and each.blocks:
-                yield each
-                continue
-            below = isinstance(each, nc.Unanswered)
-            reason = f"below {profile.rate:g} Hz" if below else "without annotated blocks"
-            self.runs.setdefault(reason, []).append(each.name)
 
-    def __str__(self) -> str:
-        if not self.runs:
-            return "no run was left out"
-        counts = [f"{len(names)} {reason}" for reason, names in self.runs.items()]
-        first = next(iter(self.runs.values()))
-        counts[0] = counts[0].replace(" ", " run " if len(first) == 1 else " runs ", 1)
-        return f"left out: {', '.join(counts)}, e.g. {first[0]}"
+def _told(left_out: Mapping[str, Sequence[str]]) -> str:
+    """Runs that are left out in a line: how many for each reason, and the name of one."""
+    if not left_out:
+        return "no run was left out"
+    (reason, first), *others = left_out.items()
+    more = "".join(f", {len(names)} {why}" for why, names in others)
+    return f"left out: {counted(len(first), 'run')} {reason}{more}, e.g. {first[0]}"
 
 
 def train(
@@ -225,8 +217,8 @@ def train(
     *,
     part: str = "all",
     overwrite: bool = False,
-) -> tuple[nc.Evaluation, LeftOut]:
-    """Train a model and write it.
+) -> tuple[nc.Evaluation, str]:
+    """Train a model and write it; its evaluation on the same runs, and a line on those left out.
 
     Runs below the rate and those without an annotation are left out; a desired velocity that is a
     placeholder is none, as in `inspector classify`.
@@ -239,20 +231,20 @@ def train(
         part: The part of the recordings to train on.
         overwrite: Whether a file that exists may be replaced.
     """
-    general = profile == ANY_RATE
-    if general and rate is not None:
+    chosen = None
+    if profile != ANY_RATE:
+        chosen = profile_at(profile, RATE if rate is None else rate)
+    elif rate is not None:
         raise OptionError(f"profile {profile} is for any rate; leave out --rate {rate:g}")
-    rate = None if general else RATE if rate is None else rate
-    chosen = nc.ANY.at(LOWEST, (nc.NOISE,)) if rate is None else profile_at(profile, rate)
     refuse_existing(output, overwrite=overwrite)
-    left_out = LeftOut()
-    files = count(inputs)
+    files, left_out = count(inputs), dict[str, list[str]]()
     thin = THIN if files > MANY else 1
-    read = progress(classified(inputs, rate, part, bare_too=True), "read", total=files)
-    usable = left_out.without((recording for recording, _ in read), chosen)
+    taken = None if chosen is None else chosen.rate
+    read = progress(classified(inputs, taken, part, bare_too=True), "read", total=files)
+    usable = annotated((recording for recording, _ in read), taken or LOWEST, left_out)
     model: nc.Classifier | nc.General
     try:
-        if general:
+        if chosen is None:
             parts = list(nc.frames_of(usable, nc.ANY, thin=thin))
             if not parts:
                 raise nc.NoFrameError(0, nc.ANY.classes)
@@ -262,11 +254,11 @@ def train(
             frames = nc.Dataset.of(usable, chosen)
             model = nc.Classifier.train(frames, chosen)
     except nc.NoFrameError as error:
-        if error.count or not left_out.runs:
+        if error.count or not left_out:
             raise
-        raise InspectorError(f"no run to train {profile} on; {left_out}") from error
+        raise InspectorError(f"no run to train {profile} on; {_told(left_out)}") from error
     model.save(output, overwrite=overwrite)
-    return model.evaluate(frames), left_out
+    return model.evaluate(frames), _told(left_out)
 
 
 def profile_at(name: str, rate: float) -> nc.Profile:
@@ -293,7 +285,7 @@ def evaluate(
             source[recording.name] = run
             yield recording
 
-    def localise(recording: nc.Recording, labels: nc.Labels) -> Located:
+    def localise(recording: nc.Recording, labels: nc.Labels) -> tuple[Events, Events]:
         run = source[recording.name]
         if run is None:  # NoisyTest's noise, as the motion of one joint
             velocity = nc.signals.stacked(recording.signal, (nc.NOISE,))[:, None]
@@ -326,24 +318,11 @@ WIDTH = 10  # least width of a column, in characters
 ROWS = 10  # best points that are printed; the results file has all
 
 
-@dataclass(frozen=True, kw_only=True)
-class Search:
-    """The settings of a grid search."""
-
-    training: Sequence[Path]  # annotated runs, folders of them, or NoisyTest folders
-    validation: Sequence[Path] = ()  # without any, the training set is folded
-    part: str = "all"  # of all these recordings
-    folds: int = 5
-    profile: str = "noisytest-rbf"  # one of ``PROFILES``
-    rate: float = 10_000.0  # of the model, in [Hz], to which faster runs are decimated
-    grid: Sequence[str] = ("paper",)  # texts that `Grid.of` reads
-
-
 @dataclass(frozen=True, eq=False)
 class Tuned:
     """The results of a grid search."""
 
-    search: Search
+    profile: str  # one of ``PROFILES``
     grid: Grid
     profiles: Sequence[nc.Profile]  # of each point
     measures: Sequence[Measures]  # of each point
@@ -354,18 +333,14 @@ class Tuned:
     @property
     def ranked(self) -> list[int]:
         """Indices of the points, best first; ties stay in the order of the grid."""
-        keys = list(map(rank, self.measures))
-        return sorted(range(len(keys)), key=keys.__getitem__)
+        return sorted(range(len(self.measures)), key=lambda point: rank(self.measures[point]))
 
     def train(self, output: Path, *, overwrite: bool = False) -> None:
         """Train the best point on the whole training set, and write the model."""
         best = self.profiles[self.ranked[0]]
-        learn, check = list(self.trial.recordings), list[nc.Recording]()
-        if self.search.validation:
-            ((first, second),) = self.trial.splits
-            learn, check = [learn[i] for i in first], [learn[i] for i in second]
-        examples = nc.Dataset.of(learn, best)
-        validation = nc.Dataset.of(check, best, training=False) if check else None
+        examples = self.trial.examples(best, training=True)  # of folds, these are all
+        folded = len(self.trial.splits) > 1
+        validation = None if folded else self.trial.examples(best, training=False)
         trained = nc.Classifier.train(examples, best, validation=validation)
         trained.save(output, overwrite=overwrite)
 
@@ -398,10 +373,10 @@ class Tuned:
         splits = self.trial.splits
         trained = len({index for learn, _ in splits for index in learn.tolist()})
         others = f"{len(set(self.reference.runs.tolist()))} others"
-        if not self.search.validation:
+        if len(splits) > 1:
             others = f"the same, in {len(splits)} folds"
         return (
-            f"{len(self.grid)} points of {self.search.profile}, trained on"
+            f"{len(self.grid)} points of {self.profile}, trained on"
             f" {self.reference.training_frames} frames of {trained} recordings, measured on"
             f" {len(self.reference.truth)} frames of {others}"
         )
@@ -417,54 +392,61 @@ class Tuned:
 
 
 def tune(
-    search: Search,
+    training: Sequence[Path],
     output: Path,
     *,
-    model: Path | None = None,
-    jobs: Jobs = 1,
-    overwrite: bool = False,
+    validation: Sequence[Path],
+    number_of_folds: int,
+    part: str,
+    profile: str,
+    rate: float,
+    grid: Sequence[str],
+    model: Path | None,
+    jobs: Jobs,
+    overwrite: bool,
 ) -> Tuned:
     """Measure the points of a grid that a results file does not have yet.
 
     Args:
+        validation: Runs to measure on; without any, those of the training set are folded.
+        rate: Rate of the model, in [Hz], to which faster runs are decimated.
+        grid: Texts that `Grid.of` reads.
         model: A model file to write afterwards; if it exists, it is refused before the work.
     """
     if model:
         refuse_existing(model, overwrite=overwrite)
-    base = profile_at(search.profile, search.rate)
-    grid = Grid.of(search.grid, base.kernel)
-    points, profiles = list(grid.points()), grid.profiles(base)
-    training, validation = (
-        _read_part(search, paths, base) for paths in (search.training, search.validation)
-    )
-    trial = _trial(training, validation, search.folds)
-    facts = {
-        "grid": {name: list(values) for name, values in grid.axes.items()},
-        "profile": {k: v for k, v in base.as_dict().items() if k not in grid.axes},
-        "training_set": _digests(training),
-        "validation_set": _digests(validation),
-        "number_of_folds": None if validation else search.folds,
+    base = profile_at(profile, rate)
+    axes = Grid.of(grid, base.kernel)
+    points, profiles = list(axes.points()), axes.profiles(base)
+    learn, check = (_read_part(paths, base, part) for paths in (training, validation))
+    trial = _trial(learn, check, number_of_folds)
+    settings = {
+        "grid": {name: list(values) for name, values in axes.axes.items()},
+        "profile": {k: v for k, v in base.as_dict().items() if k not in axes.axes},
+        "training_set": _digests(learn),
+        "validation_set": _digests(check),
+        "number_of_folds": None if check else number_of_folds,
         "software": versions(),
     }
     reference = validate([base], trial)  # first: data that cannot be trained on leave no file
-    with opened(output, facts, points, overwrite=overwrite) as (done, append):
+    with opened(output, settings, points, overwrite=overwrite) as (done, append):
         least = BATCHES * (jobs if isinstance(jobs, int) else WORKERS)
-        batches = _batches(points[len(done) :], profiles[len(done) :], least)
-        one, names = partial(measure, trial=trial), list(grid.axes)
-        found = in_order(one, batches, jobs=jobs, died=partial(_died, names=names))
+        batches = _batches(profiles[len(done) :], axes, least)
+        one, died = partial(measure, trial=trial), partial(_died, names=list(axes.axes))
+        found = in_order(one, batches, jobs=jobs, died=died)
         for measures in progress(found, "tune", total=len(batches)):
             append(measures)
-    return Tuned(search, grid, profiles, done, base, reference, trial)
+    return Tuned(profile, axes, profiles, done, base, reference, trial)
 
 
-def _read_part(search: Search, paths: Sequence[Path], base: nc.Profile) -> list[nc.Recording]:
-    left_out = LeftOut()
-    read = (one for one, _ in classified(paths, search.rate, search.part, bare_too=True))
-    found = list(left_out.without(read, base))
+def _read_part(paths: Sequence[Path], base: nc.Profile, part: str) -> list[nc.Recording]:
+    left_out: dict[str, list[str]] = {}
+    read = (one for one, _ in classified(paths, base.rate, part, bare_too=True))
+    found = list(annotated(read, base.rate, left_out))
     if paths and not found:
         names = ", ".join(map(str, paths))
-        reason = f"; {left_out}" if left_out.runs else ""
-        raise InspectorError(f"{names}: no recording (of part {search.part!r}){reason}")
+        reason = f"; {_told(left_out)}" if left_out else ""
+        raise InspectorError(f"{names}: no recording (of part {part!r}){reason}")
     return found
 
 
@@ -473,27 +455,22 @@ def _trial(
 ) -> Trial:
     if not validation:
         return Trial(training, folds([group_of(recording.name) for recording in training], count))
-
-    def name(one: nc.Recording) -> str:
-        # Not one of the training set: both folders of NoisyTest have the same names.
-        plain = group_of(one.name) == one.name
-        return f"{one.name} of the validation set" if plain else one.name
-
-    check_apart(
-        {one.name: one.sha256 for one in training}, {name(one): one.sha256 for one in validation}
-    )
+    # A name may be there twice: both folders of NoisyTest have the same names.
+    other = {
+        f"{one.name}{' of the validation set' * (group_of(one.name) == one.name)}": one.sha256
+        for one in validation
+    }
+    check_apart({one.name: one.sha256 for one in training}, other)
     return Trial.against(training, validation)
 
 
-def _batches(
-    points: Sequence[Point], profiles: Sequence[nc.Profile], least: int
-) -> list[list[nc.Profile]]:
+def _batches(profiles: Sequence[nc.Profile], grid: Grid, least: int) -> list[list[nc.Profile]]:
     """Points in groups that share their features, or their kernel matrix if those are too few."""
     found: list[list[nc.Profile]] = []
     for fast in (ESTIMATOR_SETTINGS, ("regularization",)):
-        keys = [tuple(v for name, v in point.items() if name not in fast) for point in points]
-        pairs = groupby(zip(keys, profiles, strict=True), key=lambda pair: pair[0])
-        found = [[profile for _, profile in group] for _, group in pairs]
+        slow = [name for name in grid.axes if name not in fast]
+        groups = groupby(profiles, key=lambda each: [getattr(each, name) for name in slow])
+        found = [list(group) for _, group in groups]
         if len(found) >= least:
             break
     return found
@@ -536,10 +513,26 @@ def opened(
     Returns:
         The measures of the first points, and a function that appends those of the next ones.
     """
-    refused, header = partial(_refused, path), {"format": FORMAT, **settings}
-    what = "results of tuning"
+
+    def refused(problem: str) -> InspectorError:
+        how = "name another file, or overwrite it (--overwrite)"
+        return InspectorError(f"{path}: {problem}; {how}")
+
+    header, what = {"format": FORMAT, **settings}, "results of tuning"
+    names, done = [field.name for field in fields(Measures)], list[Measures]()
     with resumed(path, header, refused, what=what, afresh=overwrite) as (rows, write):
-        done = _measures(path, rows, points)
+        if len(rows) > len(points):
+            raise refused(f"is damaged: {len(rows)} points of {len(points)}")
+        for number, (row, point) in enumerate(zip(rows, points, strict=False), start=2):
+            try:
+                found = from_json(row)
+                values = [nan if found[name] is None else float(found[name]) for name in names]
+                fits = {name: found[name] for name in point} == point
+            except (ValueError, KeyError, TypeError, OverflowError):
+                fits = False
+            if not fits:
+                raise refused(f"is damaged in line {number}")
+            done.append(Measures(*values))
 
         def append(measures: Sequence[Measures]) -> None:
             for each in measures:
@@ -547,26 +540,3 @@ def opened(
                 done.append(each)
 
         yield done, append
-
-
-def _refused(path: Path, problem: str) -> InspectorError:
-    return InspectorError(f"{path}: {problem}; name another file, or overwrite it (--overwrite)")
-
-
-def _measures(path: Path, rows: Sequence[bytes], points: Sequence[Point]) -> list[Measures]:
-    """The measures in the rows, which must be of these points."""
-    if len(rows) > len(points):
-        raise _refused(path, f"is damaged: {len(rows)} points of {len(points)}")
-    names = [field.name for field in fields(Measures)]
-    measures = []
-    for number, (row, point) in enumerate(zip(rows, points, strict=False), start=2):
-        try:
-            found = from_json(row)
-            values = [nan if found[name] is None else float(found[name]) for name in names]
-            fits = {name: found[name] for name in point} == point
-        except (ValueError, KeyError, TypeError, OverflowError):
-            fits = False
-        if not fits:
-            raise _refused(path, f"is damaged in line {number}")
-        measures.append(Measures(*values))
-    return measures

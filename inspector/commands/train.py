@@ -83,17 +83,19 @@ def tune(
     """Tune a profile's settings by grid search; resumes if killed."""
     if validation and folds:
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
-    search = learning.Search(
-        training=training,
+    tuned = learning.tune(
+        training,
+        output,
         validation=validation or (),
+        number_of_folds=folds or 5,
         part=part,
-        folds=folds or 5,
         profile=profile,
         rate=rate,
         grid=grid or ("paper",),
+        model=train,
+        jobs=shared.jobs_or_dask(jobs, dask),
+        overwrite=overwrite,
     )
-    where = shared.jobs_or_dask(jobs, dask)
-    tuned = learning.tune(search, output, model=train, jobs=where, overwrite=overwrite)
     typer.echo(dumps(tuned.as_dict(), indent=2) if as_json else tuned.table())
     if train:
         tuned.train(train, overwrite=overwrite)
