@@ -1,5 +1,7 @@
 """Commands that inspect runs: `view`, `noise`, `listen`, `live` and `robots`."""
 
+import io
+import sys
 from contextlib import suppress
 from csv import DictWriter
 from dataclasses import dataclass
@@ -36,29 +38,12 @@ from inspector.report.picture import require
 from inspector.text import cell, progress
 from inspector.verdict import EXPECTED, Verdict
 from noisemodel.compare import COMPARED
-from noisemodel.files import refuse_existing, replacing, write_whole
+from noisemodel.files import refuse_existing, write_whole
 
 # --- view
 
 SUFFIXES = ("", ".rrd", ".png", ".html")  # of what is written; without a suffix a recording
-
-Shown = Annotated[
-    list[Path] | None,
-    argument("Run files or logs; else the demo."),
-]
-Target = Annotated[
-    Path | None, option("Write a recording .rrd, a picture .png or a .html.", "--output", "-o")
-]
-At = Annotated[float | None, option("Time of a picture, in s; else the worst finding.")]
-Web = Annotated[bool, option("Serve it to a browser on this machine until Ctrl-C.", "--web")]
-Port = Annotated[int, option("Port of --web; 0 takes a free one.", min=0, max=65535)]
-Align = Annotated[
-    Literal["auto", "start", "none"] | None,
-    option("Align two runs by motion (auto), or several by start."),
-]
-GoodRuns = Annotated[
-    Path | None, option("Show where one run is louder than these good ones.", "--reference")
-]
+OF_ONE = (".png", ".html")  # what is of one run
 
 
 @dataclass(frozen=True)
@@ -76,15 +61,24 @@ class Request:
 
 def view(
     ctx: typer.Context,
-    runs: Shown = None,
-    output: Target = None,
+    runs: Annotated[list[Path] | None, argument("Run files or logs; else the demo.")] = None,
+    output: Annotated[
+        Path | None, option("Write a recording .rrd, a picture .png or a .html.", "--output", "-o")
+    ] = None,
     model: shared.ModelFiles = None,
     kind: shared.Kind = "normal",
-    at: At = None,
-    web: Web = False,
-    port: Port = 0,
-    align: Align = None,
-    reference: GoodRuns = None,
+    at: Annotated[float | None, option("Time of a picture, in s; else the worst finding.")] = None,
+    web: Annotated[
+        bool, option("Serve it to a browser on this machine until Ctrl-C.", "--web")
+    ] = False,
+    port: Annotated[int, option("Port of --web; 0 takes a free one.", min=0, max=65535)] = 0,
+    align: Annotated[
+        Literal["auto", "start", "none"] | None,
+        option("Align two runs by motion (auto), or several by start."),
+    ] = None,
+    reference: Annotated[
+        Path | None, option("Show where one run is louder than these good ones.", "--reference")
+    ] = None,
     overwrite: shared.Overwrite = False,
 ) -> None:
     """Show a run, or several side by side.
@@ -102,74 +96,50 @@ def view(
         raise typer.BadParameter("name one of --web and -o")
     together = f"{paths[0].stem}-and-{len(paths) - 1}" if len(paths) > 1 else paths[0].stem
     target = output or viewer.scratch_path(paths[0].with_name(f"{together}.npz"))
-    library = load_library(model)
-    overwrite = overwrite or output is None
+    library, overwrite = load_library(model), overwrite or output is None
     request = Request(ctx.obj, library, kind, at, align, reference, overwrite)
     _check(paths, target, request)
-    refuse_existing(target, overwrite=overwrite)
-    if target.suffix.lower() in (".png", ".html"):
-        write = _picture if target.suffix.lower() == ".png" else _page
-        write(paths[0], target, request)
-        return
-    found = _read(paths, request.reading)
-    write_recording = _one if len(found) == 1 else _two if len(paths) == 2 else _several
-    write_recording(found, target, request)
-    _show(target, web=web, port=port, saved=output is not None)
+    suffix = target.suffix.lower()
+    found = _read(paths, ctx.obj, said=suffix in OF_ONE)
+    if suffix == ".png":
+        _picture(paths[0], found[0], target, request)
+    elif suffix == ".html":
+        _page(found[0], target, request)
+    else:
+        write = _one if len(found) == 1 else _two if len(paths) == 2 else _several
+        write(found, target, request)
+        _show(target, web=web, port=port, saved=output is not None)
     if len(found) < len(paths):
         raise typer.Exit(EXIT[Status.BAD_INPUT])
 
 
 def _check(paths: list[Path], target: Path, asked: Request) -> None:
     """Refuse options that do not go together, and what cannot be written."""
+    from inspector.recording import viewer
+
     suffix, several = target.suffix.lower(), len(paths) > 1
     if suffix not in SUFFIXES:
         raise typer.BadParameter(f"{target}: name a .rrd, .png or .html file", param_hint="'-o'")
-    of_one = "--reference" if asked.reference else suffix if suffix in (".png", ".html") else ""
+    of_one = "--reference" if asked.reference else suffix if suffix in OF_ONE else ""
     if of_one and several:
         raise typer.BadParameter(f"{of_one} takes one run")
     if asked.align and (not several or (asked.align == "auto" and len(paths) > 2)):
         raise typer.BadParameter("--align takes two runs or more, --align auto two")
     if suffix != ".png" and asked.at is not None:
         raise typer.BadParameter("--at takes -o FILE.png")
+    refuse_existing(target, overwrite=asked.overwrite)
+    if suffix == ".png":
+        viewer.require_driver()
+    if suffix == ".html":
+        require("a report")
 
 
-def _picture(run: Path, output: Path, request: Request) -> None:
-    """Write a PNG of what the viewer shows, without a display."""
-    from inspector.recording import viewer
-    from inspector.recording.run import write
-
-    viewer.require_driver()
-    source, at = opened(run, request.reading), request.at
-    first, last = (float(source.run.time[place]) for place in (0, -1))
-    if at is not None and not first <= at <= last:
-        raise typer.BadParameter(f"--at {at:g}: the samples are from {first:g} s to {last:g} s")
-    found, _, beside = _analysed(source, request)
-    seconds = sonification.worst_time(found) if at is None else at
-    with TemporaryDirectory() as folder:
-        recording = Path(folder) / "run.rrd"
-        write(found, recording, beside=beside)
-        viewer.shoot(recording, output, seconds, overwrite=request.overwrite)
-    typer.echo(f"{output}: {run} at {seconds:.2f} s")
-
-
-def _page(run: Path, output: Path, request: Request) -> None:
-    """Write one HTML page about a run: findings, picture, sound."""
-    from inspector.report import html
-
-    require("a report")
-    found, verdict, beside = _analysed(opened(run, request.reading), request)
-    audit = text(found.name, found.audit)
-    page = html.page(found, audit=audit, verdict=verdict, beside=beside)
-    write_whole(output, page, overwrite=request.overwrite)
-    typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
-
-
-def _read(paths: list[Path], reading: Reading) -> list[Opened]:
-    """Open the runs that can be read, and name the others; their remarks are printed later."""
+def _read(paths: list[Path], reading: Reading, *, said: bool) -> list[Opened]:
+    """Open the runs that can be read, and name the others; remarks are ``said``, or come later."""
     found = []
     for path in paths:
         try:
-            found.append(opened(path, reading, said=False))
+            found.append(opened(path, reading, said=said))
         except EXPECTED as error:
             if len(paths) == 1:
                 raise
@@ -189,6 +159,35 @@ def _analysed(run: Opened, request: Request) -> tuple[Analysis, Verdict | None, 
     verdict, beside = references(found, Verdict.of(path, found))
     verdict = references.judge(verdict, None, date.today())
     return seen(found, verdict), verdict, beside
+
+
+def _picture(path: Path, run: Opened, output: Path, request: Request) -> None:
+    """Write a PNG of what the viewer shows, without a display."""
+    from inspector.recording import viewer
+    from inspector.recording.run import write
+
+    at = request.at
+    first, last = (float(run.run.time[place]) for place in (0, -1))
+    if at is not None and not first <= at <= last:
+        raise typer.BadParameter(f"--at {at:g}: the samples are from {first:g} s to {last:g} s")
+    found, _, beside = _analysed(run, request)
+    seconds = sonification.worst_time(found) if at is None else at
+    with TemporaryDirectory() as folder:
+        recording = Path(folder) / "run.rrd"
+        write(found, recording, beside=beside)
+        viewer.shoot(recording, output, seconds, overwrite=request.overwrite)
+    typer.echo(f"{output}: {path} at {seconds:.2f} s")
+
+
+def _page(run: Opened, output: Path, request: Request) -> None:
+    """Write one HTML page about a run: findings, picture, sound."""
+    from inspector.report import html
+
+    found, verdict, beside = _analysed(run, request)
+    audit = text(found.name, found.audit)
+    page = html.page(found, audit=audit, verdict=verdict, beside=beside)
+    write_whole(output, page, overwrite=request.overwrite)
+    typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
 
 
 def _one(runs: list[Opened], target: Path, request: Request) -> None:
@@ -214,8 +213,7 @@ def _two(runs: list[Opened], target: Path, request: Request) -> None:
     from inspector.compare import Align, changes, compare, summary, write
 
     before, after = runs
-    how = Align(request.align or "auto")
-    pair = compare(before, after, request.library, how=how)
+    pair = compare(before, after, request.library, how=Align(request.align or "auto"))
     write(pair, target, overwrite=request.overwrite)
     typer.echo(f"{before.source.shown} → {after.source.shown}: {summary(pair)}")
     typer.echo(f"  aligned {pair.alignment}")
@@ -241,11 +239,10 @@ def _show(target: Path, *, web: bool, port: int, saved: bool) -> None:
     if web:
         viewer.serve(target, lambda url: typer.echo(f"open {url}"), port=port)
         return
-    problem = ""
-    if not saved and viewer.has_display():
-        problem = viewer.open_window(target)
-        if not problem:
-            return
+    opens = not saved and viewer.has_display()
+    problem = viewer.open_window(target) if opens else ""
+    if opens and not problem:
+        return
     typer.echo(f"recording: {target} ({target.stat().st_size / 1e6:.1f} MB)")
     typer.echo(viewer.how_to_open(target))
     if problem:
@@ -254,22 +251,20 @@ def _show(target: Path, *, web: bool, port: int, saved: bool) -> None:
 
 # --- noise
 
-NoiseRuns = Annotated[list[Path] | None, argument("A run file or log; with --compare several.")]
-Kinds = Annotated[
-    list[str] | None, option("simplified, paper, A, B, C, mean, rms, normal; repeatable.")
-]
-Csv = Annotated[Path | None, option("Write the noise over time, or all numbers.")]
-Compare = Annotated[bool, option("Compare noise models on run files with positions.", "--compare")]
-Robots = Annotated[str, option("Compare them on robots that move: talos,go2 or all.")]
-
 
 def noise(
     ctx: typer.Context,
-    runs: NoiseRuns = None,
-    kind: Kinds = None,
-    csv: Csv = None,
-    compare: Compare = False,
-    robots: Robots = "",
+    runs: Annotated[
+        list[Path] | None, argument("A run file or log; with --compare several.")
+    ] = None,
+    kind: Annotated[
+        list[str] | None, option("simplified, paper, A, B, C, mean, rms, normal; repeatable.")
+    ] = None,
+    csv: Annotated[Path | None, option("Write the noise over time, or all numbers.")] = None,
+    compare: Annotated[
+        bool, option("Compare noise models on run files with positions.", "--compare")
+    ] = False,
+    robots: Annotated[str, option("Compare them on robots that move: talos,go2 or all.")] = "",
     jobs: shared.NumberOfJobs = 1,
     overwrite: shared.Overwrite = False,
 ) -> None:
@@ -320,14 +315,12 @@ def write_numbers(found: nm.Comparisons, path: Path, *, overwrite: bool = False)
             return f"{value:g}" if name == "rate_hz" else f"{value:.4f}"
         return cell(value) if isinstance(value, str) else int(value)
 
-    with (
-        replacing(path, overwrite=overwrite) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = DictWriter(file, rows.column_names, lineterminator="\n")
-        writer.writeheader()
-        for row in rows.to_pylist():
-            writer.writerow({name: shown(name, value) for name, value in row.items()})
+    told = io.StringIO(newline="")
+    writer = DictWriter(told, rows.column_names, lineterminator="\n")
+    writer.writeheader()
+    for row in rows.to_pylist():
+        writer.writerow({name: shown(name, value) for name, value in row.items()})
+    write_whole(path, told.getvalue(), overwrite=overwrite)
 
 
 # --- listen
@@ -363,20 +356,13 @@ def listen(
 
 # --- live
 
-LiveRate = Annotated[float, option("Sampling rate in [Hz].", min=1.0, show_default=False)]
 LiveRobot = Annotated[
     str | None,
     option("The robot to draw: a name that `robots` lists, a URDF or an MJCF (robot.xml)."),
 ]
-Names = Annotated[str, option("Joints in the order of the columns: elbow,wrist,...")]
-SaveLive = Annotated[Path | None, option("Write the recording to this file, open no viewer.")]
 Connect = Annotated[
     str | None, option("Send to the viewer at PORT or HOST:PORT; by default one is opened.")
 ]
-LiveFormat = Annotated[
-    Literal["text", "json"], option("Of findings: lines of text, or JSON lines.")
-]
-FailFast = Annotated[bool, option("End at the first finding that counts.", "--fail-fast")]
 LiveReference = Annotated[
     Path | None,
     option(
@@ -387,15 +373,21 @@ LiveReference = Annotated[
 
 
 def live(
-    rate: LiveRate,
+    rate: Annotated[float, option("Sampling rate in [Hz].", min=1.0, show_default=False)],
     robot: LiveRobot = None,
     package_root: shared.PackageRoot = None,
     limit: shared.Limits = None,
-    names: Names = "",
-    save: SaveLive = None,
+    names: Annotated[str, option("Joints in the order of the columns: elbow,wrist,...")] = "",
+    save: Annotated[
+        Path | None, option("Write the recording to this file, open no viewer.")
+    ] = None,
     connect: Connect = None,
-    format: LiveFormat = "text",  # noqa: A002
-    fail_fast: FailFast = False,
+    format: Annotated[  # noqa: A002
+        Literal["text", "json"], option("Of findings: lines of text, or JSON lines.")
+    ] = "text",
+    fail_fast: Annotated[
+        bool, option("End at the first finding that counts.", "--fail-fast")
+    ] = False,
     reference: LiveReference = None,
     model: shared.ModelFiles = None,
     overwrite: shared.Overwrite = False,
@@ -410,16 +402,13 @@ def live(
 
     Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost, 70 bug.
     """
-    import sys
-
     from inspector.live import LiveError, LiveSession
     from inspector.live.pipe import Gate, follow
 
     del package_root, limit  # have been set
     if sys.stdin.isatty():
-        raise LiveError(
-            "samples are read from standard input; pipe them in: robot | inspector live"
-        )
+        how = "pipe them in: robot | inspector live"
+        raise LiveError(f"samples are read from standard input; {how}")
     known = None if reference is None else Reference.load(reference)
     gate = Gate(_tell, as_json=format == "json", reference=known)
     session = partial(
@@ -430,7 +419,6 @@ def live(
         save=save,
         connect=connect,
         overwrite=overwrite,
-        keep_levels=known is not None,
         on_warning=partial(typer.echo, err=True),
         on_finding=gate.take,
         on_levels=None if known is None else gate.compare,
