@@ -117,7 +117,7 @@ def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path
 
 def export(
     ctx: typer.Context,
-    run: shared.RunFile,
+    run: Annotated[Path, argument("A run file, or any log: CSV, bag, ...")],
     output: Annotated[
         Path,
         option(

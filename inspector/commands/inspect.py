@@ -24,7 +24,7 @@ from inspector.analysis import (
 )
 from inspector.audit import text
 from inspector.commands import shared
-from inspector.commands.shared import argument, opened, option
+from inspector.commands.shared import argument, names_in, opened, option
 from inspector.errors import EXIT, InspectorError, Status
 from inspector.export import sound as sonification
 from inspector.library import Library, demo_run, load_library
@@ -285,8 +285,8 @@ def noise(
         for each in estimates:
             typer.echo(noise_level(recorded, each))
         return
-    names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
-    sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
+    names = list(nm.ROBOTS) if robots == "all" else names_in(robots)
+    sources = list(dict.fromkeys([*(runs or ()), *names]))
     if not sources:
         raise typer.BadParameter("name run files, or robots with --robots")
     if csv:  # before long work is done for it
@@ -425,7 +425,7 @@ def live(
     )
     summary = follow(
         sys.stdin.buffer,
-        tuple(name.strip() for name in names.split(",") if name.strip()),
+        tuple(names_in(names)),
         lambda found: session(joint_names=found),
         enough=lambda: fail_fast and gate.failed,
     )

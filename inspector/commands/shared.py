@@ -14,14 +14,13 @@ from inspector.logs.mapping import check_joints, read_options
 from inspector.logs.motion import limit_warnings
 from inspector.logs.read import Opened, Reading, open_run
 from noisemodel import OutputError, Run
-from noisemodel.files import refuse_existing, write_whole
+from noisemodel.files import LIMITS, refuse_existing, write_whole
 from noisemodel.parallel import Jobs
 
 Result = TypeVar("Result")
 
-# Names that the modules have as well, which would take too long to import here.
+# Those of `noisemodel.KINDS`; a test compares them.
 Kinds = Literal["normal", "rms", "mean", "paper", "A", "B", "C"]
-LIMITS = ("joints", "columns", "triangles", "bodies")
 
 ASSUMED = 100  # most characters of what was assumed of a log, unless all is asked for
 
@@ -34,6 +33,11 @@ def option(text: str, *names: str, **settings: Any) -> Any:
 def argument(text: str) -> Any:
     """An argument by its help."""
     return typer.Argument(help=text, show_default=False)
+
+
+def names_in(text: str) -> list[str]:
+    """Names between commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 # --- checks of values
@@ -56,9 +60,8 @@ def _allow(folder: Path | None) -> Path | None:
 
 
 def _raise_limit(gigabytes: float | None) -> None:
-    if gigabytes is not None:
-        finite(gigabytes)
-        os.environ["NOISE_MAX_UNPACKED"] = str(int(gigabytes * 1e9))
+    if (known := finite(gigabytes)) is not None:
+        os.environ["NOISE_MAX_UNPACKED"] = str(int(known * 1e9))
 
 
 def _raise_limits(limits: list[str] | None) -> None:
@@ -71,12 +74,10 @@ def _raise_limits(limits: list[str] | None) -> None:
 
 # --- what several commands take
 
-RunFile = Annotated[Path, argument("A run file, or any log: CSV, bag, ...")]
 Runs = Annotated[list[Path], argument("Run files, logs, folders of them.")]
 Inputs = Annotated[
     list[Path], argument("Annotated runs, samples, folders of them, or NoisyTest folders.")
 ]
-Output = Annotated[Path, option("The file to write.", "--output", "-o")]
 Overwrite = Annotated[bool, option("Replace a file that exists.", "--overwrite")]
 NumberOfJobs = Annotated[int, option("Parallel processes.", "--jobs", "-j", min=1)]
 Dask = Annotated[

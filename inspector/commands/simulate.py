@@ -2,16 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from inspector.commands import shared
-from inspector.commands.shared import argument, option
-
-if TYPE_CHECKING:
-    from noiseclassifier.scenarios.dataset import Folder
+from inspector.commands.shared import argument, names_in, option
+from inspector.text import progress
 
 
 class OneRunUnlessNamed(TyperGroup):
@@ -37,7 +35,6 @@ List = Annotated[bool, option("Print what there is, simulate nothing.", "--list"
 To = Annotated[Path, option("The folder to write.", "--output", "-o")]
 Jobs = Annotated[int, option("Parallel runs.", "--jobs", "-j", min=1)]
 Seconds = Annotated[float | None, option("In seconds; by default the motion's.", min=3.0)]
-Names = Annotated[str, option("Names of robots, talos,go2,panda; by default all.")]
 
 
 @app.command(epilog="Example: inspector simulate run talos --scenario 7 --seed 1 -o run.npz")
@@ -85,26 +82,19 @@ def dataset(
     as_json: shared.AsJson = False,
 ) -> None:
     """Simulate a data set; resumes if killed: only missing runs are made."""
-    from noiseclassifier.scenarios.dataset import (
-        Folder,
-        described,
-        scenario_tasks,
-        statistics,
-    )
+    from noiseclassifier.scenarios.dataset import Folder, described, scenario_tasks
 
     where = shared.jobs_or_dask(jobs, dask)
-    names, numbers = _listed(robots), _listed(scenarios)
+    names, numbers = names_in(robots), names_in(scenarios)
     tasks = scenario_tasks(names, numbers, first=first_seed, seeds=seeds)
-    folder = Folder.opened(output, duration=duration, rate=rate)
-    _make(folder, folder.missing(tasks), where)
-    found = statistics(folder)
+    found = _filled(Folder.opened(output, duration=duration, rate=rate), tasks, where)
     typer.echo(json.dumps(found, indent=2) if as_json else f"{output}: {described(found)}")
 
 
 @app.command(epilog="Example: inspector simulate domains --seeds 8 -o data/ -j 2")
 def domains(
     output: To = Path(),
-    robots: Names = "",
+    robots: Annotated[str, option("Names of robots, talos,go2,panda; by default all.")] = "",
     seeds: Annotated[int, option("Seeds per robot; each draws a domain.", min=1)] = 8,
     first_seed: Annotated[int, option("The first random seed.", min=10_000)] = 10_000,
     faults: Annotated[int, option("Faulty runs per robot and seed.", min=0)] = 2,
@@ -115,7 +105,7 @@ def domains(
     list_: List = False,
 ) -> None:
     """Simulate wide domains: many robots, drives, controllers, motions; resumes if killed."""
-    from noiseclassifier.scenarios.dataset import Folder, described, statistics, wide_tasks
+    from noiseclassifier.scenarios.dataset import Folder, described, wide_tasks
     from noiseclassifier.scenarios.robots import TARGETS, WIDE
 
     if list_ or output == Path():
@@ -123,20 +113,17 @@ def domains(
         typer.echo(f"{len(sources)} robots to learn from: {', '.join(sources)}")
         typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}")
         return
-    names = _listed(robots)
-    chosen = wide_tasks(names, first=first_seed, seeds=seeds, faults=faults, throughout=throughout)
-    folder = Folder.opened(output, wide=True)
-    _make(folder, folder.missing(chosen), jobs)
-    typer.echo(f"{output}: {described(statistics(folder))}")
+    names = names_in(robots)
+    tasks = wide_tasks(names, first=first_seed, seeds=seeds, faults=faults, throughout=throughout)
+    found = _filled(Folder.opened(output, wide=True), tasks, jobs)
+    typer.echo(f"{output}: {described(found)}")
 
 
-def _make(folder: "Folder", tasks: list[Any], jobs: Any) -> None:
-    from inspector.text import progress
-    from noiseclassifier.scenarios.dataset import make
+def _filled(folder: Any, tasks: list[Any], jobs: Any) -> dict[str, Any]:
+    """Simulate the runs that a folder lacks; statistics of all of it."""
+    from noiseclassifier.scenarios.dataset import make, statistics
 
-    for _ in progress(make(folder, tasks, jobs=jobs), "simulate", total=len(tasks)):
+    missing = folder.missing(tasks)
+    for _ in progress(make(folder, missing, jobs=jobs), "simulate", total=len(missing)):
         pass
-
-
-def _listed(names: str) -> list[str]:
-    return [name.strip() for name in names.split(",") if name.strip()]
+    return statistics(folder)

@@ -15,7 +15,7 @@ from noiseclassifier.assessment import table
 
 def train(
     inputs: shared.Inputs,
-    output: shared.Output,
+    output: Annotated[Path, option("The file to write.", "--output", "-o")],
     profile: Annotated[
         str,
         option(
