@@ -434,25 +434,22 @@ def _standard_output() -> _StandardOutput | None:
         return None
     if plain is None:  # was closed: whatever is written is lost
         watched = _StandardOutput(os.open(os.devnull, os.O_RDONLY), "w")
-        sys.stdout = io.TextIOWrapper(io.BufferedWriter(watched), encoding="utf-8")
-        return watched
-    watched = _StandardOutput(plain.fileno(), "w", closefd=False)
-    sys.stdout = io.TextIOWrapper(
-        io.BufferedWriter(watched), encoding=plain.encoding, errors=plain.errors
-    )
+    else:
+        watched = _StandardOutput(plain.fileno(), "w", closefd=False)
+    encoding = "utf-8" if plain is None else plain.encoding
+    sys.stdout = io.TextIOWrapper(io.BufferedWriter(watched), encoding=encoding)
     return watched
 
 
 def _failed(error: Exception) -> int:
     """Print an expected error as one line, or the traceback of a bug; the exit status."""
+    told, status = str(error), EXIT[Status.INTERNAL_ERROR]  # Python's own would be of a finding
     if isinstance(error, OptionError):  # needs none of the imports below
-        typer.echo(f"inspector: {printable(str(error))}", err=True)
-        return 2
-    if isinstance(error, OSError) and error.filename and error.errno in UNUSABLE:
-        name = Path(os.fsdecode(error.filename))
-        typer.echo(f"inspector: {printable(str(name))}: {error.strerror}", err=True)
-        return OUTPUT_LOST if error.errno in (errno.ENOSPC, errno.EROFS) else 3
-    if isinstance(error, ValueError):
+        status = 2
+    elif isinstance(error, OSError) and error.filename and error.errno in UNUSABLE:
+        told = f"{Path(os.fsdecode(error.filename))}: {error.strerror}"
+        status = OUTPUT_LOST if error.errno in (errno.ENOSPC, errno.EROFS) else 3
+    elif isinstance(error, ValueError):
         import noiseclassifier as nc
         import noisemodel
         from inspector.recording.viewer import DisplayError
@@ -460,13 +457,14 @@ def _failed(error: Exception) -> int:
         from noiseclassifier.scenarios import ScenarioError
 
         if isinstance(error, (*EXPECTED, ScenarioError)):
-            typer.echo(f"inspector: {printable(str(error))}", err=True)
-            if isinstance(error, noisemodel.UnknownKindError):
-                return 2
             output = isinstance(error, (noisemodel.OutputError, nc.OutputError))
             lost = output and isinstance(error.__cause__, OSError)
-            return OUTPUT_LOST if lost or isinstance(error, DisplayError) else 3
-    import traceback
+            status = OUTPUT_LOST if lost or isinstance(error, DisplayError) else 3
+            status = 2 if isinstance(error, noisemodel.UnknownKindError) else status
+    if status == EXIT[Status.INTERNAL_ERROR]:
+        import traceback
 
-    traceback.print_exception(error)
-    return EXIT[Status.INTERNAL_ERROR]  # Python's own would be that of a finding
+        traceback.print_exception(error)
+    else:
+        typer.echo(f"inspector: {printable(told)}", err=True)
+    return status
