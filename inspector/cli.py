@@ -338,14 +338,11 @@ def find_settings() -> tuple[Path, dict[str, Any]] | None:
 
 def settings_of(name: str, path: Path, content: Mapping[str, Any]) -> dict[str, Any]:
     """The settings of a command, by the names of its parameters; refuses unknown ones."""
-    own = {
-        each.opts[0].lstrip("-"): each.name
-        for each in _command(name).params
-        if each.name not in UNSET
-    }
+    params = {each.opts[0].lstrip("-"): each.name for each in _command(name).params}
+    own = {key: parameter for key, parameter in params.items() if parameter not in UNSET}
     shared = SHARED | {each.opts[0].lstrip("-") for each in _command("import").added}
-    top = {key: value for key, value in content.items() if not isinstance(value, dict)}
     tables = {key: value for key, value in content.items() if isinstance(value, dict)}
+    top = {key: value for key, value in content.items() if key not in tables}
     if unknown := next((key for key in tables if key not in MODULES), None):
         raise OptionError(f"{path}: no command {unknown!r}")
     table = tables.get(name, {})

@@ -38,8 +38,6 @@ Verbose = Annotated[
 ReportFolder = Annotated[
     Path | None, option("Write index.html with a picture of each run to this folder.")
 ]
-Resume = Annotated[Path | None, option("Keep verdicts in this file; continue if it exists.")]
-
 Accepted = Annotated[
     Path | None,
     option("Accepted runs, or a folder of good ones; by default the nearest reference/."),
@@ -67,7 +65,9 @@ def classify(
     write: shared.Write = None,
     report: ReportFolder = None,
     overwrite: shared.Overwrite = False,
-    resume: Resume = None,
+    resume: Annotated[
+        Path | None, option("Keep verdicts in this file; continue if it exists.")
+    ] = None,
     unknown: shared.UnknownFrames = Unknown.FINDING,
     reference: Accepted = None,
     no_reference: Annotated[bool, option("Use the general model alone.", "--no-reference")] = False,
@@ -104,10 +104,8 @@ def classify(
     )
     known = {each.path: each for each in progress(classified, "classify", total=len(found))}
     judged = [references.judge(known[path], gate, date.today()) for path in shown]
-    verdicts = [
-        replace(each, ignored=on_bad_input == "ignore" and each.status is Status.BAD_INPUT)
-        for each in judged
-    ]
+    ignored = Status.BAD_INPUT if on_bad_input == "ignore" else None
+    verdicts = [replace(each, ignored=each.status is ignored) for each in judged]
     verdicts += references.absent(verdicts, [each for each in runs if each.is_dir()])
 
     shared.say_assumed({str(each.path): each.assumed for each in verdicts}, verbose=verbose)
@@ -129,12 +127,9 @@ def _classes(given: Sequence[str], library: Library) -> tuple[str, ...]:
     """The classes that fail a run."""
     known = classes_found(library)
     names = [name for each in given for name in each.split(",")]
-    for name in names:
-        if name not in known:
-            raise typer.BadParameter(
-                f"{name!r} is none of {', '.join(known)}{hint(name, known)}",
-                param_hint="'--fail-on-class'",
-            )
+    if (other := next((name for name in names if name not in known), None)) is not None:
+        problem = f"{other!r} is none of {', '.join(known)}{hint(other, known)}"
+        raise typer.BadParameter(problem, param_hint="'--fail-on-class'")
     return tuple(names)
 
 
@@ -194,8 +189,7 @@ def diff(
     if report:
         require("a report")
         shared.prepare(report, *FILES, overwrite=overwrite)
-        worst = partial(_write_worst, library=library, overwrite=overwrite)
-        outputs[report] = partial(worst, folder=report)
+        outputs[report] = partial(_write_worst, folder=report, library=library, overwrite=overwrite)
     found = difference(reference, candidate, library, margin=margin, unknown=unknown, jobs=where)
     _name_failed(found.failed)
     drawn = report / PICTURE if report and any(row.worst for row in found.rows) else None
@@ -382,11 +376,11 @@ def merge(
         for verdict in read_results(path):
             if not verdict.of_run:
                 absent.append(verdict)
-                continue
-            if verdict.path in found:
+            elif verdict.path in found:
                 first = found[verdict.path][1]
                 raise InspectorError(f"{path}: the run {verdict.path} is in {first}, too")
-            found[verdict.path] = verdict, path
+            else:
+                found[verdict.path] = verdict, path
     merged = [verdict for verdict, _ in found.values()]
     merged += still_absent(absent, merged)
     if report is not None:

@@ -1,6 +1,7 @@
 """Commands that import and export: `import` and `export`."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -58,41 +59,40 @@ def _import(paths: Sequence[Path], output: Path, reading: Reading, *, overwrite:
     """Write a run file for each run of some logs, and return the exit status."""
     logs = [log for path in paths for log in logs_in(path)[0]]
     also_reading(logs)
-    several, status = len(logs) > 1, 0
+    several = len(logs) > 1
     if reading.desired and several:
         raise InspectorError(f"{reading.desired}: belongs to one log, {len(logs)} are given")
     jobs: list[tuple[str, Callable[[], Imported]]] = []
+    failed: list[int] = []
     for log in logs:
-        try:
-            found = readers_of(log, reading)
-        except (InspectorError, NoiseModelError) as error:
-            status = _refused(error, status, alone=not several)
-        else:
-            jobs += ((run_name(log, episode), read) for episode, read in found.items())
+        with _refusals(failed, alone=not several):
+            jobs += [(run_name(log, each), read) for each, read in readers_of(log, reading).items()]
     targets = _targets([name for name, _ in jobs], output, several=several)
     for target in targets:
         refuse_existing(target, overwrite=overwrite)
     reads = zip([read for _, read in jobs], targets, strict=True)
     for read, target in progress(reads, "import", total=len(jobs)):
-        try:
+        with _refusals(failed, alone=len(targets) == 1 and not several):
             imported = read()
             run = imported.run
             run.save(target, overwrite=overwrite)
             for remark in (*imported.remarks, *contradictions(run), *limit_warnings(run)):
                 typer.echo(f"  {remark}")
             typer.echo(f"{target}: {run.duration:.2f} s at {run.rate:g} Hz")
-        except (InspectorError, NoiseModelError) as error:
-            status = _refused(error, status, alone=len(targets) == 1 and not several)
-    return status
+    return worst(failed)
 
 
-def _refused(error: Exception, status: int, *, alone: bool) -> int:
-    """Print why a log has no run file, and return the worse status; of one alone, raise it."""
-    if alone:
-        raise error
-    typer.echo(f"inspector: {error}", err=True)
-    lost = isinstance(error, OutputError) and isinstance(error.__cause__, OSError)
-    return worst([status, OUTPUT_LOST if lost else EXIT[Status.BAD_INPUT]])
+@contextmanager
+def _refusals(statuses: list[int], *, alone: bool) -> Iterator[None]:
+    """Print why a log has no run file, and keep the exit status; of one alone, raise it."""
+    try:
+        yield
+    except (InspectorError, NoiseModelError) as error:
+        if alone:
+            raise
+        typer.echo(f"inspector: {error}", err=True)
+        lost = isinstance(error, OutputError) and isinstance(error.__cause__, OSError)
+        statuses.append(OUTPUT_LOST if lost else EXIT[Status.BAD_INPUT])
 
 
 def _targets(names: Sequence[str], output: Path, *, several: bool) -> tuple[Path, ...]:

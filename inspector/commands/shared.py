@@ -118,19 +118,17 @@ Limits = Annotated[
 PackageRoot = Annotated[
     Path | None, option("A further folder of packages, for robots' meshes.", callback=_allow)
 ]
-MaxUnpacked = Annotated[
-    float | None,
-    option("Refuse compressed files that expand beyond this many GB.", callback=_raise_limit),
-]
-Robot = Annotated[
-    str | None, option('Robot name (see `inspector robots`), URDF or MJCF, or "none".')
-]
 
 
 def log_options(
-    robot: Robot = None,
+    robot: Annotated[
+        str | None, option('Robot name (see `inspector robots`), URDF or MJCF, or "none".')
+    ] = None,
     package_root: PackageRoot = None,
-    max_unpacked: MaxUnpacked = None,
+    max_unpacked: Annotated[
+        float | None,
+        option("Refuse compressed files that expand beyond this many GB.", callback=_raise_limit),
+    ] = None,
     limit: Limits = None,
     rate: Annotated[
         float | None, option("Rate of the log in [Hz], if it is known.", min=1.0)
