@@ -301,7 +301,6 @@ def help_(
 # --- settings of a project
 
 FILE = "inspector.toml"
-MOST_BYTES = 2**20
 SHARED = frozenset(("model", "jobs"))  # settings of all commands, besides those on reading logs
 # Settings that are paths, which are meant from the folder of the file.
 PATHS = {"mapping", "desired", "model", "reference", "candidate", "runs", "package-root"}
@@ -315,8 +314,6 @@ def find_settings() -> tuple[Path, dict[str, Any]] | None:
     ``[classify]`` is for one command, with its arguments (``runs``). The command line wins.
     Nothing that is written can be set here: a file must not replace others.
     """
-    import tomllib
-
     start = Path.cwd().absolute()
     for folder in (start, *start.parents):
         path = folder / FILE
@@ -326,13 +323,11 @@ def find_settings() -> tuple[Path, dict[str, Any]] | None:
             return None
     else:
         return None
-    with path.open("rb") as stream:
-        data = stream.read(MOST_BYTES + 1)
+    from noiseclassifier.jsontext import from_toml, text_of
+
     try:
-        if len(data) > MOST_BYTES:
-            raise ValueError("more than 1 MB")
-        return path, tomllib.loads(data.decode())
-    except (ValueError, RecursionError) as error:
+        return path, from_toml(text_of(path))
+    except ValueError as error:
         raise OptionError(f"{path}: cannot be read ({error})") from error
 
 
