@@ -49,8 +49,7 @@ MinScore = Annotated[
     float | None, option("Fail only on findings of this score or more, 0 to 1.", min=0.0, max=1.0)
 ]
 MinDuration = Annotated[
-    float,
-    option("Fail only on findings of so many seconds.", min=0.0, callback=shared.finite),
+    float, option("Fail only on findings of so many seconds.", min=0.0, callback=shared.finite)
 ]
 
 
@@ -166,8 +165,7 @@ def diff(
         float, option("Least margin from which a run is louder, in dB.", min=0.0)
     ] = 0.0,
     report: Annotated[
-        Path | None,
-        option("Write recording, picture and diff.json of the worst to this folder."),
+        Path | None, option("Write recording, picture and diff.json of the worst to this folder.")
     ] = None,
     write: shared.Write = None,
     on_bad_input: shared.OnBadInput = "fail",

@@ -29,8 +29,7 @@ def import_(
         list[Path], argument("CSV, Parquet, HDF5, npz, ROS bags, LeRobot data sets, folders.")
     ],
     output: Annotated[
-        Path | None,
-        option("The run file to write; a folder for several runs.", "--output", "-o"),
+        Path | None, option("The run file to write; a folder for several runs.", "--output", "-o")
     ] = None,
     save_mapping: Annotated[Path | None, option("Save these options as a mapping (TOML).")] = None,
     list_: Annotated[

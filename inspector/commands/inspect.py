@@ -292,10 +292,7 @@ def noise(
     if csv:  # before long work is done for it
         refuse_existing(csv, overwrite=overwrite)
     found = nm.compare(
-        sources,
-        kinds=kinds or COMPARED,
-        jobs=jobs,
-        progress=partial(progress, what="compare"),
+        sources, kinds=kinds or COMPARED, jobs=jobs, progress=partial(progress, what="compare")
     )
     for left_out in found.left_out:
         typer.echo(f"inspector: {left_out.name}: {left_out.reason}", err=True)

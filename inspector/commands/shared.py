@@ -154,8 +154,7 @@ def log_options(
         Path | None, option("Another log, with the desired motion on its own clock.")
     ] = None,
     offset: Annotated[
-        float | None,
-        option("Add to the timestamps of --desired, in seconds; else estimated."),
+        float | None, option("Add to the timestamps of --desired, in seconds; else estimated.")
     ] = None,
 ) -> Reading:
     """Options on reading logs: in the help of `import` only; others take them, too (`cli`)."""
