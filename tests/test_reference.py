@@ -230,8 +230,22 @@ def test_a_reference_of_another_robot_is_told_and_the_general_model_decides(own,
     there, here = "shoulder, upperarm, elbow", "joint0, joint1, joint2"
     told = f"no reference: it is of a robot with joints {there}, and the run of a robot with joints"
     assert f"{told} {here}" in out
+    first = own / "runs" / "pick-1.npz"
+    status, out, err = call("diff", first, own / "pick-1.npz", "--report", own / "page")
+    assert (status, err, f"{told} {here}" in out) == (4, "", True)
+    assert not (own / "page" / "worst.png").exists()
     out = call("accept", own / "pick-1.npz", "--reason", "x", "-o", own / "reference")[1]
     assert "pick: 1 repetition replace the accepted, of a robot with other joints" in out
+
+
+def test_a_base_without_joints_is_not_accepted_and_has_no_reference(own):
+    still, base = np.zeros((3000, 0)), np.random.default_rng(0).normal(size=(3000, 6))
+    path, time = own / "base-1.npz", np.arange(3000) / 1000
+    nm.Run(time=time, joint_names=(), velocity=still, base_velocity=base).save(path)
+    refused = f"inspector: {path}: no joints, whose levels a reference has\n"
+    assert call("accept", path, "--reason", "x")[::2] == (3, refused)
+    out = call("classify", path, "--reference", own / "reference")[1]
+    assert "upperarm, elbow, and the run of a robot without joints" in out
 
 
 def test_what_no_reference_covers_is_decided_by_the_general_model(own, simulate):

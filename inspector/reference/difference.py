@@ -94,7 +94,7 @@ class Row:
     changes: tuple[Change, ...] = ()  # the largest first
     findings: tuple[ChangedFinding, ...] = ()  # new ones first
     remarks: tuple[str, ...] = ()  # what is not compared, and why
-    worst: Comparison | None = field(default=None, repr=False)  # of the run with the largest score
+    worst: Comparison | None = field(default=None, repr=False)  # that has the largest score
 
     @property
     def new(self) -> tuple[ChangedFinding, ...]:
@@ -250,6 +250,7 @@ def _row(
     outcome, reason = _outcome(verdicts, back, scores, margin, changes)
     events = [event for each in were for event in each.events]
     findings = [*_findings(verdicts, events, NEW, least), *_findings(were, (), RESOLVED, least)]
+    shown = [each for each in found if each.over.size]
     return Row(
         name,
         outcome,
@@ -261,7 +262,7 @@ def _row(
         changes,
         tuple(findings),
         tuple(dict.fromkeys(remark for each in found for remark in each.remarks)),
-        max(found, key=lambda each: np.nan_to_num(each.worst, nan=-np.inf)),
+        max(shown, key=lambda each: np.nan_to_num(each.worst, nan=-np.inf), default=None),
     )
 
 

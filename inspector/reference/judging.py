@@ -392,7 +392,8 @@ def _common(
     """Joints and octaves that can be compared, and what cannot."""
     if not known:
         own, *others = (
-            f"{each.robot or 'a robot'} with joints {', '.join(each.joints[:3])}"
+            f"{each.robot or 'a robot'} with{' joints ' if each.joints else 'out joints'}"
+            f"{', '.join(each.joints[:3])}"
             for each in (run, *(scenario.repetitions[-1] for scenario in accepted))
         )
         there = " or ".join(sorted(set(others))) or "nothing"

@@ -133,7 +133,7 @@ def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Lev
         level,
         (_framed(guide, frames) / BINS).astype(np.float32),
         guided_by,
-        np.sqrt(np.mean(np.square(moved), axis=1)).astype(np.float32),
+        np.sqrt(np.square(moved).sum(axis=1) / max(1, moved.shape[1])).astype(np.float32),
     )
 
 

@@ -189,6 +189,8 @@ def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Leve
             for source in sources([path], reading)[0]:
                 opened = open_source(source, reading)
                 name = scenario_of(opened.run, source.shown, root)
+                if not opened.run.joint_names:
+                    raise InspectorError(f"{source.shown}: no joints, whose levels a reference has")
                 run, file = without_placeholder(opened.run)[0], str(source.shown)
                 found.append(levels(run, name=name, file=file, sha256=opened.sha256))
     except NoiseModelError as error:
