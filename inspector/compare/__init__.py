@@ -483,14 +483,15 @@ def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change
     styles = {kind: (kind, shade) for kind, shade in SHADES.items()}
     panels.log_shades(recording, "/level/change", changed, styles, (LOW_DB, HIGH_DB))
     for place, (name, _) in enumerate(pair.sides):
-        views.log_line(recording, f"/level/{name}", time, level[:, place], SIDE_COLORS[name])
+        own, line = level[:, [place]], {name: SIDE_COLORS[name]}
+        views.log_lines(recording, f"/level/{name}", time, own, line)
     views.log_beside(recording, LEVEL, panels.level_axis(), _sides())
     change = level[:, 1] - level[:, 0]
     peak = float(change[np.abs(change).argmax()])
     reach = SPAN_DB * max(float(np.ceil(abs(peak) / SPAN_DB)), 1.0)
-    views.log_line(recording, "/change/noise", time, change, views.INK)
-    nothing = colors.CLASSES["unknown"]
-    views.log_line(recording, "/change/none", time[[0, -1]], np.zeros(2), nothing)
+    views.log_lines(recording, "/change/noise", time, change[:, None], {"noise": views.INK})
+    nothing = {"none": colors.CLASSES["unknown"]}
+    views.log_lines(recording, "/change/none", time[[0, -1]], np.zeros((2, 1)), nothing)
     panels.log_shades(recording, "/change/finding", changed, styles, (-reach, reach))
     marks = [
         Label(0.5 + mark / reach / 2, views.written(mark), 44.0)

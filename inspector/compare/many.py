@@ -251,8 +251,8 @@ def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -
     chosen: Sequence[int] = sorted(several.order[:CURVES])
     for index, color in zip(chosen, colors.of_series(len(chosen)), strict=True):
         time, level = several.levels[index]
-        path, name = f"/curves/{index:03d}", several.names[index]
-        views.log_line(recording, path, time, level, color, name=name)
+        line = {several.names[index]: color}
+        views.log_lines(recording, f"/curves/{index:03d}", time, level[:, None], line)
     told = f"the worst\n{CURVES} runs" if len(several.names) > len(chosen) else "all runs"
     views.log_beside(recording, panel, panels.level_axis(), [Label(0.5, told)])
     paths, ends = ("$origin/**",), (LOW_DB, HIGH_DB)

@@ -38,9 +38,8 @@ def log_gaps(
     if found:
         times = [np.append(np.linspace(*gap, HATCHES + 1), gap[1]) for gap in found]
         stroke = np.append(np.resize(between, HATCHES + 1), np.nan)
-        line, shade = np.tile(stroke, len(found)), colors.CLASSES["unknown"]
-        name = "gap: no samples"
-        views.log_line(recording, f"{path}/gap", np.concatenate(times), line, shade, name=name)
+        values, lines = np.tile(stroke, len(found)), {"gap: no samples": colors.CLASSES["unknown"]}
+        views.log_lines(recording, f"{path}/gap", np.concatenate(times), values[:, None], lines)
 
 
 MAX_JOINTS = 10  # joints that one plot can hold
@@ -122,8 +121,8 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     if labels is not None:
         centres = (labels.start + labels.stop) / 2
         for name, score in zip(labels.classes, labels.scores.T, strict=True):
-            path, called = f"/score/{name}", spoken(name)
-            views.log_line(recording, path, centres, score, colours[name], name=called)
+            line = {spoken(name): colours[name]}
+            views.log_lines(recording, f"/score/{name}", centres, score[:, None], line)
     if rows := listed_events(analysis):
         views.log_events(
             recording,
@@ -305,7 +304,7 @@ def log_noise(
     for (which, side), noise, shade in zip(sides.items(), known, shades, strict=True):
         name = which if len(sides) > 1 else f"noise p\u0302 [{unit}]"
         time, values = extremes(side.run.time[side.run.mask], noise[:, None] / scale, points=points)
-        views.log_line(recording, f"/noise/{which}", time, values[:, 0], shade, name=name)
+        views.log_lines(recording, f"/noise/{which}", time, values, {name: shade})
         peak = float(values.max(initial=peak))
     top = 1.08 * max(peak, 0.01)
     right = right or [Label(min(peak / top, 0.9), f"max\n{peak * scale:.3g}")]
@@ -320,10 +319,10 @@ def _log_level(
     if beside is not None:
         time, level, lowest = beside.time, beside.noise[:, None], beside.octaves[0][0]
         names = [f"{each} repetition [dB re 1 rad/s]" for each in ("quietest", "loudest")]
-        path, band = "/level/repetitions", [colors.BAND, colors.BAND]
-        views.log_lines(recording, path, time, beside.band, names=names, colours=band)
+        band = dict.fromkeys(names, colors.BAND)
+        views.log_lines(recording, "/level/repetitions", time, beside.band, band)
     name = f"noise above {lowest:g} Hz [dB re 1 rad/s]"
-    views.log_line(recording, "/level/noise", time, level[:, 0], colors.LEVEL, name=name)
+    views.log_lines(recording, "/level/noise", time, level, {name: colors.LEVEL})
     peak = float(np.nanmax(level, initial=LOW_DB))
     place = min(max((peak - LOW_DB) / (HIGH_DB - LOW_DB), 0.05), 0.85)
     left = level_axis(f"level above\n{lowest:g} Hz [dB re\n1 rad/s]", -20.0)
@@ -349,11 +348,10 @@ def _log_probability(
     apart = np.flatnonzero(labels.start[1:] > labels.stop[:-1] + 1.0 / run.rate) + 1
     middles = np.insert(middles, apart, labels.start[apart])
     failure = np.insert(failure, apart, np.nan)
-    path, name = "/probability/failure", "probability of a failure"
-    views.log_line(recording, path, middles, failure, colors.LEVEL, name=name)
-    path, name = "/probability/alarm", f"alarm threshold {alarm:g}"
-    ends = run.time[[0, -1]]
-    views.log_line(recording, path, ends, np.full(2, alarm), colors.THRESHOLD, name=name)
+    line = {"probability of a failure": colors.LEVEL}
+    views.log_lines(recording, "/probability/failure", middles, failure[:, None], line)
+    ends, line = run.time[[0, -1]], {f"alarm threshold {alarm:g}": colors.THRESHOLD}
+    views.log_lines(recording, "/probability/alarm", ends, np.full((2, 1), alarm), line)
     title, mark = Label(0.5, "probability\nof a failure"), Label(alarm, f"alarm {alarm:g}")
     views.log_beside(recording, PROBABILITY, [title], [mark])
     return _curve(recording, analysis, PROBABILITY, (0.0, 1.05))
@@ -436,14 +434,8 @@ def log_plots(
                 if own := [name for name in joints if name in signal.joints]:
                     columns = [signal.joints.index(name) for name in own]
                     paths[limb].append(f"{path}/{number}")
-                    views.log_lines(
-                        recording,
-                        paths[limb][-1],
-                        shown,
-                        np.ascontiguousarray(values[:, columns]),
-                        names=[name + suffix for name in own],
-                        colours=[colours[name] for name in own],
-                    )
+                    lines = {name + suffix: colours[name] for name in own}
+                    views.log_lines(recording, paths[limb][-1], shown, values[:, columns], lines)
         for limb, own in paths.items():
             if own:
                 plot = views.plot(title, "/joints", (*own, views.SPAN), legend=True)
@@ -489,7 +481,7 @@ def log_links(
     """Log the noise of a robot's links: levels of those that vibrate most, power, colours."""
     time, level = levels.link_levels(noise)
     power = np.maximum(decibel(noise.total / REFERENCE_POWER), POWER_FLOOR_DB)
-    views.log_line(recording, "/power/total", noise.time, power, colors.NOISE)
+    views.log_lines(recording, "/power/total", noise.time, power[:, None], {"total": colors.NOISE})
     scale = levels.LINKS.following(level)
     log_robot_levels(recording, robot, noise, scale)
     views.log_scale(recording, KEY, scale, "dB re\n1 pW")
@@ -619,12 +611,13 @@ def log_details(
         energy = (vibrating(velocity, valid, run.rate) ** 2).sum(axis=0)
         joints = np.sort(np.argsort(-energy, kind="stable")[:DETAIL_JOINTS])
         path, names = f"/detail/{number}", [run.joint_names[joint] for joint in joints]
-        for kind, lines, values, shades in (
-            ("noise", ["simplified"], analysis.noise[part, None], [colors.NOISE]),
-            ("velocity", names, velocity[:, joints], colors.of_series(len(names))),
+        shades = dict(zip(names, colors.of_series(len(names)), strict=True))
+        for kind, values, lines in (
+            ("noise", analysis.noise[part, None], {"simplified": colors.NOISE}),
+            ("velocity", velocity[:, joints], shades),
         ):
             thin = extremes(run.time[part][valid], values[valid], points=DETAIL_POINTS)
-            views.log_lines(recording, f"{path}/{kind}", *thin, names=lines, colours=shades)
+            views.log_lines(recording, f"{path}/{kind}", *thin, lines)
         title = f"Velocities [rad/s], {spoken(moment.label)} at {moment.peak:.2f} s"
         found += [
             views.plot(title, f"{path}/velocity", legend=True, during=edges),

@@ -12,7 +12,7 @@ findings; the end of a recording's file, and what rerun waits for if it cannot b
 """
 
 import ctypes
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -261,8 +261,7 @@ def log_span(recording: rr.RecordingStream, begin: float, end: float) -> None:
             f"times from {begin:g} s to {end:g} s: a recording holds times within {FARTHEST:g} s;"
             " let the log begin at 0"
         )
-    ends, nothing = np.array([begin, end]), np.full((2, 1), np.nan)
-    log_lines(recording, SPAN, ends, nothing, names=[""], colours=[INK])
+    log_lines(recording, SPAN, np.array([begin, end]), np.full((2, 1), np.nan), {"": INK})
 
 
 def scalars(values: Real) -> list[rr.ComponentColumn]:
@@ -274,35 +273,15 @@ def scalars(values: Real) -> list[rr.ComponentColumn]:
 
 
 def log_lines(
-    recording: rr.RecordingStream,
-    path: str,
-    time: Array,
-    values: Real,
-    *,
-    names: Sequence[str],
-    colours: Sequence[Color],
+    recording: rr.RecordingStream, path: str, time: Array, values: Real, lines: Mapping[str, Color]
 ) -> None:
-    """Log lines, shape (samples, lines), that share their times, in [s]."""
-    style_lines(recording, path, names=names, colours=colours)
+    """Log lines, shape (samples, lines), at times in [s]: each has its name and its colour."""
+    style_lines(recording, path, names=lines, colours=lines.values())
     recording.send_columns(path, indexes=[at(time)], columns=scalars(values))
 
 
-def log_line(
-    recording: rr.RecordingStream,
-    path: str,
-    time: Array,
-    values: Real,
-    color: Color,
-    *,
-    name: str = "",
-) -> None:
-    """Log one line, which is called as its path ends unless it is named."""
-    name = name or path.rpartition("/")[2]
-    log_lines(recording, path, time, values[:, None], names=[name], colours=[color])
-
-
 def style_lines(
-    recording: rr.RecordingStream, path: str, *, names: Sequence[str], colours: Sequence[Color]
+    recording: rr.RecordingStream, path: str, *, names: Collection[str], colours: Iterable[Color]
 ) -> None:
     """Log how the lines of one entity are drawn; see `log_lines`."""
     # Rerun's default aggregation draws the mean of a pixel's extremes, which hides vibration.
