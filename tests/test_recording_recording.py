@@ -501,7 +501,7 @@ def test_a_recording_that_fails_halfway_leaves_nothing(tmp_path, monkeypatch):
         raise InspectorError("broken off")
 
     found = inspected(panda_run(robot=None), tmp_path)
-    monkeypatch.setattr("inspector.recording.run._log_text", break_off)
+    monkeypatch.setattr("inspector.recording.views.blueprint", break_off)
     with pytest.raises(InspectorError, match="broken off"):
         write(found, tmp_path / "out.rrd")
     assert {path.name for path in tmp_path.iterdir()} == {"run.npz"}

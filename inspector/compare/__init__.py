@@ -19,7 +19,7 @@ import rerun as rr
 from inspector import colors
 from inspector.analysis import Analysis, analyse, robot_known, with_links, worst_joint, worst_signal
 from inspector.errors import InspectorError
-from inspector.levels import FLOOR_DB, LINKS, SPECTRUM, STEP, Spectrogram, link_levels, spectrogram
+from inspector.levels import FLOOR_DB, SPECTRUM, STEP, Spectrogram, spectrogram
 from inspector.library import Library
 from inspector.logs.read import Opened, open_run
 from inspector.recording import panels, robot, views
@@ -620,10 +620,8 @@ def _log_robots(recording: rr.RecordingStream, pair: Pair) -> tuple[dict[str, Dr
         for side, (_, camera) in robots.items()
     ]
     drawn = {side: each for side, (each, _) in robots.items()}
-    scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
-    for each, noise in zip(drawn.values(), pair.links, strict=True):
-        panels.log_robot_levels(recording, each, noise, scale)
-    views.log_scale(recording, KEY, scale, "dB re\n1 pW")
+    coloured = list(zip(drawn.values(), pair.links, strict=True))
+    panels.log_robot_levels(recording, coloured, KEY)
     return drawn, [*shown, (views.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 
@@ -656,8 +654,8 @@ def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]
     kinds = {change.kind for change in found}
     worse, better = kinds & {NEW, LOUDER}, kinds & {RESOLVED, QUIETER}
     told = f"{'WORSE' if worse else 'BETTER' if better else 'SAME'}   {_counts(found)}".strip()
-    views.log_verdict(recording, "findings" if worse else "ok", told)
+    verdict = views.log_verdict(recording, "findings" if worse else "ok", told)
     text = views.text("Before \u2192 after", "/report")
     if found:
         text = views.tabs(text, views.events("Changes", "/events"))
-    return views.above((views.drawing("/verdict"), views.VERDICT), (text, ABOVE))
+    return views.above(verdict, (text, ABOVE))

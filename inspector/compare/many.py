@@ -107,7 +107,7 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         views.log_span(recording, begin, end)
         failing = sum(bool(side.findings) for side in several.sides)
         told = f"FAIL   {failing} of {len(several.names)} runs" if failing else "PASS   no finding"
-        views.log_verdict(recording, "findings" if failing else "ok", told)
+        verdict = views.log_verdict(recording, "findings" if failing else "ok", told)
         count = len(several.names)
         room = WHOLE - TABLE - CURVE
         row = min((room / 2 - views.AXIS) / count, HIGHEST)
@@ -124,7 +124,6 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         title = f"{several.names[0]} and {len(several.names) - 1} more"
         log_report(recording, title, report(several), properties)
         rest = WHOLE - views.VERDICT - sum(size for _, size in rows)
-        verdict = (views.drawing("/verdict"), views.VERDICT)
         table = (views.text("Runs", "/report", titled=False), rest)
         whole = views.above(verdict, table, *rows)
         event = several.longest

@@ -17,8 +17,8 @@ from inspector import colors, levels
 from inspector.analysis import SHOWN, Analysis, Moment, chosen, gaps
 from inspector.levels import WINDOW, Scale, Spectrogram, extremes, in_bands
 from inspector.recording import views
-from inspector.recording.robot import Drawn, log_colours
-from inspector.recording.views import Camera, Label, Panel, Part, Timed
+from inspector.recording.robot import Drawn
+from inspector.recording.views import Label, Panel, Part, Timed
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
 from inspector.report import brief, classes_of, finding_of, missed, spoken
@@ -482,9 +482,7 @@ def log_links(
     time, level = levels.link_levels(noise)
     power = np.maximum(decibel(noise.total / REFERENCE_POWER), POWER_FLOOR_DB)
     views.log_lines(recording, "/power/total", noise.time, power[:, None], {"total": colors.NOISE})
-    scale = levels.LINKS.following(level)
-    log_robot_levels(recording, robot, noise, scale)
-    views.log_scale(recording, KEY, scale, "dB re\n1 pW")
+    scale = log_robot_levels(recording, [(robot, noise)], KEY)
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
     edges = np.append(time, noise.time[-1] + width / 2)
     title, which = "Links above 10 Hz", chosen(analysis, time, level)
@@ -492,13 +490,27 @@ def log_links(
 
 
 def log_robot_levels(
-    recording: rr.RecordingStream, robot: Drawn, noise: LinkNoise, scale: Scale
-) -> None:
-    """Colour the links of a robot by their levels; what does not move is as quiet as can be."""
-    time, level = levels.link_levels(noise)
-    rgba = scale.colours(level, shades=ROBOT_SHADES)
-    colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
-    log_colours(recording, robot, time, colours, rest=scale.colours(np.array([-np.inf])))
+    recording: rr.RecordingStream, robots: Sequence[tuple[Drawn, LinkNoise]], key: Panel
+) -> Scale:
+    """Colour the links of robots by their levels on one scale, and log it as the key; the scale.
+
+    What does not move is as quiet as can be.
+    """
+    found = [levels.link_levels(noise) for _, noise in robots]
+    scale = levels.LINKS.following(np.concatenate([level for _, level in found]))
+    rest = rr.Asset3D.from_fields(albedo_factor=scale.colours(np.array([-np.inf])))
+    for (robot, noise), (time, level) in zip(robots, found, strict=True):
+        rgba = scale.colours(level, shades=ROBOT_SHADES)
+        for link in robot.links:
+            if link not in noise.links:
+                recording.log(robot.path(link), rest, static=True)
+                continue
+            own = rgba[:, noise.links.index(link)]
+            changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
+            columns = rr.Asset3D.columns(albedo_factor=own[changed])
+            recording.send_columns(robot.path(link), [views.at(time[changed])], columns)
+    views.log_scale(recording, key, scale, "dB re\n1 pW")
+    return scale
 
 
 def log_strip(
@@ -527,12 +539,6 @@ def log_strip(
         lines=STROKES,
         path=f"/strips/{name}",
     )
-
-
-def robot_view(camera: Camera) -> Part:
-    """A robot, and the scale of its colours."""
-    robot = views.robot("Robot, links coloured by level above 10 Hz", "/robot", camera)
-    return views.beside((robot, 88.0), (views.drawing(f"/axis/{KEY.name}/right"), 12.0))
 
 
 BANDS = 48

@@ -130,7 +130,10 @@ def log_robot(
         raise InspectorError(f"{error}; `--robot none` shows the run without the robot") from error
     carried = _carried(robot)
     meshes = {index: surfaces[index] for index in carried if len(surfaces[index])}
-    outermost = {index: _outermost(mesh.reshape(-1, 3)) for index, mesh in meshes.items()}
+    outermost = {}
+    for index, mesh in meshes.items():
+        corners = mesh.reshape(-1, 3)
+        outermost[index] = corners[np.unique((corners @ DIRECTIONS.T).argmax(axis=0))]
     outermost = outermost or dict.fromkeys(carried, np.zeros((1, 3)))
     drawn = Drawn(robot, f"robot_{side}" if side else "robot", outermost, moves, mimics)
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -147,10 +150,6 @@ def _carried(robot: Robot) -> list[int]:
         if joint.parent in found and joint.kind != "floating":
             found.append(index)
     return found
-
-
-def _outermost(corners: Array) -> Array:
-    return np.asarray(corners[np.unique((corners @ DIRECTIONS.T).argmax(axis=0))])
 
 
 def _stl(triangles: Array) -> bytes:
@@ -200,26 +199,6 @@ def shown(run: Run) -> NDArray[np.intp]:
     step = max(1, round(run.rate / FRAMES_PER_SECOND), -(-len(run.time) // MAX_FRAMES))
     frames = np.arange(0, len(run.time), step)
     return frames[run.mask[frames]]
-
-
-def log_colours(
-    recording: rr.RecordingStream,
-    drawn: Drawn,
-    time: Array,
-    colours: Mapping[str, NDArray[np.uint8]],
-    *,
-    rest: NDArray[np.uint8],
-) -> None:
-    """Log the colours of links over time, shape (steps, 4), and of what does not move."""
-    for link in drawn.links:
-        if link not in colours:
-            still = rr.Asset3D.from_fields(albedo_factor=rest)
-            recording.log(drawn.path(link), still, static=True)
-            continue
-        own = colours[link]
-        changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
-        columns = rr.Asset3D.columns(albedo_factor=own[changed])
-        recording.send_columns(drawn.path(link), [views.at(time[changed])], columns)
 
 
 # Of the viewer's camera, from the lower to the upper edge, in [rad].

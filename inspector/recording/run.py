@@ -36,7 +36,10 @@ def writing(
             recording.disconnect()
         else:
             views.abandon(recording)
-        require_whole(temporary)
+        if not views.has_end(temporary):  # rerun tells its log why, nobody else
+            with temporary.open("ab") as file:
+                file.write(bytes(1 << 16))  # fails as rerun did
+            raise OSError("the recording is incomplete")
 
 
 def _flushed(recording: rr.RecordingStream, path: Path) -> bool:
@@ -48,15 +51,6 @@ def _flushed(recording: rr.RecordingStream, path: Path) -> bool:
             recording.flush(timeout_sec=PATIENCE)
             return True
     return False
-
-
-def require_whole(recording: Path) -> None:
-    """Refuse a recording that rerun could not write to its end; it tells that to its log only."""
-    if views.has_end(recording):
-        return
-    with recording.open("ab") as file:
-        file.write(bytes(1 << 16))  # fails as rerun did
-    raise OSError("the recording is incomplete")
 
 
 def log_report(
@@ -101,7 +95,9 @@ def write(
         if analysis.links is not None:
             ((drawn, seen),) = robot.log_robots(recording, {"": run}, aspect=ASPECT)
             rest = WHOLE - DETAILS - sum(size for _, size in left)
-            left.append((panels.robot_view(seen), rest))
+            shown = views.robot("Robot, links coloured by level above 10 Hz", "/robot", seen)
+            key = views.drawing(f"/axis/{panels.KEY.name}/right")
+            left.append((views.beside((shown, 88.0), (key, 12.0)), rest))
         details = views.tabs(*panels.log_details(recording, analysis, moments))
         over_time = [
             *panels.log_classes(recording, analysis),
@@ -109,7 +105,6 @@ def write(
             (_log_spectra(recording, analysis), panels.HEIGHT + TITLES),
             _log_strips(recording, analysis, drawn, beside),
         ]
-        _log_text(recording, analysis)
         whole = views.beside(
             (views.above(*left, (details, DETAILS)), 36.0), (views.above(*over_time), 64.0)
         )
@@ -119,15 +114,24 @@ def write(
 
 
 def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tuple[Part, float]]:
-    """Log the verdict; it, the report and the list of events, with their heights."""
+    """Log verdict, report and what a program wants to know; the parts at the top with heights."""
+    run, links, markdown = analysis.run, analysis.links, report(analysis)
+    properties = {
+        "input_sha256": analysis.sha256,
+        "robot": run.robot or "",
+        "rate_hz": run.rate,
+        "duration_s": run.duration,
+        "joints": len(run.joint_names),
+        "samples_in_gaps": int((~run.mask).sum()),
+        "model": analysis.model,
+        "link_noise": "" if links is None else links.kind,
+        "findings": len(analysis.findings),
+    }
+    log_report(recording, analysis.name, markdown, properties)
     kinds = spoken(analysis.headline).partition(": ")[2] or "no finding"
     told = {"findings": f"FAIL   {kinds}", "ok": f"PASS   {kinds}", "cannot-tell": "CANNOT TELL"}
-    views.log_verdict(recording, analysis.status, told[analysis.status])
-    text = views.text("Findings", "/report", titled=False)
-    parts = [
-        (views.drawing("/verdict"), views.VERDICT),
-        (text, height(report(analysis))),
-    ]
+    parts = [views.log_verdict(recording, analysis.status, told[analysis.status])]
+    parts.append((views.text("Findings", "/report", titled=False), height(markdown)))
     if count := len(panels.listed_events(analysis)):
         events = views.events("Click a time to go there", "/events")
         parts.append((events, EVENTS + EVENT * min(count, 4)))
@@ -185,20 +189,3 @@ def height(markdown: str) -> float:
             break
         found = below
     return max(found, HEAD) + FOOT
-
-
-def _log_text(recording: rr.RecordingStream, analysis: Analysis) -> None:
-    """Log the report, and what a program wants to know of the run."""
-    run, links = analysis.run, analysis.links
-    properties = {
-        "input_sha256": analysis.sha256,
-        "robot": run.robot or "",
-        "rate_hz": run.rate,
-        "duration_s": run.duration,
-        "joints": len(run.joint_names),
-        "samples_in_gaps": int((~run.mask).sum()),
-        "model": analysis.model,
-        "link_noise": "" if links is None else links.kind,
-        "findings": len(analysis.findings),
-    }
-    log_report(recording, analysis.name, report(analysis), properties)

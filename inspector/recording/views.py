@@ -486,7 +486,7 @@ def hertz(value: float) -> str:
 
 def log_verdict(
     recording: rr.RecordingStream, verdict: str, text: str, time: float | None = None
-) -> None:
+) -> Timed:
     """Log a verdict, a key of ``colors.VERDICTS``, for all times or from one on, in [s]."""
     band = rr.LineStrips2D(
         [[(-99.0, 0.5), (99.0, 0.5)]],
@@ -499,6 +499,7 @@ def log_verdict(
     for path, drawn in (("band", band), ("words", words)):
         recording.log(f"/verdict/{path}", drawn, static=time is None)
     recording.reset_time()
+    return drawing("/verdict"), VERDICT
 
 
 # Colour of a row where nothing is known: the viewer's background.
