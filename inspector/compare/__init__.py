@@ -480,8 +480,7 @@ def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change
     """Log both levels every 50 ms, and their change, with what changed shaded."""
     time, level = steps(pair)
     changed = [(change.kind, change.start, change.stop) for change in found]
-    styles = {kind: (kind, shade) for kind, shade in SHADES.items()}
-    panels.log_shades(recording, "/level/change", changed, styles, (LOW_DB, HIGH_DB))
+    panels.log_shades(recording, "/level/change", changed, SHADES, (LOW_DB, HIGH_DB))
     for place, (name, _) in enumerate(pair.sides):
         own, line = level[:, [place]], {name: SIDE_COLORS[name]}
         views.log_lines(recording, f"/level/{name}", time, own, line)
@@ -492,7 +491,7 @@ def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change
     views.log_lines(recording, "/change/noise", time, change[:, None], {"noise": views.INK})
     nothing = {"none": colors.CLASSES["unknown"]}
     views.log_lines(recording, "/change/none", time[[0, -1]], np.zeros((2, 1)), nothing)
-    panels.log_shades(recording, "/change/finding", changed, styles, (-reach, reach))
+    panels.log_shades(recording, "/change/finding", changed, SHADES, (-reach, reach))
     marks = [
         Label(0.5 + mark / reach / 2, views.written(mark), 44.0)
         for mark in (-reach / 2, 0.0, reach / 2)
@@ -555,13 +554,8 @@ def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Chang
         told.append(Label(0.1, "thin: annotated"))
     views.log_beside(recording, panel, titles or [Label(0.5, "no failure\nin either run")], told)
     if found:
-        views.log_events(
-            recording,
-            [change.start for change in found],
-            [str(change) for change in found],
-            [SHADES[change.kind] for change in found],
-            warnings=[change.kind == NEW for change in found],
-        )
+        listed = [(change.start, str(change), SHADES[change.kind]) for change in found]
+        views.log_events(recording, listed, [change.kind == NEW for change in found])
     return views.timed(panel)
 
 

@@ -475,7 +475,7 @@ class Drawing:
 
     def event(self, time: float, text: str, colour: colors.Color = colors.CLASSES[UNKNOWN]) -> None:
         """Add a line to the list of events."""
-        log_events(self._recording, [time], [text], [colour])
+        log_events(self._recording, [(time, text, colour)])
 
     def finish(self, time: float, found: Sequence[Event]) -> None:
         """Show what waits, and the findings of the whole stream."""

@@ -124,13 +124,11 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
             line = {spoken(name): colours[name]}
             views.log_lines(recording, f"/score/{name}", centres, score[:, None], line)
     if rows := listed_events(analysis):
-        views.log_events(
-            recording,
-            [event.start for _, event in rows],
-            [f"{how}: {brief(analysis, event)}" for how, event in rows],
-            [colours[event.label] for _, event in rows],  # legible in light themes, too
-            warnings=[how == "found" for how, _ in rows],
-        )
+        listed = [  # in colours that are legible in light themes, too
+            (event.start, f"{how}: {brief(analysis, event)}", colours[event.label])
+            for how, event in rows
+        ]
+        views.log_events(recording, listed, [how == "found" for how, _ in rows])
     names = classes_of(analysis)
     if not names:
         return []
@@ -174,16 +172,15 @@ def log_shades(
     recording: rr.RecordingStream,
     path: str,
     found: Sequence[tuple[str, float, float]],
-    styles: Mapping[str, tuple[str, colors.Color]],
+    shades: Mapping[str, colors.Color],
     between: tuple[float, float],
+    what: str = "",
 ) -> None:
-    """Shade stretches in a plot, by kind, start and stop in [s], in the name and colour of each."""
+    """Shade stretches in a plot, by kind, start and stop in [s], in the colour of each kind."""
     for kind in dict.fromkeys(kind for kind, *_ in found):
         own = [(start, stop) for each, start, stop in found if each == kind]
-        name, color = styles[kind]
-        views.log_stretches(
-            recording, f"{path}/{kind}", own, between=between, name=name, color=color
-        )
+        name = f"{what}{spoken(kind)}"
+        views.log_stretches(recording, f"{path}/{kind}", own, between, name, shades[kind])
 
 
 def log_class(
@@ -211,9 +208,7 @@ def log_class(
         called = f"{side}, {how}: {spoken(name)}" if side else f"{how}: {spoken(name)}"
         path = "/".join(["/class", *([side] if side else []), how, name])
         low, high = (views.TOP * (1.0 - (row + share) / count) for share in reversed(ends))
-        views.log_stretches(
-            recording, path, own, between=(low, high), name=called, color=color, opaque=True
-        )
+        views.log_stretches(recording, path, own, (low, high), called, color, opaque=True)
 
 
 def found_stretches(analysis: Analysis, name: str) -> list[tuple[float, float]]:
@@ -274,10 +269,8 @@ def _curve(
 ) -> Timed:
     """Shade findings and hatch gaps behind a curve, whose axis has these ends."""
     path, found = f"/{panel.name}", [(e.label, e.start, e.stop) for e in analysis.findings]
-    styles = {
-        name: (f"found: {spoken(name)}", shade) for name, shade in colours_of(analysis).items()
-    }
-    log_shades(recording, f"{path}/finding", found, styles, between)
+    colours = colours_of(analysis)
+    log_shades(recording, f"{path}/finding", found, colours, between, "found: ")
     log_gaps(recording, path, analysis.run, between)
     return views.timed(panel, between=between)
 

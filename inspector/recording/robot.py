@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from inspector.colors import Color
 from inspector.errors import InspectorError
@@ -25,8 +24,7 @@ from noisemodel.surface import link_names, triangles
 from noisemodel.types import Array, UnknownJointError
 from noisemodel.urdf import Mimic
 
-FRAMES_PER_SECOND = 50.0
-MAX_FRAMES = 2000
+FRAMES_PER_SECOND, MAX_FRAMES = 50.0, 2000  # of the motion that is drawn, at most; none in a gap
 # Frames of transforms beside those of links that move.
 WORLD, FIXED, VIEW = "_world", "_fixed", "_view"
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
@@ -174,7 +172,10 @@ def log_robots(
     for side, run in runs.items():
         assert run.robot is not None
         assert run.position is not None
-        names, frames = (*run.joint_names, *run.desired_joint_names), shown(run)
+        step = max(1, round(run.rate / FRAMES_PER_SECOND), -(-len(run.time) // MAX_FRAMES))
+        frames = np.arange(0, len(run.time), step)
+        frames = frames[run.mask[frames]]
+        names = (*run.joint_names, *run.desired_joint_names)
         moves = run.base_pose is not None
         drawn = log_robot(recording, run.robot, names, side=side, moves=moves)
         columns = dict(zip(run.joint_names, run.position[frames].T, strict=True))
@@ -192,13 +193,6 @@ def log_robots(
         if base is not None:
             log_floor(recording, drawn, camera, base)
     return cameras
-
-
-def shown(run: Run) -> NDArray[np.intp]:
-    """The samples that are drawn, at most 50 a second and 2000 in all; none in a gap."""
-    step = max(1, round(run.rate / FRAMES_PER_SECOND), -(-len(run.time) // MAX_FRAMES))
-    frames = np.arange(0, len(run.time), step)
-    return frames[run.mask[frames]]
 
 
 # Of the viewer's camera, from the lower to the upper edge, in [rad].

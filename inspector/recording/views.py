@@ -32,6 +32,8 @@ from noisemodel.types import Array, Real
 
 Part: TypeAlias = rrb.View | rrb.Container  # a view, or views that are arranged
 TIMELINE = "time"
+TOP = 9.99  # upper end of the axis of rows
+ROWS = 0.0, TOP
 PLOTS = colors.BACKGROUNDS[0]
 # Behind a robot, lighter than a quiet one, and the lines of its floor.
 ROBOT, GRID = (80, 84, 94), (112, 116, 126, 130)
@@ -51,7 +53,6 @@ def plot(
     *,
     legend: bool = False,
     between: tuple[float, float] | None = None,
-    fixed: bool = False,
     during: tuple[float, float] | None = None,
     last: float | None = None,
     titled: bool = True,
@@ -59,7 +60,7 @@ def plot(
     """Plot scalars over time.
 
     Args:
-        between: Range of values that is shown; by default the range of the lines.
+        between: Range of values that is shown, fixed for rows; by default the range of the lines.
         during: Stretch of time that is shown, in [s]; by default as in all other views.
         last: Time up to the cursor that is shown in place of that, in [s].
     """
@@ -79,7 +80,7 @@ def plot(
         plot_legend=rrb.PlotLegend(corner, visible=legend),
         axis_x=time,
         background=rrb.archetypes.PlotBackground(color=PLOTS),  # in light themes, too
-        axis_y=None if between is None else rrb.ScalarAxis(range=between, zoom_lock=fixed),
+        axis_y=between and rrb.ScalarAxis(range=between, zoom_lock=between == ROWS),
         titlebar=None if titled else False,
     )
 
@@ -189,10 +190,10 @@ def log_stretches(
     recording: rr.RecordingStream,
     path: str,
     stretches: Sequence[tuple[float, float]],
-    *,
     between: tuple[float, float],
     name: str,
-    color: tuple[int, int, int],
+    color: Color,
+    *,
     opaque: bool = False,
 ) -> None:
     """Shade stretches of time, in [s], in a plot, if there are any; rerun cannot annotate them.
@@ -217,7 +218,7 @@ def style_bands(
     recording: rr.RecordingStream,
     path: str,
     names: Sequence[str],
-    shades: Sequence[tuple[int, int, int]],
+    shades: Sequence[Color],
     copies: int,
 ) -> None:
     """Log names and colours of bands that `band_columns` draws, each so many times."""
@@ -296,24 +297,17 @@ def style_lines(
 
 def log_events(
     recording: rr.RecordingStream,
-    time: Sequence[float],
-    text: Sequence[str],
-    colours: Sequence[Color],
-    *,
+    events: Iterable[tuple[float, str, Color]],
     warnings: Sequence[bool] | None = None,
 ) -> None:
-    """List events, a line of text each, at times in [s]."""
+    """List events: time in [s], line of text and colour of each."""
+    time, text, colours = zip(*events, strict=True)
     level = None if warnings is None else ["WARN" if each else "INFO" for each in warnings]
-    recording.send_columns(
-        "/events",
-        indexes=[at(np.array(time))],
-        columns=rr.TextLog.columns(
-            text=text, level=level, color=np.array([(*color, 255) for color in colours], np.uint8)
-        ),
-    )
+    rgba = np.array([(*color, 255) for color in colours], np.uint8)
+    columns = rr.TextLog.columns(text=text, level=level, color=rgba)
+    recording.send_columns("/events", indexes=[at(np.array(time))], columns=columns)
 
 
-TOP = 9.99  # upper end of the axis of rows
 INK, WHITE = (205, 208, 214), (255, 255, 255)
 VERDICT = 38.0  # height of a verdict, in points
 AXIS = 18.0  # height of a panel's time axis, in points
@@ -419,7 +413,7 @@ def timed(
     *,
     title: str | None = None,
     name: str | None = None,
-    between: tuple[float, float] | None = (0.0, TOP),
+    between: tuple[float, float] | None = ROWS,
     paths: Sequence[str] = ALL,
     legend: bool = False,
     last: float | None = None,
@@ -437,7 +431,6 @@ def timed(
         path,
         paths,
         between=between,
-        fixed=between == (0.0, TOP),
         titled=False,
         legend=legend,
         last=last,
