@@ -22,7 +22,6 @@ from inspector.recording.views import Label, Panel, Timed
 from inspector.report import spoken
 from noiseclassifier import Event
 from noisemodel import Block
-from noisemodel.types import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,18 +32,10 @@ class Several:
     sides: tuple[Analysis, ...]
 
     @cached_property
-    def levels(self) -> tuple[tuple[Array, Array], ...]:
-        """Of each run, starts of steps of 50 ms in [s], and levels above 10 Hz; NaN in gaps."""
-        found = []
-        for side in self.sides:
-            time, level = side.vibration_level
-            found.append((time, level[:, 0]))
-        return tuple(found)
-
-    @cached_property
     def peaks(self) -> tuple[float, ...]:
         """Highest level of each run, in [dB re 1 rad/s]."""
-        return tuple(float(np.nanmax(level, initial=FLOOR_DB)) for _, level in self.levels)
+        levels = [side.vibration_level[1] for side in self.sides]
+        return tuple(float(np.nanmax(level, initial=FLOOR_DB)) for level in levels)
 
     @cached_property
     def order(self) -> tuple[int, ...]:
@@ -155,11 +146,6 @@ def report(several: Several) -> str:
     return "\n".join(lines) + "\n"
 
 
-def shortened(names: Sequence[str]) -> list[str]:
-    """Names of runs, as long as they may stand beside a row."""
-    return [name if len(name) <= LETTERS else f"\u2026{name[1 - LETTERS :]}" for name in names]
-
-
 def _lines(several: Several, panel: Panel) -> tuple[float, int]:
     """Width and number of the lines that make a run's row."""
     height = (panel.height - views.AXIS) / len(several.names)
@@ -168,10 +154,13 @@ def _lines(several: Several, panel: Panel) -> tuple[float, int]:
 
 
 def _names(several: Several, panel: Panel) -> list[Label]:
-    """Names of the rows, as many as there is room for; the worst is marked."""
+    """Names of the rows, as long and as many as there is room for; the worst is marked."""
     step = int(np.ceil(NAMED * len(several.names) / (panel.height - views.AXIS)))
+    short = [
+        name if len(name) <= LETTERS else f"\u2026{name[1 - LETTERS :]}" for name in several.names
+    ]
     labels = []
-    for index, label in enumerate(views.row_labels(shortened(several.names))):
+    for index, label in enumerate(views.row_labels(short)):
         worst = index == several.worst
         if index % step == 0 or worst:
             text = f"{label.text}\nworst" if worst and step == 1 else label.text
@@ -182,7 +171,7 @@ def _names(several: Several, panel: Panel) -> list[Label]:
 
 def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) -> Timed:
     colours = panels.colours_of(*several.sides)
-    lanes = [[each for each in side.lane if each[2]] for side in several.sides]
+    lanes = [side.lane for side in several.sides]
     edges = np.unique([0.0, *(time for lane in lanes for each in lane for time in each[:2])])
     if len(edges) < 2:
         edges = np.array([0.0, 1.0])
@@ -203,19 +192,14 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
             for event in side.findings
             if event.label == name
         ]
-        time, place = zip(*sorted(marks), strict=True)
-        panels.log_marks(recording, name, number, views.INK, time, place)
-    shown = [*failing, "ok"]
-    key = [
-        Label(
-            1.0 - (row + 0.5) / max(len(shown), 3),
-            spoken(name)
-            if name == "ok"
-            else f"{SIGNS[row % len(SIGNS)]} {spoken(name)}".replace("high ", "high\n"),
-            color=panels.readable(colours.get(name, colors.CLASSES["ok"])),
-        )
-        for row, name in enumerate(shown)
-    ]
+        panels.log_marks(recording, name, number, views.INK, sorted(marks))
+    key = []
+    for row, name in enumerate([*failing, "ok"]):
+        sign = "" if name == "ok" else f"{SIGNS[row % len(SIGNS)]} "
+        text = f"{sign}{spoken(name)}".replace("high ", "high\n")
+        place = 1.0 - (row + 0.5) / max(len(failing) + 1, 3)
+        color = panels.readable(colours.get(name, colors.CLASSES["ok"]))
+        key.append(Label(place, text, color=color))
     views.log_beside(recording, panel, _names(several, panel), key)
     return views.timed(panel, name="Classes")
 
@@ -225,10 +209,12 @@ def _log_levels(
 ) -> Timed:
     step = max(levels.STEP, (span[1] - span[0]) / COLUMNS)
     columns = int(np.ceil((span[1] - span[0]) / step))
-    edges: Array = span[0] + step * np.arange(columns + 1, dtype=np.float64)
-    if len(edges) < 2:
-        edges = np.array([span[0], span[0] + step])
-    found = np.stack([_columns(time, level, edges) for time, level in several.levels])
+    edges = span[0] + step * np.arange(columns + 1, dtype=np.float64)
+    found = np.full((len(several.sides), columns), np.nan)
+    for row, side in zip(found, several.sides, strict=True):
+        time, level = side.vibration_level
+        column = np.searchsorted(edges, time + 1e-9, side="right") - 1
+        np.fmax.at(row, np.clip(column, 0, columns - 1), level[:, 0])  # NaN where there is none
     scale = levels.JOINTS.following(found)
     width, lines = _lines(several, panel)
     left, names = _names(several, panel), [f"{name} [{scale.unit}]" for name in several.names]
@@ -238,20 +224,11 @@ def _log_levels(
     )  # fmt: skip
 
 
-def _columns(time: Array, level: Array, edges: Array) -> Array:
-    """Highest level in each column, NaN where there is none."""
-    column = np.clip(np.searchsorted(edges, time + 1e-9, side="right") - 1, 0, len(edges) - 2)
-    found: Array = np.full(len(edges) - 1, -np.inf)
-    np.maximum.at(found, column, np.nan_to_num(level, nan=-np.inf))
-    return np.where(np.isfinite(found), found, np.nan)
-
-
 def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -> Timed:
     chosen: Sequence[int] = sorted(several.order[:CURVES])
     for index, color in zip(chosen, colors.of_series(len(chosen)), strict=True):
-        time, level = several.levels[index]
-        line = {several.names[index]: color}
-        views.log_lines(recording, f"/curves/{index:03d}", time, level[:, None], line)
+        line, path = {several.names[index]: color}, f"/curves/{index:03d}"
+        views.log_lines(recording, path, *several.sides[index].vibration_level, line)
     told = f"the worst\n{CURVES} runs" if len(several.names) > len(chosen) else "all runs"
     views.log_beside(recording, panel, panels.level_axis(), [Label(0.5, told)])
     paths, ends = ("$origin/**",), (LOW_DB, HIGH_DB)

@@ -139,9 +139,9 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     for row, name in enumerate(names):
         shades, place = (colours[name], views.INK), (row, count)
         log_class(recording, analysis, name, place, shades, (FOUND, ANNOTATED))
-        if starts := [event.start for event in analysis.findings if event.label == name]:
-            middle = views.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
-            log_marks(recording, name, row, colours[name], starts, [middle] * len(starts))
+        middle = views.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
+        if marks := [(each.start, middle) for each in analysis.findings if each.label == name]:
+            log_marks(recording, name, row, colours[name], marks)
     if lost:
         log_gaps(recording, "/class", run, (0.1 * views.TOP / count, 0.9 * views.TOP / count))
     inks = [*(readable(colours[name]) for name in names), views.INK][:count]
@@ -222,18 +222,16 @@ def log_marks(
     name: str,
     number: int,
     color: colors.Color,
-    time: Sequence[float],
-    place: Sequence[float],
+    marks: Sequence[tuple[float, float]],
 ) -> None:
-    """Log a marker of a class at the start of each finding, at its place in the panel."""
-    shape = MARKERS[number % len(MARKERS)]
+    """Log markers of a class, one for each finding, at its start in [s] and place in the panel."""
+    shape, path = MARKERS[number % len(MARKERS)], f"/class/mark/{name}"
     points = rr.SeriesPoints(
         names=[spoken(name)], colors=[color], markers=[shape], marker_sizes=[4.0]
     )
-    path = f"/class/mark/{name}"
     recording.log(path, points, static=True)
-    columns = views.scalars(np.array(place))
-    recording.send_columns(path, indexes=[views.at(np.array(time))], columns=columns)
+    time, place = np.array(marks).T
+    recording.send_columns(path, indexes=[views.at(time)], columns=views.scalars(place))
 
 
 def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
