@@ -32,9 +32,8 @@ from noiseclassifier import Event
 from noiseclassifier.matching import spans_of, union
 from noisemodel import Block, Run, decimated
 from noisemodel import robot as robots
-from noisemodel.noise import LinkNoise, decibel, vibrating
+from noisemodel.noise import LinkNoise, decibel, simplified, vibrating
 from noisemodel.run import part
-from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
 
 CORRELATION = 0.6  # correlation of the envelopes below which an alignment is refused
@@ -131,13 +130,9 @@ def _powers(run: Run) -> tuple[Array, Array, Array]:
     better guide, as a defect changes what is measured.
     """
     velocity = run.velocity if run.velocity_desired is None else run.velocity_desired
-    speed, mask = np.empty(len(velocity)), run.mask
-    for rows in pieces(velocity):
-        part = velocity[rows]
-        speed[rows] = np.sqrt(np.einsum("ij,ij->i", part, part, dtype=np.float64))
-    size = float(np.sqrt(np.mean(speed[mask] ** 2))) if mask.any() else 0.0
-    mean = float(speed[mask].mean()) if mask.any() else 0.0
-    level = (speed - mean) * mask
+    speed, mask = simplified(velocity), run.mask
+    level = (speed - speed[mask].mean()) * mask
+    size = np.sqrt(np.mean(speed[mask] ** 2))
     level[np.abs(level) < STILL * size] = 0.0  # rounding is no motion
     return mask.astype(np.float64), level, level**2
 
@@ -313,10 +308,8 @@ def spectra(pair: Pair, joint: str = "") -> list[Spectrogram]:
     for _, side in pair.sides:
         own = worst_signal(side, side.run.joint_names.index(joint)) if joint else side.noise
         each = spectrogram(own, pair.rate, start=float(pair.time[0]), valid=pair.valid)
-        kept = each.valid
-        found.append(
-            Spectrogram(each.time[kept], each.frequency, each.amplitude[:, kept], kept[kept])
-        )
+        kept, amplitude = each.valid, each.amplitude[:, each.valid]
+        found.append(replace(each, time=each.time[kept], amplitude=amplitude, valid=kept[kept]))
     return found
 
 

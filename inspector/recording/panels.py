@@ -5,9 +5,8 @@ One run, two, many and a stream draw the same panels; each only chooses which.
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import takewhile
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -352,19 +351,14 @@ JOINT_POINTS = 4000  # points of a line, so that a long run has no more than a s
 UNITS = {"velocity": "rad/s", "position": "rad", "effort": "N m"}
 
 
-@dataclass(frozen=True, eq=False)
-class Signal:
-    """A signal of joints, of a kind such as "velocity" or "stage planned"."""
+class Signal(NamedTuple):
+    """A signal of joints."""
 
-    kind: str
+    kind: str  # such as "velocity" or "stage planned"
+    unit: str  # stages are velocities
     desired: bool
-    values: Real  # shape (samples, joints), in the unit of its kind
+    values: Real  # shape (samples, joints)
     joints: tuple[str, ...]
-
-    @property
-    def unit(self) -> str:
-        """Of its values; stages are velocities."""
-        return UNITS.get(self.kind, UNITS["velocity"])
 
 
 def signals(run: Run) -> list[Signal]:
@@ -379,7 +373,7 @@ def signals(run: Run) -> list[Signal]:
         *((f"stage {name}", False, stage, names) for name, stage in run.stages.items()),
     ]
     return [
-        Signal(kind, wanted, values, joints)
+        Signal(kind, UNITS.get(kind, UNITS["velocity"]), wanted, values, joints)
         for kind, wanted, values, joints in every
         if values is not None
     ]
