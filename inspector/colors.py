@@ -7,6 +7,7 @@ CIEDE2000 of at least 15 as deuteranopes and protanopes see them (Machado, Olive
 or a name.
 """
 
+from itertools import cycle
 from typing import TypeAlias
 
 import numpy as np
@@ -51,9 +52,8 @@ SERIES: tuple[Color, ...] = (
 
 def of_classes(classes: tuple[str, ...]) -> dict[str, Color]:
     """The colour of each class; classes that are not NoisyTest's own take further ones."""
-    others = [name for name in classes if name not in CLASSES]
-    extra = {name: OTHERS[i % len(OTHERS)] for i, name in enumerate(others)}
-    return {name: CLASSES.get(name) or extra[name] for name in classes}
+    others = cycle(OTHERS)
+    return {name: CLASSES.get(name) or next(others) for name in classes}
 
 
 def of_series(count: int, *, dim: bool = False) -> list[Color]:

@@ -512,9 +512,8 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[P
     for what, (values, own) in shown.items():
         panel, axis = Panel(f"spectrum_{what}", DETAILS), f"{joint or 'noise'}\n{what}"
         path, title = f"/spectrogram/{what}", f"Spectrum{', ' if what == 'change' else ' '}{what}"
-        bands = time, edges, values
-        part, _ = panels.log_heat(recording, panel, bands, own, axis, title, path=path, below="")
-        parts.append(part)
+        panels.log_heat(recording, path, panel, (time, edges, values), own, axis)
+        parts.append(views.timed(panel, path, name=title)[0])
     return parts
 
 

@@ -217,11 +217,10 @@ def _log_levels(
         np.fmax.at(row, np.clip(column, 0, columns - 1), level[:, 0])  # NaN where there is none
     scale = levels.JOINTS.following(found)
     width, lines = _lines(several, panel)
-    left, names = _names(several, panel), [f"{name} [{scale.unit}]" for name in several.names]
-    return views.log_levels(
-        recording, panel, edges, found, scale, left,
-        title="Level above 10 Hz", names=names, width=width, lines=lines,
-    )  # fmt: skip
+    rgba, names = views.shades(scale, found), [f"{name} [{scale.unit}]" for name in several.names]
+    views.log_rows(recording, "/levels", edges, rgba, names=names, width=width, lines=lines)
+    views.log_beside(recording, panel, _names(several, panel), scale)
+    return views.timed(panel, name="Level above 10 Hz")
 
 
 def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -> Timed:

@@ -155,9 +155,7 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
 def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
     """The colours of all classes of runs, found or annotated, the models' classes first."""
     known = dict.fromkeys(name for side in sides if side.labels for name in side.labels.classes)
-    others = {name for side in sides for *_, name in side.lane}
-    others |= {block.label for side in sides for block in side.run.blocks}
-    others |= {event.label for side in sides for event in side.findings}
+    others = {name for side in sides for name in classes_of(side)}
     return colors.of_classes((*known, *sorted(others - set(known))))
 
 
@@ -511,19 +509,12 @@ def log_strip(
 ) -> Timed:
     """Log levels, shape (columns, rows), of some rows; the panel is as high as these need."""
     own = [names[index] for index in which]
-    return views.log_levels(
-        recording,
-        Panel(name, STRIP_ROW * len(own) + views.AXIS),
-        edges,
-        level[:, which].T,
-        scale,
-        views.row_labels(own),
-        title=title,
-        names=[f"{each}{unit or f' [{scale.unit}]'}" for each in own],
-        width=STRIP_WIDTH,
-        lines=STROKES,
-        path=f"/strips/{name}",
-    )
+    panel, path = Panel(name, STRIP_ROW * len(own) + views.AXIS), f"/strips/{name}"
+    named = [f"{each}{unit or f' [{scale.unit}]'}" for each in own]
+    rgba = views.shades(scale, level[:, which].T)
+    views.log_rows(recording, path, edges, rgba, names=named, width=STRIP_WIDTH, lines=STROKES)
+    views.log_beside(recording, panel, views.row_labels(own), scale)
+    return views.timed(panel, path, name=title)
 
 
 BANDS = 48
@@ -544,31 +535,19 @@ def in_levels(spectrum: Spectrogram) -> tuple[Array, Array, Array]:
 
 def log_heat(
     recording: rr.RecordingStream,
+    path: str,
     panel: Panel,
     spectrum: tuple[Array, Array, Array],
     scale: Scale,
-    axis: str,
     title: str,
-    *,
-    path: str = "",
-    below: str = "/bands",
-) -> Timed:
-    """Log a spectrogram, as `in_levels` has it, with its axis and its scale."""
+) -> None:
+    """Log a spectrogram, as `in_levels` has it, and its axis and scale beside its panel."""
     time, edges, level = spectrum
     half = np.diff(time).min(initial=WINDOW) / 2
-    return views.log_levels(
-        recording,
-        panel,
-        np.append(time - half, time[-1] + half),
-        level[::-1],
-        scale,
-        band_axis(panel, edges, axis),
-        title=title,
-        names=[f"{centre:.0f} Hz" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1].tolist()],
-        width=LINE_WIDTH,
-        path=path,
-        below=below,
-    )
+    ends, rgba = np.append(time - half, time[-1] + half), views.shades(scale, level[::-1])
+    names = [f"{centre:.0f} Hz" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1].tolist()]
+    views.log_rows(recording, path, ends, rgba, names=names, width=LINE_WIDTH)
+    views.log_beside(recording, panel, band_axis(panel, edges, title), scale)
 
 
 def band_axis(panel: Panel, edges: Array, title: str) -> list[Label]:

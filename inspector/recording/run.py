@@ -147,9 +147,8 @@ def _log_spectra(recording: rr.RecordingStream, analysis: Analysis) -> Part:
     name = "the noise" if joint is None else run.joint_names[joint]
     panel, bands = views.Panel("spectrogram", panels.HEIGHT), panels.in_levels(spectrum)
     panels.log_gaps(recording, "/spectrogram", run, (0.0, views.TOP))
-    axis, title = "velocity\nspectrum", f"Spectrogram of {name}"
-    part, _ = panels.log_heat(recording, panel, bands, scale, axis, title)
-    parts = [part]
+    panels.log_heat(recording, "/spectrogram/bands", panel, bands, scale, "velocity\nspectrum")
+    parts = [views.timed(panel, name=f"Spectrogram of {name}")[0]]
     if links is not None:
         parts.append(views.plot("Sound power [dB re 1 pW]", "/power", views.ALL))
     return views.tabs(*parts)

@@ -163,9 +163,7 @@ def blueprint(
 ) -> rrb.Blueprint:
     """Fill the window with a part; playing repeats a stretch of time, if there is one, in [s]."""
     playing: Literal["following", "paused"] = "following" if following else "paused"
-    selected = None
-    if loop is not None:
-        selected = rrb.components.AbsoluteTimeRange(*(round(1e9 * each) for each in loop))
+    selected = loop and rrb.components.AbsoluteTimeRange(*(round(1e9 * each) for each in loop))
     time = rrb.TimePanel(
         state="collapsed",
         timeline=TIMELINE,
@@ -534,29 +532,9 @@ def shaded(places: Array, rgba: NDArray[np.uint8]) -> list[Any]:
     return [*scalars(np.tile(places, (count, 1))), *colours]
 
 
-def log_levels(
-    recording: rr.RecordingStream,
-    panel: Panel,
-    edges: Array,
-    level: Real,
-    scale: Scale,
-    left: Sequence[Label],
-    *,
-    title: str,
-    names: Sequence[str],
-    width: float,
-    lines: int = 1,
-    path: str = "",
-    below: str = "",
-) -> Timed:
-    """Log levels in [dB], shape (rows, columns), as rows of colours; nothing where one is NaN.
-
-    The rows lie below the panel's path, or further below it.
-    """
-    path = path or f"/{panel.name}"
+def shades(scale: Scale, level: Real) -> NDArray[np.uint8]:
+    """Colours of levels in [dB] in rows, shape (rows, columns, 4); none where one is NaN."""
     unknown = np.isnan(level)
     rgba = scale.colours(np.asarray(np.where(unknown, scale.low, level)), shades=scale.shades)
     rgba[unknown] = EMPTY
-    log_rows(recording, path + below, edges, rgba, names=names, width=width, lines=lines)
-    log_beside(recording, panel, left, scale)
-    return timed(panel, path, name=title)
+    return rgba
