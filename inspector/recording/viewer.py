@@ -14,7 +14,7 @@ import tempfile
 import time
 import webbrowser
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from ctypes.util import find_library
 from dataclasses import dataclass
 from http.client import HTTPConnection
@@ -176,13 +176,10 @@ def launch(port: str, *arguments: str) -> str:
     taken = port.isdigit() and listens(HOST, int(port))
     with started("--port", port, "--hide-welcome-screen", *arguments) as viewer:
         # It listens before it opens its window; if another one does already, it only passes on.
-        if taken:
-            with suppress(subprocess.TimeoutExpired):
-                viewer.process.wait(timeout=START_TIMEOUT)
-        elif port.isdigit():
+        if port.isdigit() and not taken:
             viewer.listens(int(port), START_TIMEOUT)
         try:
-            code = viewer.process.wait(timeout=SETTLE)
+            code = viewer.process.wait(timeout=SETTLE + START_TIMEOUT * taken)
         except subprocess.TimeoutExpired:
             return ""
         return "" if code == 0 else viewer.ended()
@@ -219,26 +216,21 @@ def serving(recording: Path, *, port: int = 0) -> Iterator[tuple[str, Process]]:
     made to point to this machine (DNS rebinding) could read a recording from it. So rerun serves
     the empty viewer only, and the recording comes from here, to those who ask for this host.
     """
-    with _Server((HOST, free_port(port)), _Relay) as server:
+    with _Server((HOST, free_port(port)), _Relay) as server, ExitStack() as ending:
         taken = server.server_address[1]
         page, other = (free_port(other=taken) for _ in range(2))
         ports = ("--web-viewer-port", str(page), "--port", str(other))
-        with started("--serve-web", *ports) as viewer:
-            try:
-                if not viewer.listens(page, SERVE_TIMEOUT):
-                    silent = f"the viewer does not respond on port {page}"
-                    late = f"{silent}, {SERVE_TIMEOUT:g} s after its start"
-                    raise ViewerError(viewer.ended() or late)
-                server.recording, server.page = recording, page
-                server.hosts = {f"{name}:{taken}" for name in (HOST, "localhost")}
-                Thread(target=server.serve_forever, daemon=True).start()
-                address = f"http://{HOST}:{taken}"
-                try:
-                    yield f"{address}/?url={quote(address + RECORDING, safe='')}", viewer
-                finally:
-                    server.shutdown()
-            finally:
-                viewer.kill()
+        viewer = ending.enter_context(started("--serve-web", *ports))
+        ending.callback(viewer.kill)
+        if not viewer.listens(page, SERVE_TIMEOUT):
+            silent = f"the viewer does not respond on port {page}"
+            raise ViewerError(viewer.ended() or f"{silent}, {SERVE_TIMEOUT:g} s after its start")
+        server.recording, server.page = recording, page
+        server.hosts = {f"{name}:{taken}" for name in (HOST, "localhost")}
+        Thread(target=server.serve_forever, daemon=True).start()
+        ending.callback(server.shutdown)
+        address = f"http://{HOST}:{taken}"
+        yield f"{address}/?url={quote(address + RECORDING, safe='')}", viewer
 
 
 RECORDING = "/recording.rrd"
@@ -268,16 +260,14 @@ class _Relay(BaseHTTPRequestHandler):
                 self._head(200, {"Content-Type": kind, "Content-Length": size})
                 shutil.copyfileobj(file, self.wfile)
             return
-        upstream = HTTPConnection(HOST, self.server.page, timeout=SERVE_TIMEOUT)
-        try:
+        connection = HTTPConnection(HOST, self.server.page, timeout=SERVE_TIMEOUT)
+        with closing(connection) as upstream:
             accepted = {"Accept-Encoding": self.headers.get("Accept-Encoding", "identity")}
             upstream.request("GET", self.path, headers=accepted)
             answer = upstream.getresponse()
             kept = ("Content-Type", "Content-Encoding", "Content-Length")
             self._head(answer.status, {name: answer.getheader(name) for name in kept})
             shutil.copyfileobj(answer, self.wfile)
-        finally:
-            upstream.close()
 
     def _head(self, status: int, headers: Mapping[str, object]) -> None:
         self.send_response(status)
@@ -343,10 +333,13 @@ def headless_viewer() -> "Iterator[ViewerClient]":
     port = free_port()
     start = ("--headless", "--port", str(port), "--hide-welcome-screen")
     window = ("--window-size", f"{WINDOW[0]}x{WINDOW[1]}")
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        started(*start, *window, env=_environment(folder)) as process,
-    ):
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as ending:
+        # Without settings of the user, and by a software driver if there is one.
+        env = {"HOME": folder, "XDG_RUNTIME_DIR": folder, "RUST_LOG": "error"}
+        if software := _drivers("lvp_icd*"):
+            env["VK_DRIVER_FILES"] = str(software[0])
+        process = ending.enter_context(started(*start, *window, env=os.environ | env))
+        ending.callback(process.kill)
 
         def connected() -> "ViewerClient | None":
             if problem := process.ended():
@@ -357,13 +350,10 @@ def headless_viewer() -> "Iterator[ViewerClient]":
                 return client
             return None
 
-        try:
-            client = until(connected, TIMEOUT)
-            if client is None:
-                raise ViewerError(f"the viewer does not respond within {TIMEOUT:g} s")
-            yield client
-        finally:
-            process.kill()
+        client = until(connected, TIMEOUT)
+        if client is None:
+            raise ViewerError(f"the viewer does not respond within {TIMEOUT:g} s")
+        yield client
 
 
 def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
@@ -384,13 +374,6 @@ def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
     if not frames:
         raise ViewerError(f"the viewer draws nothing within {TIMEOUT:g} s")
     return frames[-1]
-
-
-def _environment(folder: str) -> dict[str, str]:
-    """Environment for the viewer: no settings of the user, software rendering if possible."""
-    software = _drivers("lvp_icd*")
-    driver = {"VK_DRIVER_FILES": str(software[0])} if software else {}
-    return os.environ | {"HOME": folder, "XDG_RUNTIME_DIR": folder, "RUST_LOG": "error"} | driver
 
 
 def _drivers(pattern: str) -> list[Path]:
