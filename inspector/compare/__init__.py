@@ -24,13 +24,12 @@ from inspector.library import Library
 from inspector.logs.read import Opened, open_run
 from inspector.recording import panels, robot, views
 from inspector.recording.panels import CHANGE, HIGH_DB, LOW_DB, Plotted, found_stretches
-from inspector.recording.robot import Drawn
 from inspector.recording.run import log_report, writing
 from inspector.recording.views import Label, Panel, Part, Timed
 from inspector.report import classes_of, spoken
 from noiseclassifier import Event
 from noiseclassifier.matching import spans_of, union
-from noisemodel import Block, Run, decimated
+from noisemodel import Block, Robot, Run, decimated
 from noisemodel import robot as robots
 from noisemodel.noise import LinkNoise, decibel, simplified, vibrating
 from noisemodel.run import part
@@ -338,14 +337,15 @@ def whole(pair: Pair) -> Level:
     return within(pair, float(pair.time[0]), float(pair.time[-1]) + 1 / pair.rate)
 
 
-# In the order in which they matter.
-KINDS = NEW, LOUDER, RESOLVED, QUIETER, UNCHANGED = (
-    "new",
-    "louder",
-    "resolved",
-    "quieter",
-    "unchanged",
-)
+# Kinds of changes in the order in which they matter, each in the colour of the run that has it.
+SHADES = {
+    "new": colors.AFTER,
+    "louder": colors.AFTER,
+    "resolved": colors.BEFORE,
+    "quieter": colors.BEFORE,
+    "unchanged": views.INK,
+}
+KINDS = NEW, LOUDER, RESOLVED, QUIETER, UNCHANGED = tuple(SHADES)
 LOUDER_DB = 3.0  # a failure in both runs whose level changed by as much is louder or quieter
 
 
@@ -429,22 +429,19 @@ def report(pair: Pair) -> str:
     """The report of two runs, in Markdown."""
     parts = [f"### {pair.before.name} → {pair.after.name}", f"**{summary(pair)}**"]
     title = "finding" if labelled(pair) else "annotated"
-    rows: list[tuple[str, ...]] = [
-        ("", title, "time [s]", "before [dB]", "after [dB]", "change"),
-        ("---",) * 6,
-    ]
+    rows = [("", title, "time [s]", "before [dB]", "after [dB]", "change"), ("---",) * 6]
     for each in sorted(changes(pair), key=lambda change: (KINDS.index(change.kind), change.start)):
         when, both = f"{each.start:.2f} to {each.stop:.2f}", (each.level.before, each.level.after)
-        levels = [f"{value:.1f}" if np.isfinite(value) else "silent" for value in both]
-        numbers = (*levels, f"{each.level.change:+.1f}")
-        rows.append((f"**{each.kind}**", spoken(each.label), when, *numbers))
+        before, after = (f"{value:.1f}" if np.isfinite(value) else "silent" for value in both)
+        what, change = f"**{each.kind}**", f"{each.level.change:+.1f}"
+        rows.append((what, spoken(each.label), when, before, after, change))
     if len(rows) > 2:
         parts.append("\n".join(f"| {' | '.join(cells)} |" for cells in rows))
     time, level = steps(pair)
-    change = level[:, 1] - level[:, 0]
-    place = int(np.abs(change).argmax())
-    most = f"Largest change of level: **{change[place]:+.0f} dB at {time[place]:.2f} s**."
-    parts.append(most if change[place] else "The level is the same at all times.")
+    louder = level[:, 1] - level[:, 0]
+    place = int(np.abs(louder).argmax())
+    most = f"Largest change of level: **{louder[place]:+.0f} dB at {time[place]:.2f} s**."
+    parts.append(most if louder[place] else "The level is the same at all times.")
     parts.append(f"Aligned {pair.alignment}. Levels above 10 Hz in dB re 1 rad/s.")
     if pair.remarks:
         parts += ["#### Remarks", "\n".join(f"- {remark}" for remark in pair.remarks)]
@@ -454,14 +451,6 @@ def report(pair: Pair) -> str:
 # --- the recording
 
 SIDE_COLORS = {"before": colors.BEFORE, "after": colors.AFTER}
-# Of changes: the colour of the run that has them.
-SHADES = {
-    NEW: colors.AFTER,
-    LOUDER: colors.AFTER,
-    RESOLVED: colors.BEFORE,
-    QUIETER: colors.BEFORE,
-    UNCHANGED: views.INK,
-}
 NOISE_POINTS = 60_000  # of each run's noise
 DETAILS = 184.0  # height of the panels that lie behind each other
 LEVEL, CHANGED, NOISE_PANEL = Panel("level", 118.0), Panel("change", 84.0), Panel("noise", DETAILS)
@@ -571,8 +560,6 @@ def log_joints(
 KEY = Panel("key", 260.0)  # the scale beside the robots
 ABOVE = 240.0  # least height of the report and the robots
 TITLES = 28.0  # height of a row of tabs
-
-
 ASPECT = 1.35  # least width of a robot's view by its height
 
 
@@ -587,31 +574,29 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
     loop = largest_change(pair, found)
     with writing(path, identity, overwrite=overwrite) as recording:
         views.log_span(recording, float(time[0]), float(time[-1]))
-        drawn, robots = _log_robots(recording, pair)
+        after, robots = _log_robots(recording, pair)
         over_time = [log_changes(recording, pair, found), *log_levels(recording, pair, found)]
-        details = _log_details(recording, pair, drawn)
+        details = _log_details(recording, pair, after)
         head = views.beside((_log_text(recording, pair, found), 34.0), *robots)
         whole = views.above((head, ABOVE), *over_time, (details, DETAILS + TITLES))
         recording.send_blueprint(views.blueprint(whole, loop))  # instead of an older layout
 
 
-def _log_robots(recording: rr.RecordingStream, pair: Pair) -> tuple[dict[str, Drawn], list[Timed]]:
-    """Log the robot before and after, as two robots, coloured by the levels of their links."""
+def _log_robots(recording: rr.RecordingStream, pair: Pair) -> tuple[Robot | None, list[Timed]]:
+    """Log both robots, coloured by the levels of their links; the robot after, and the parts."""
     if pair.links is None:
-        return {}, []
+        return None, []
     runs = {side: each.run for side, each in pair.sides}
-    robots = dict(zip(runs, robot.log_robots(recording, runs, aspect=ASPECT), strict=True))
+    drawn, cameras = zip(*robot.log_robots(recording, runs, aspect=ASPECT), strict=True)
+    panels.log_robot_levels(recording, list(zip(drawn, pair.links, strict=True)), KEY)
     shown = [
         (views.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0)
-        for side, (_, camera) in robots.items()
+        for side, camera in zip(SIDES, cameras, strict=True)
     ]
-    drawn = {side: each for side, (each, _) in robots.items()}
-    coloured = list(zip(drawn.values(), pair.links, strict=True))
-    panels.log_robot_levels(recording, coloured, KEY)
-    return drawn, [*shown, (views.drawing(f"/axis/{KEY.name}/right"), 8.0)]
+    return drawn[1].robot, [*shown, (views.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 
-def _log_details(recording: rr.RecordingStream, pair: Pair, drawn: Mapping[str, Drawn]) -> Part:
+def _log_details(recording: rr.RecordingStream, pair: Pair, after: Robot | None) -> Part:
     """Log what lies behind each other: spectra, noise, signals of joints."""
     worst = worst_joint(pair.after)
     joint = "" if worst is None else pair.after.run.joint_names[worst]
@@ -620,8 +605,7 @@ def _log_details(recording: rr.RecordingStream, pair: Pair, drawn: Mapping[str, 
     ends = panels.log_noise(recording, NOISE_PANEL, sides, shades, _sides(), NOISE_POINTS)
     parts.append(views.timed(NOISE_PANEL, title="Noise", name="Noise", between=ends)[0])
     names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
-    after = drawn.get("after")
-    limbs = panels.limbs(tuple(names), after.robot if after else None)
+    limbs = panels.limbs(tuple(names), after)
     return views.tabs(*parts, *log_joints(recording, pair, limbs))
 
 
