@@ -262,18 +262,9 @@ def compare(
     for name, side in zip(("Before", "After"), sides, strict=True):
         told |= {remark: "Both" if remark in told else name for remark in side.remarks}
     timed = alignment.how is not Align.AUTO and any(side.findings for side in sides)
-    return Pair(
-        before=sides[0],
-        after=sides[1],
-        alignment=alignment,
-        remarks=(
-            *remarks,
-            *left_out,
-            *([missing] if missing else []),
-            *([TIMED] if timed else []),
-            *(f"{who}: {remark}" for remark, who in told.items()),
-        ),
-    )
+    of_both = *remarks, *left_out, *filter(None, (missing, TIMED if timed else ""))
+    own = (f"{who}: {remark}" for remark, who in told.items())
+    return Pair(sides[0], sides[1], alignment, remarks=(*of_both, *own))
 
 
 def _no_links(before: Run, after: Run) -> str:
@@ -625,7 +616,7 @@ def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]
     worse, better = kinds & {NEW, LOUDER}, kinds & {RESOLVED, QUIETER}
     told = f"{'WORSE' if worse else 'BETTER' if better else 'SAME'}   {_counts(found)}".strip()
     verdict = views.log_verdict(recording, "findings" if worse else "ok", told)
-    text = views.text("Before \u2192 after", "/report")
+    text = views.text("Before \u2192 after")
     if found:
-        text = views.tabs(text, views.events("Changes", "/events"))
+        text = views.tabs(text, views.events("Changes"))
     return views.above(verdict, (text, ABOVE))

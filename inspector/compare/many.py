@@ -115,7 +115,7 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         title = f"{several.names[0]} and {len(several.names) - 1} more"
         log_report(recording, title, report(several), properties)
         rest = WHOLE - views.VERDICT - sum(size for _, size in rows)
-        table = (views.text("Runs", "/report", titled=False), rest)
+        table = (views.text("Runs", titled=False), rest)
         whole = views.above(verdict, table, *rows)
         event = several.longest
         loop = None if event is None else (event.start, event.stop)

@@ -401,7 +401,8 @@ class Drawing:
         self._titles["Scores"] = [SCORES]
         shades = [self._colours[name] for name in self._rows]
         names = [spoken(name) for name in self._rows]
-        views.style_bands(recording, "/class/found", names, shades, views.COPIES)
+        found = dict(zip(names, shades, strict=True))
+        views.style_bands(recording, "/class/found", found, views.COPIES)
         named = views.row_labels(names, list(map(panels.readable, shades)))
         views.log_beside(recording, self._classes, named, nothing)
 
@@ -489,7 +490,7 @@ class Drawing:
             views.timed(NOISE_PANEL, title="Noise", between=None, last=SHOWN),
             views.timed(SPECTROGRAM_PANEL, title="Spectrum", last=SHOWN),
         ]
-        left = [(views.events("Events", "/events"), 2.4)]
+        left = [(views.events("Events"), 2.4)]
         if self._classes is not None:  # otherwise there is no verdict
             over_time.insert(0, views.timed(self._classes, title="Classes", last=SHOWN))
             left.insert(0, (views.drawing("/verdict"), 0.32))

@@ -131,9 +131,9 @@ def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tup
     kinds = spoken(analysis.headline).partition(": ")[2] or "no finding"
     told = {"findings": f"FAIL   {kinds}", "ok": f"PASS   {kinds}", "cannot-tell": "CANNOT TELL"}
     parts = [views.log_verdict(recording, analysis.status, told[analysis.status])]
-    parts.append((views.text("Findings", "/report", titled=False), height(markdown)))
+    parts.append((views.text("Findings", titled=False), height(markdown)))
     if count := len(panels.listed_events(analysis)):
-        events = views.events("Click a time to go there", "/events")
+        events = views.events("Click a time to go there")
         parts.append((events, EVENTS + EVENT * min(count, 4)))
     return parts
 

@@ -27,7 +27,7 @@ from urllib.parse import quote
 
 import noisemodel as nm
 from inspector.errors import InspectorError
-from noisemodel.files import refuse_existing, replacing
+from noisemodel.files import replacing
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -318,7 +318,6 @@ def require_driver() -> None:
 def shoot(recording: Path, output: Path, seconds: float, *, overwrite: bool = False) -> None:
     """Take a picture of a recording at a time, in [s]."""
     require_driver()
-    refuse_existing(output, overwrite=overwrite)
     with headless_viewer() as client:
         png = picture(client, recording, seconds)
     with replacing(output, overwrite=overwrite) as temporary:

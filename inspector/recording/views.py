@@ -130,15 +130,15 @@ def robot(name: str, origin: str, camera: Camera) -> Part:
     )
 
 
-def text(name: str, origin: str, *, titled: bool = True) -> Part:
-    """Show a document."""
-    return rrb.TextDocumentView(origin=origin, name=name, titlebar=None if titled else False)
+def text(name: str, *, titled: bool = True) -> Part:
+    """Show the report."""
+    return rrb.TextDocumentView(origin="/report", name=name, titlebar=None if titled else False)
 
 
-def events(name: str, origin: str) -> Part:
-    """List log lines; a click on the time of one goes there."""
+def events(name: str) -> Part:
+    """List the events; a click on the time of one goes there."""
     columns = rrb.TextLogColumns(text_log_columns=["Body"])
-    return rrb.TextLogView(origin=origin, name=name, columns=columns)
+    return rrb.TextLogView(origin="/events", name=name, columns=columns)
 
 
 def tabs(*parts: Part, name: str | None = None) -> Part:
@@ -207,23 +207,19 @@ def log_stretches(
     start, after = union(whole + np.array([0, 1])).T
     apart = np.stack((start, after - 1, after), axis=1)  # a value that is none ends a band
     values = np.tile([middle, middle, np.nan], len(apart))[:, None].repeat(copies, axis=1)
-    style_bands(recording, path, [name], [color], copies)
+    style_bands(recording, path, {name: color}, copies)
     index = rr.TimeColumn(TIMELINE, duration=apart.ravel().astype("timedelta64[ns]"))
     recording.send_columns(path, indexes=[index], columns=band_columns(values, half))
 
 
 def style_bands(
-    recording: rr.RecordingStream,
-    path: str,
-    names: Sequence[str],
-    shades: Sequence[Color],
-    copies: int,
+    recording: rr.RecordingStream, path: str, bands: Mapping[str, Color], copies: int
 ) -> None:
     """Log names and colours of bands that `band_columns` draws, each so many times."""
     style = rr.Measurements.from_fields(
-        names=[name for name in names for _ in range(copies)],
-        colors=[shade for shade in shades for _ in range(copies)],
-        widths=[0.0] * len(names) * copies,
+        names=[name for name in bands for _ in range(copies)],
+        colors=[shade for shade in bands.values() for _ in range(copies)],
+        widths=[0.0] * len(bands) * copies,
     )
     recording.log(path, style, static=True)
 
