@@ -20,9 +20,9 @@ from inspector.recording.robot import Drawn
 from inspector.recording.views import Label, Panel, Part, Timed
 from inspector.reference.judging import Comparison
 from inspector.reference.levels import HOP
-from inspector.report import brief, classes_of, finding_of, missed, spoken
-from noiseclassifier import Event, Labels
-from noisemodel import Block, Robot, Run
+from inspector.report import classes_of, spoken
+from noiseclassifier import Labels
+from noisemodel import Robot, Run
 from noisemodel.noise import REFERENCE_POWER, LinkNoise, decibel, vibrating
 from noisemodel.types import Array, Mask, Real
 
@@ -115,23 +115,10 @@ MARKERS: tuple[MarkerShapeLike, ...] = (
 
 def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed]:
     """Log the classes that a model found, and those that are annotated; nothing without any."""
-    run, labels = analysis.run, analysis.labels
-    colours = colours_of(analysis)
-    if labels is not None:
-        centres = (labels.start + labels.stop) / 2
-        for name, score in zip(labels.classes, labels.scores.T, strict=True):
-            line = {spoken(name): colours[name]}
-            views.log_lines(recording, f"/score/{name}", centres, score[:, None], line)
-    if rows := listed_events(analysis):
-        listed = [  # in colours that are legible in light themes, too
-            (event.start, f"{how}: {brief(analysis, event)}", colours[event.label])
-            for how, event in rows
-        ]
-        views.log_events(recording, listed, [how == "found" for how, _ in rows])
-    names = classes_of(analysis)
+    run, labels, names = analysis.run, analysis.labels, classes_of(analysis)
     if not names:
         return []
-    lost = gaps(run)
+    lost, colours = gaps(run), colours_of(analysis)
     titles = [*map(spoken, names), *(["gap: no samples"] if lost else [])]
     count = len(titles)
     panel = Panel("class", ROW * count + views.AXIS)
@@ -229,17 +216,6 @@ def log_marks(
     recording.log(path, points, static=True)
     time, place = np.array(marks).T
     recording.send_columns(path, indexes=[views.at(time)], columns=views.scalars(place))
-
-
-def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
-    """List findings, and annotated failures that were not found, by time."""
-    rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
-    rows += [
-        ("annotated" if analysis.labels is None else missed(analysis, block), block)
-        for block in analysis.run.blocks
-        if block.label != "ok" and finding_of(analysis, block) is None
-    ]
-    return sorted(rows, key=lambda row: row[1].start)
 
 
 NOISE_POINTS = 100_000
@@ -552,13 +528,11 @@ def log_heat(
 
 def band_axis(panel: Panel, edges: Array, title: str) -> list[Label]:
     """Title and ticks at the left of a panel of bands, whose axis is logarithmic."""
-    low, high = float(edges[0]), float(edges[-1])
-    span = np.log(max(high / low, 1.01))
-    marks = [
-        Label(float(np.log(tick / low) / span), views.hertz(tick), 40.0)
-        for tick in views.ticks(low, max(high, 1.01 * low), panel)
-    ]
-    return [Label(0.5, title, -22.0), *marks]
+    labels, (low, high) = [Label(0.5, title, -22.0)], edges[[0, -1]].tolist()
+    for tick in views.ticks(low, high, panel):
+        text = f"{tick:g} Hz" if tick < 1000 else f"{tick / 1000:g} kHz"
+        labels.append(Label(float(np.log(tick / low) / np.log(high / low)), text, 40.0))
+    return labels
 
 
 DETAIL = 0.5  # duration of a detail, in [s]

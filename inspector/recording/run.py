@@ -16,7 +16,9 @@ from inspector.recording import panels, robot, views
 from inspector.recording.robot import Drawn
 from inspector.recording.views import Part
 from inspector.reference.judging import Comparison
-from inspector.report import report, spoken
+from inspector.report import brief, finding_of, missed, report, spoken
+from noiseclassifier import Event
+from noisemodel import Block
 from noisemodel.files import replacing
 
 APPLICATION = "inspector"
@@ -114,7 +116,10 @@ def write(
 
 
 def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tuple[Part, float]]:
-    """Log verdict, report and what a program wants to know; the parts at the top with heights."""
+    """Log verdict, report, and events; the parts that show them with their heights.
+
+    Events are findings, and annotated failures that were not found.
+    """
     run, links, markdown = analysis.run, analysis.links, report(analysis)
     properties = {
         "input_sha256": analysis.sha256,
@@ -132,9 +137,21 @@ def _log_findings(recording: rr.RecordingStream, analysis: Analysis) -> list[tup
     told = {"findings": f"FAIL   {kinds}", "ok": f"PASS   {kinds}", "cannot-tell": "CANNOT TELL"}
     parts = [views.log_verdict(recording, analysis.status, told[analysis.status])]
     parts.append((views.text("Findings", titled=False), height(markdown)))
-    if count := len(panels.listed_events(analysis)):
-        events = views.events("Click a time to go there")
-        parts.append((events, EVENTS + EVENT * min(count, 4)))
+    rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
+    rows += [
+        ("annotated" if analysis.labels is None else missed(analysis, block), block)
+        for block in run.blocks
+        if block.label != "ok" and finding_of(analysis, block) is None
+    ]
+    if rows:
+        rows.sort(key=lambda row: row[1].start)
+        colours = panels.colours_of(analysis)  # legible in light themes, too
+        listed = [
+            (event.start, f"{how}: {brief(analysis, event)}", colours[event.label])
+            for how, event in rows
+        ]
+        views.log_events(recording, listed, [how == "found" for how, _ in rows])
+        parts.append((views.events("Click a time to go there"), EVENTS + EVENT * min(len(rows), 4)))
     return parts
 
 
@@ -167,7 +184,11 @@ def _log_strips(
     if drawn is not None and links is not None:
         strips.append(panels.log_links(recording, drawn, analysis, links))
     parts = [part for part, _ in strips]
-    if analysis.labels is not None:
+    if (labels := analysis.labels) is not None:
+        centres, colours = (labels.start + labels.stop) / 2, panels.colours_of(analysis)
+        for name, score in zip(labels.classes, labels.scores.T, strict=True):
+            line = {spoken(name): colours[name]}
+            views.log_lines(recording, f"/score/{name}", centres, score[:, None], line)
         parts.append(views.plot("Scores", "/score", views.ALL, legend=True))
     parts += panels.log_joints(
         recording, run, panels.limbs(run.joint_names, drawn.robot if drawn else None)

@@ -466,11 +466,6 @@ def ticks(low: float, high: float, panel: Panel) -> list[float]:
     return [float(value) for value in values if low * 0.999 <= value <= top]
 
 
-def hertz(value: float) -> str:
-    """A frequency, such as "20 Hz" or "1 kHz"."""
-    return f"{value:g} Hz" if value < 1000 else f"{value / 1000:g} kHz"
-
-
 def log_verdict(
     recording: rr.RecordingStream, verdict: str, text: str, time: float | None = None
 ) -> Timed:
