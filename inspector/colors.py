@@ -74,17 +74,13 @@ HEAT = np.array(
 BEFORE, SAME, AFTER = (86, 180, 233), (62, 68, 80), (240, 160, 30)
 
 
-def heat(level: NDArray[np.floating]) -> NDArray[np.uint8]:
+def heat(level: NDArray[np.floating], shades: NDArray[np.float64] = HEAT) -> NDArray[np.uint8]:
     """Colour levels from 0 to 1, by red, green, blue and opacity, shape (…, 4)."""
-    return _between(HEAT, level)
+    place, steps = np.asarray(level) * (len(shades) - 1), np.arange(len(shades))
+    channels = [np.interp(place, steps, shades[:, channel]) for channel in range(3)]
+    return np.stack([*channels, np.full(place.shape, 255.0)], axis=-1).astype(np.uint8)
 
 
 def diverging(level: NDArray[np.floating]) -> NDArray[np.uint8]:
     """Colour changes: blue at 0, grey at 0.5, orange at 1."""
-    return _between(np.array([BEFORE, SAME, AFTER], dtype=np.float64), level)
-
-
-def _between(shades: NDArray[np.float64], level: NDArray[np.floating]) -> NDArray[np.uint8]:
-    place, steps = np.asarray(level) * (len(shades) - 1), np.arange(len(shades))
-    channels = [np.interp(place, steps, shades[:, channel]) for channel in range(3)]
-    return np.stack([*channels, np.full(place.shape, 255.0)], axis=-1).astype(np.uint8)
+    return heat(level, np.array([BEFORE, SAME, AFTER], dtype=np.float64))

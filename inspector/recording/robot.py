@@ -5,7 +5,6 @@ The camera is as near as it sees every point in the motion, and the floor below.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import chain, product
 from typing import Any
 
@@ -38,14 +37,9 @@ class Drawn:
     origin: str  # entity path that all of it lies under
     # Outermost points of what each joint moves, in its axes, in [m]; 0 is fixed to the world.
     outermost: Mapping[int, Array]
+    links: Sequence[str]  # what each joint moves, in the same order
     moves: bool  # whether its base does, which the camera follows on the floor
     mimics: Mapping[str, Mimic]
-
-    @cached_property
-    def links(self) -> list[str]:
-        """What each joint moves, in the order of `outermost`."""
-        names = (FIXED, *link_names(self.robot))
-        return [names[joint] for joint in self.outermost]
 
     def frame(self, link: str) -> str:
         """Name of a frame of transforms."""
@@ -133,7 +127,9 @@ def log_robot(
         corners = mesh.reshape(-1, 3)
         outermost[index] = corners[np.unique((corners @ DIRECTIONS.T).argmax(axis=0))]
     outermost = outermost or dict.fromkeys(carried, np.zeros((1, 3)))
-    drawn = Drawn(robot, f"robot_{side}" if side else "robot", outermost, moves, mimics)
+    names = (FIXED, *link_names(robot))
+    links = [names[joint] for joint in outermost]
+    drawn = Drawn(robot, f"robot_{side}" if side else "robot", outermost, links, moves, mimics)
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for link, mesh in zip(drawn.links, meshes.values(), strict=False):
         shape = rr.Asset3D(contents=_stl(mesh), media_type=rr.MediaType.STL, albedo_factor=color)
@@ -187,12 +183,11 @@ def log_robots(
             base, poses = None, drawn.poses(1, {}, None)
         found.append((drawn, base))
         seen.append(reached(drawn, poses))
-    camera, cameras = fitted(chain(*seen), aspect=aspect), list[tuple[Drawn, Camera]]()
+    camera = fitted(chain(*seen), aspect=aspect)
     for drawn, base in found:
-        cameras.append((drawn, standing(camera, drawn)))
         if base is not None:
             log_floor(recording, drawn, camera, base)
-    return cameras
+    return [(drawn, standing(camera, drawn)) for drawn, _ in found]
 
 
 # Of the viewer's camera, from the lower to the upper edge, in [rad].

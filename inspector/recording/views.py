@@ -459,7 +459,7 @@ def ticks(low: float, high: float, panel: Panel) -> list[float]:
     powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
     for factors in ((1, 2, 5), (1, 3), (1,)):
         gaps = np.log10(np.append(factors[1:], 10) / np.array(factors))
-        if gaps.min() * decade >= APART or factors == (1,):
+        if gaps.min() * decade >= APART:
             break
     values = np.outer(powers, factors).ravel()
     top = high / 10.0 ** (HALF / 2 / decade)  # so that it is not above its place
