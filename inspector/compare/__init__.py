@@ -281,15 +281,15 @@ def _no_links(before: Run, after: Run) -> str:
 
 @dataclass(frozen=True)
 class Level:
-    """How loud both runs are, in [dB]."""
+    """How loud both runs are, in [dB]; silence is at `FLOOR_DB`."""
 
     before: float
     after: float
 
     @property
     def change(self) -> float:
-        """By how much it became louder, in [dB]; 0 where it is silent in both."""
-        return 0.0 if self.before == self.after else self.after - self.before
+        """By how much it became louder, in [dB]."""
+        return self.after - self.before
 
 
 def spectra(pair: Pair, joint: str = "") -> list[Spectrogram]:
@@ -422,8 +422,8 @@ def report(pair: Pair) -> str:
     title = "finding" if labelled(pair) else "annotated"
     rows = [("", title, "time [s]", "before [dB]", "after [dB]", "change"), ("---",) * 6]
     for each in sorted(changes(pair), key=lambda change: (KINDS.index(change.kind), change.start)):
-        when, both = f"{each.start:.2f} to {each.stop:.2f}", (each.level.before, each.level.after)
-        before, after = (f"{value:.1f}" if np.isfinite(value) else "silent" for value in both)
+        when = f"{each.start:.2f} to {each.stop:.2f}"
+        before, after = f"{each.level.before:.1f}", f"{each.level.after:.1f}"
         what, change = f"**{each.kind}**", f"{each.level.change:+.1f}"
         rows.append((what, spoken(each.label), when, before, after, change))
     if len(rows) > 2:

@@ -119,8 +119,7 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
     if not names:
         return []
     lost, colours = gaps(run), colours_of(analysis)
-    titles = [*map(spoken, names), *(["gap: no samples"] if lost else [])]
-    count = len(titles)
+    count = len(names) + bool(lost)
     panel = Panel("class", ROW * count + views.AXIS)
     for row, name in enumerate(names):
         shades, place = (colours[name], views.INK), (row, count)
@@ -130,12 +129,12 @@ def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> list[Timed
             log_marks(recording, name, row, colours[name], marks)
     if lost:
         log_gaps(recording, "/class", run, (0.1 * views.TOP / count, 0.9 * views.TOP / count))
+    titles = [*map(spoken, names), "gap: no samples"][:count]
     inks = [*(readable(colours[name]) for name in names), views.INK][:count]
-    both = labels is not None and bool(run.blocks)
-    told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")] if both else []
-    only = "found" if labels is not None else "annotated"
-    left, right = views.row_labels(titles, inks), told or [Label(0.5, only)]
-    views.log_beside(recording, panel, left, right)
+    told = [Label(0.5, "annotated" if labels is None else "found")]
+    if labels is not None and run.blocks:
+        told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")]
+    views.log_beside(recording, panel, views.row_labels(titles, inks), told)
     return [views.timed(panel)]
 
 

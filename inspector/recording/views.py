@@ -368,7 +368,7 @@ def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: 
     bar = rr.LineStrips2D(strips, colors=shades, radii=rr.Radius.ui_points(6.0))
     recording.log(f"/axis/{panel.name}/right/scale", bar, static=True)
     room = max(1.0, (top - low) * (GROWN * panel.height - AXIS) / LINE)  # of labels
-    every = max(1, int(np.ceil(len(scale.ticks) / room)))
+    every = int(np.ceil(len(scale.ticks) / room))
     ticks = [
         Label(low + (top - low) * float(scale.place(np.array(tick))), written(tick), 8.0)
         for tick in scale.ticks[::-every][::-1]
