@@ -64,29 +64,21 @@ def limbs(names: Sequence[str], robot: Robot | None) -> dict[str, tuple[str, ...
 
 def _chains(names: Sequence[str], robot: Robot) -> list[tuple[str, ...]]:
     """Follow the robot outwards: a limb begins where it branches, and has two joints or more."""
-    known = ["", *(joint.name for joint in robot.joints)]
-    above = {joint.name: known[joint.parent] for joint in robot.joints}
-    carrier: dict[str, str] = {}  # the next of the named joints towards the root, if there is one
-    for name in names:
-        link = above[name]
-        while link and link not in names:
-            link = above[link]
-        carrier[name] = link
+    nearest, carrier = [""], dict[str, str]()  # the named joint at or above each; above the named
+    for joint in robot.joints:  # parents come first
+        above = nearest[joint.parent]
+        if joint.name in names:
+            carrier[joint.name] = above
+        nearest.append(joint.name if joint.name in names else above)
     branches = Counter(carrier.values())
-
-    def first(name: str) -> str:
-        """The joint that the limb of a joint begins with."""
-        while before := carrier[name]:
-            if branches[name] and branches[before] > 1:  # no finger
-                return name
-            name = before
-        return name if branches[name] else ""  # wheels belong together
-
-    firsts = {name: first(name) for name in names}
-    return [
-        tuple(name for name in names if firsts[name] == limb)
-        for limb in dict.fromkeys(firsts.values())
-    ]
+    limb: dict[str, str] = {}  # the joint that the limb of a joint begins with
+    for name, before in carrier.items():
+        if before and not (branches[name] and branches[before] > 1):  # such as a finger
+            limb[name] = limb[before]
+        else:
+            limb[name] = name if branches[name] else ""  # wheels belong together
+    firsts = dict.fromkeys(limb[name] for name in names)
+    return [tuple(name for name in names if limb[name] == first) for first in firsts]
 
 
 def _limb_title(joints: Sequence[str]) -> str:
