@@ -176,13 +176,12 @@ def together(before: Run, after: Run, alignment: Alignment) -> tuple[Run, Run, t
         )
     time, lag = before.time[first:stop], alignment.lag
     cut = _cut(before, first, stop, time), _cut(after, first - lag, stop - lag, time)
-    left = [run.duration - own.duration for run, own in zip((before, after), cut, strict=True)]
-    remarks = (
+    remarks = tuple(
         f"The run {which} has {more:.2f} s that the other one has not: they are not compared."
-        for which, more in zip(SIDES, left, strict=True)
-        if more >= REMARKED
+        for which, run, own in zip(SIDES, (before, after), cut, strict=True)
+        if (more := run.duration - own.duration) >= REMARKED
     )
-    return *cut, tuple(remarks)
+    return *cut, remarks
 
 
 def _cut(run: Run, first: int, stop: int, time: Array) -> Run:
