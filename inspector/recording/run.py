@@ -110,8 +110,8 @@ def write(
         whole = views.beside(
             (views.above(*left, (details, DETAILS)), 36.0), (views.above(*over_time), 64.0)
         )
-        failures = [(moment.start, moment.stop) for moment in moments if moment.label != LOUDEST]
-        loop = failures[0] if failures else None
+        failures = ((each.start, each.stop) for each in moments if each.label != LOUDEST)
+        loop = next(failures, None)
         recording.send_blueprint(views.blueprint(whole, loop))  # instead of an older run's
 
 
@@ -190,9 +190,8 @@ def _log_strips(
             line = {spoken(name): colours[name]}
             views.log_lines(recording, f"/score/{name}", centres, score[:, None], line)
         parts.append(views.plot("Scores", "/score", views.ALL, legend=True))
-    parts += panels.log_joints(
-        recording, run, panels.limbs(run.joint_names, drawn.robot if drawn else None)
-    )
+    limbs = panels.limbs(run.joint_names, drawn.robot if drawn else None)
+    parts += panels.log_joints(recording, run, limbs)
     lowest = max((size for _, size in strips), default=160.0)
     return views.tabs(*parts), lowest + TITLES
 

@@ -16,7 +16,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -162,13 +162,12 @@ def blueprint(
     content: Part, loop: tuple[float, float] | None = None, *, following: bool = False
 ) -> rrb.Blueprint:
     """Fill the window with a part; playing repeats a stretch of time, if there is one, in [s]."""
-    playing: Literal["following", "paused"] = "following" if following else "paused"
     selected = loop and rrb.components.AbsoluteTimeRange(*(round(1e9 * each) for each in loop))
     time = rrb.TimePanel(
         state="collapsed",
         timeline=TIMELINE,
-        play_state=playing,
-        loop_mode=None if loop is None else "selection",
+        play_state="following" if following else "paused",
+        loop_mode="selection" if loop else None,
         time_selection=selected,
     )
     return rrb.Blueprint(
@@ -509,11 +508,8 @@ def log_rows(
         # A segment takes the colour of its end.
         kept = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1), [True]))
         shown = np.concatenate((own[:1], own))[kept]
-        recording.send_columns(
-            entity,
-            indexes=[at(edges[kept])],
-            columns=shaded(place + apart, shown[:, None].repeat(lines, axis=1)),
-        )
+        columns = shaded(place + apart, shown[:, None].repeat(lines, axis=1))
+        recording.send_columns(entity, indexes=[at(edges[kept])], columns=columns)
 
 
 def shaded(places: Array, rgba: NDArray[np.uint8]) -> list[Any]:
