@@ -64,7 +64,8 @@ def limbs(names: Sequence[str], robot: Robot | None) -> dict[str, tuple[str, ...
 
 def _chains(names: Sequence[str], robot: Robot) -> list[tuple[str, ...]]:
     """Follow the robot outwards: a limb begins where it branches, and has two joints or more."""
-    nearest, carrier = [""], dict[str, str]()  # the named joint at or above each; above the named
+    nearest = [""]  # of each joint, itself if it is among the names, or else the next above
+    carrier: dict[str, str] = {}  # the next of the named joints towards the root, if there is one
     for joint in robot.joints:  # parents come first
         above = nearest[joint.parent]
         if joint.name in names:
