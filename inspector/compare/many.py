@@ -172,9 +172,8 @@ def _names(several: Several, panel: Panel) -> list[Label]:
 def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) -> Timed:
     colours = panels.colours_of(*several.sides)
     lanes = [side.lane for side in several.sides]
-    edges = np.unique([0.0, *(time for lane in lanes for each in lane for time in each[:2])])
-    if len(edges) < 2:
-        edges = np.array([0.0, 1.0])
+    times = [time for lane in lanes for each in lane for time in each[:2]]
+    edges = np.unique([0.0, *(times or [1.0])])
     rgba = np.tile(np.array(views.EMPTY, dtype=np.uint8), (len(lanes), len(edges) - 1, 1))
     for row, lane in enumerate(lanes):
         for start, stop, name in lane:
