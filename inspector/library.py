@@ -80,8 +80,8 @@ def load_library(chosen: Sequence[str | Path] | None = None) -> Library:
 def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) -> Labelled:
     """Label a run by the model of the nearest rate at or below its own whose signals it has.
 
-    Where each value of a slower log is there several times (`clocks.without_hold`), it is labelled as
-    that slower log.
+    Where each value of a slower log is there several times (`clocks.without_hold`), it is labelled
+    as that slower log.
     """
     slower = without_hold(run) if slower is None else slower
     try:
