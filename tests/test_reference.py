@@ -248,6 +248,14 @@ def test_a_base_without_joints_is_not_accepted_and_has_no_reference(own):
     assert "upperarm, elbow, and the run of a robot without joints" in out
 
 
+def test_a_reference_counts_in_the_process_that_writes_it(tmp_path, simulate):
+    path, written = tmp_path / "pick-1.npz", tmp_path / "reference"
+    simulate.run("pick", 1).save(path)
+    assert store.find(path) is None
+    assert call("accept", path, "--reason", "first", "-o", written)[::2] == (0, "")
+    assert store.find(path) == written
+
+
 def test_what_no_reference_covers_is_decided_by_the_general_model(own, simulate):
     run = simulate.run("pick", 9)
     tone = 0.3 * np.sin(600 * np.pi * run.time) * np.exp(-(((run.time - 3) / 0.3) ** 2))

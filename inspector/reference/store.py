@@ -383,6 +383,7 @@ def save(reference: Reference, folder: Path) -> None:
         lines += ["", *_lines(scenario, margin, name, sha256)]
     with replacing(folder / NAME, overwrite=True) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    _nearest.cache_clear()  # runs that were asked about before have it now
     for path in folder.glob("*.npz"):  # of scenarios that people removed
         if path.name not in names and _holds_levels(path):
             path.unlink(missing_ok=True)
