@@ -13,8 +13,9 @@ Sources:
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -180,15 +181,17 @@ def scored(run: Run, log: str, *, episode: str = "") -> Episode:
     if slower is not run:
         remarks.append(f"Values are held: scored at {slower.rate:g} Hz, their rate.")
     run, rate = slower, slower.rate
-    part = max(stretches(run.mask, len(run.time)), key=_length, default=slice(0, 1))
-    if _length(part) < run.mask.sum():
+    whole = stretches(run.mask, len(run.time))
+    part = max(whole, key=lambda each: each.stop - each.start, default=slice(0, 1))
+    samples = part.stop - part.start
+    if samples < run.mask.sum():
         remarks.append("The longest stretch without a gap was scored.")
     if "velocity" in run.meta.get("differentiated", {}) and run.position is not None:
         velocity = np.diff(_angles(run.position[part]), axis=0) * rate
         remarks.append("Velocities are first differences of positions.")
     else:
         velocity = np.asarray(run.velocity[part], dtype=np.float64)
-    seconds = _length(part) / rate
+    seconds = samples / rate
     found: dict[str, tuple[float | None, str]] = {}
     reason = f"{seconds:.3g} s are too short for {FAST:g} Hz"
     if rate < 2 * BAND * FAST:
@@ -211,10 +214,6 @@ def scored(run: Run, log: str, *, episode: str = "") -> Episode:
     return Episode(log, episode, seconds, rate, scores, missing, tuple(remarks))
 
 
-def _length(part: slice) -> int:
-    return int(part.stop - part.start)
-
-
 def _actions(commanded: Array) -> Array:
     """What was commanded, once for each action, shape (actions, joints)."""
     held = round(hold_length(commanded))
@@ -232,32 +231,28 @@ def _angles(position: Real) -> Array:
 # --- episodes of logs
 
 
-@dataclass(frozen=True)
-class Failed:
-    """A log or an episode that cannot be read, and why, in one line."""
+def scored_episodes(
+    paths: Sequence[Path], reading: Reading
+) -> tuple[list[Episode], list[tuple[str, str]]]:
+    """Read and score the episodes of logs and folders; one that cannot be read stops no other.
 
-    name: str
-    problem: str
-
-
-def scored_episodes(paths: Sequence[Path], reading: Reading) -> list[Episode | Failed]:
-    """Read and score the episodes of logs and folders; one that cannot be read stops no other."""
-    found, failed = list[Source](), list[Episode | Failed]()
+    Also gives the name of each log and episode that cannot be read, and why, in one line.
+    """
+    found, unread = list[Source](), []
     for path in paths:
         try:
             found += sources([path], reading)[0]
         except EXPECTED as error:
-            failed.append(Failed(str(path), without_path(error, path)))
-
-    def score(each: Source) -> Episode | Failed:
+            unread.append((str(path), without_path(error, path)))
+    episodes, failed = [], []
+    for each in progress(found, "score", total=len(found)):
         log, name = str(each.path), each.episode
         try:
-            return scored(open_source(each, reading).run, log, episode=name)
+            episodes.append(scored(open_source(each, reading).run, log, episode=name))
         except EXPECTED as error:
             shown = f"{log} episode {name}" if name else log
-            return Failed(shown, without_path(error, each.path))
-
-    return [*progress(map(score, found), "score", total=len(found)), *failed]
+            failed.append((shown, without_path(error, each.path)))
+    return episodes, failed + unread
 
 
 # --- ranking
@@ -269,7 +264,7 @@ class Ranking:
 
     by: str  # the score that they are ordered by
     episodes: tuple[Episode, ...]  # the smoothest first; those without this score last
-    failed: tuple[Failed, ...] = ()  # what could not be read
+    failed: Sequence[tuple[str, str]] = ()  # name of what could not be read, and why
 
     @property
     def ranks(self) -> tuple[int | None, ...]:
@@ -287,26 +282,22 @@ def default_order(episodes: Sequence[Episode]) -> str:
     """
     actions = all(episode.episode for episode in episodes)
     names = ORDERS if actions else sorted(ORDERS, key=lambda name: name.startswith("action"))
-    known = []
-    for name in names:
-        values = {episode.scores[name] for episode in episodes}
-        if None not in values:
-            known.append((len(values) == 1, name))
+    values = {name: {episode.scores[name] for episode in episodes} for name in names}
+    known = [name for name in names if None not in values[name]]
     # The first that tells episodes apart, else the first that all have.
-    return min(known, key=lambda each: each[0], default=(True, "level"))[1]
+    return min(known, key=lambda name: len(values[name]) == 1, default="level")
 
 
-def ranked(found: Iterable[Episode | Failed], *, by: str = "") -> Ranking:
+def ranked(
+    episodes: Sequence[Episode], failed: Sequence[tuple[str, str]] = (), *, by: str = ""
+) -> Ranking:
     """Order episodes from the smoothest to the roughest, by default as `default_order` has it."""
-    each = tuple(found)
-    episodes = [one for one in each if isinstance(one, Episode)]
     by = by or default_order(episodes)
 
     def roughness(episode: Episode) -> tuple[bool, float]:
         value = episode.scores[by]
         return value is None, 0.0 if value is None else -SCORES[by].smooth * value
 
-    failed = tuple(one for one in each if isinstance(one, Failed))
     return Ranking(by, tuple(sorted(episodes, key=roughness)), failed)
 
 
@@ -317,16 +308,18 @@ def as_text(ranking: Ranking) -> str:
         return "0 episodes"
     heads = [("rank", ""), ("episode", ""), ("duration", "s"), ("rate", "Hz")]
     heads += [(score.title, score.unit) for score in SCORES.values()]
-    names = _short([episode.name for episode in episodes])
+    parts = [Path(episode.name).parts for episode in episodes]
+    folders = zip(*(each[:-1] for each in parts), strict=False)
+    shared = len(list(takewhile(lambda names: len(set(names)) == 1, folders)))
     rows = [
         [
             "" if rank is None else str(rank),
-            name,
+            str(Path(*path[shared:])),
             f"{episode.duration:.2f}",
             f"{episode.rate:g}",
             *(_cell(score, value) for score, value in episode.scores.items()),
         ]
-        for rank, name, episode in zip(ranking.ranks, names, episodes, strict=True)
+        for rank, path, episode in zip(ranking.ranks, parts, episodes, strict=True)
     ]
     rows = [[title for title, _ in heads], [unit for _, unit in heads], *rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -366,14 +359,13 @@ def as_json(ranking: Ranking) -> str:
         }
         for rank, each in zip(ranking.ranks, ranking.episodes, strict=True)
     ]
-    failed = {each.name: each.problem for each in ranking.failed}
     document = {
         "format": FORMAT,
         "by": ranking.by,
         "scores": scores,
         "settings": settings,
         "episodes": episodes,
-        "failed": failed,
+        "failed": dict(ranking.failed),
     }
     return json.dumps(document, indent=2, ensure_ascii=False)
 
@@ -381,7 +373,6 @@ def as_json(ranking: Ranking) -> str:
 def _notes(ranking: Ranking) -> Iterator[str]:
     """Say what is missing, what was decided, and what to look at, each once."""
     episodes = ranking.episodes
-
     for score in SCORES.values():
         reasons = [each.reasons[score.name] for each in episodes if score.name in each.reasons]
         if reasons:
@@ -392,7 +383,7 @@ def _notes(ranking: Ranking) -> Iterator[str]:
         yield remark if count == len(episodes) else f"{count} of {len(episodes)}: {remark}"
     rates = sorted({episode.rate for episode in episodes})
     if len(rates) > 1:
-        yield (f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only.")
+        yield f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only."
     yield f"SPARC: cut-off {CUTOFF:g} Hz. SPARC and LDLJ: higher is smoother; others: lower."
     # What to look at: the roughest episode, or that all are equal.
     ordered = [each for each in episodes if each.scores[ranking.by] is not None]
@@ -404,15 +395,6 @@ def _notes(ranking: Ranking) -> Iterator[str]:
         return
     command = f"inspector import {last.log} --episode {last.episode} -o roughest.npz"
     yield f"The roughest by {title}: {command if last.episode else f'inspector view {last.log}'}"
-
-
-def _short(names: Sequence[str]) -> list[str]:
-    """Names without the folders that all share."""
-    parts = [Path(name).parts for name in names]
-    shared = 0
-    while all(len(each) > shared + 1 and each[shared] == parts[0][shared] for each in parts):
-        shared += 1
-    return [str(Path(*each[shared:])) for each in parts]
 
 
 def _cell(name: str, value: float | None) -> str:

@@ -346,10 +346,10 @@ def smoothness(
     """
     from inspector import smoothness as ranking
 
-    order = ranking.ranked(ranking.scored_episodes(logs, ctx.obj), by=by or "")
+    order = ranking.ranked(*ranking.scored_episodes(logs, ctx.obj), by=by or "")
     typer.echo(ranking.as_json(order) if format == "json" else ranking.as_text(order))
-    for each in order.failed:
-        typer.echo(f"inspector: {each.name}: {each.problem}", err=True)
+    for name, problem in order.failed:
+        typer.echo(f"inspector: {name}: {problem}", err=True)
     raise typer.Exit(3 if order.failed else 0)
 
 
