@@ -250,33 +250,30 @@ class SpectrogramStream:
         self._hop = max(1, self._length // 4)
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
         self.edges = np.geomspace(self._frequency[0], self._frequency[-1], panels.BANDS + 1)
-        self._samples, self._valid = np.zeros((0, 1)), np.zeros(0, dtype=bool)
+        self._samples = np.empty((0, 1))  # that wait for those that follow; NaN where not valid
 
     def skip(self) -> None:
         """Begin anew after a gap, with a window that touches it and is dark."""
-        self._samples, self._valid = np.zeros((self._hop, 1)), np.zeros(self._hop, dtype=bool)
+        self._samples = np.full((self._hop, 1), np.nan)
 
     def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
         """Take samples; centres of windows in [s], and levels, shape (columns, bands)."""
         length, hop = self._length, self._hop
-        held = np.broadcast_to(self._samples, (len(self._valid), velocity.shape[1]))
-        samples = np.concatenate((held, velocity))
-        valid = np.concatenate((self._valid, valid))
+        held = np.broadcast_to(self._samples, (len(self._samples), velocity.shape[1]))
+        samples = np.concatenate((held, np.where(valid[:, None], velocity, np.nan)))
         count = max(0, (len(samples) - length) // hop + 1)
-        self._samples, self._valid = samples[count * hop :], valid[count * hop :]
+        self._samples = samples[count * hop :]
         if not count:
             return np.empty(0), np.empty((0, panels.BANDS))
-        view = np.lib.stride_tricks.sliding_window_view
-        windows = view(samples, length, axis=0)[::hop][:count]  # (windows, joints, length)
-        whole = view(valid, length)[::hop][:count].all(axis=1)
+        # Shape (windows, joints, length).
+        windows = np.lib.stride_tricks.sliding_window_view(samples, length, axis=0)[::hop]
         # In a window, slow motion is a line all but: what is left of it is below 10 Hz.
         ramp = np.arange(length) - (length - 1) / 2
         slope = windows @ ramp / (ramp @ ramp)
         level_windows = (windows - slope[..., None] * ramp).reshape(-1, length)
-        every = amplitudes(level_windows).reshape(*windows.shape[:2], -1)
-        amplitude = every.max(axis=1).T * whole
-        level = 2 * decibel(in_bands(self._frequency, amplitude, self.edges))
-        level = np.clip(SPECTRUM.place(level), 0.0, 1.0).T
+        amplitude = amplitudes(level_windows).reshape(*windows.shape[:2], -1).max(axis=1)
+        level = 2 * decibel(in_bands(self._frequency, amplitude.T, self.edges))
+        level = np.nan_to_num(np.clip(SPECTRUM.place(level), 0.0, 1.0).T)
         since = len(samples) - hop * np.arange(count)  # samples from starts to the end
         return np.asarray(end - (since - length / 2) / self._rate), level
 
@@ -419,7 +416,6 @@ class Drawing:
         """Draw the spectrogram of a stretch without missing samples."""
         if after_gap:
             self._spectrogram.skip()
-        velocity = np.where(valid[:, None], velocity, 0.0)
         end = float(time[-1]) + 1.0 / self._rate
         centres, level = self._spectrogram.push(velocity, valid, end)
         if self._sink.open:
