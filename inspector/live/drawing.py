@@ -61,34 +61,30 @@ class Sink:
         self, save: Path | None = None, connect: str | None = None, *, overwrite: bool = False
     ) -> None:
         self.saved, self.gone = save is not None, False  # gone: there was a viewer, or it is late
-        self._address = (HOST, PORT)
         self._checked = time.monotonic()
         self._asked: float | None = None  # since when the viewer lacks what had been sent by then
         self._ended = Signal()
-        # Of one identity, but two: a viewer that is late or hangs would hold the file up.
-        self._file = self._viewer = None
+        # What takes what is logged: of one identity, but two, since a viewer that is late or hangs
+        # would hold the file up.
+        self.open: list[rr.RecordingStream] = []
+        self._viewer: rr.RecordingStream | None = None
         identity = uuid.uuid4().hex
         places = []
         with ExitStack() as stack:
             if save is not None:
                 file = writing(save, identity, application=APPLICATION, overwrite=overwrite)
-                self._file = stack.enter_context(file)
+                self.open.append(stack.enter_context(file))
                 places.append(f"written to {save}")
             if connect is not None or save is None:
-                host, port = self._address = _viewer(connect)
+                self._address = host, port = _viewer(connect)
                 self._viewer = rr.RecordingStream(APPLICATION, recording_id=identity)
                 self._viewer.set_sinks(rr.GrpcSink(f"rerun+http://{host}:{port}/proxy"))
+                self.open.append(self._viewer)
                 places.append(f"shown by the viewer at {host}:{port}")
                 Thread(target=self._follow, args=(self._viewer,), daemon=True).start()
             self._stack = stack.pop_all()
         self.where = " and ".join(places)
-        self.recording: rr.RecordingStream = cast(Any, _Tee(self))
-
-    @property
-    def open(self) -> list[rr.RecordingStream]:
-        """The sinks that take what is logged: a file does when its viewer is gone."""
-        shown = None if self.gone else self._viewer
-        return [each for each in (self._file, shown) if each is not None]
+        self.recording: rr.RecordingStream = cast(Any, _Tee(self.open))
 
     @property
     def watched(self) -> bool:
@@ -102,6 +98,8 @@ class Sink:
         self._checked = time.monotonic()
         behind = 0.0 if self._asked is None else self._checked - self._asked
         self.gone = behind > LATE or not viewer.listens(*self._address)
+        if self.gone:
+            self.open.remove(self._viewer)
         return not self.gone
 
     def _follow(self, shown: rr.RecordingStream) -> None:
@@ -142,22 +140,30 @@ class Sink:
 
 
 class _Tee:
-    """Logs into every sink that is open, by the methods of a recording."""
+    """Logs into every recording that is open, by the methods of one."""
 
-    def __init__(self, sink: Sink) -> None:
-        self._sink = sink
+    def __init__(self, recordings: Sequence[rr.RecordingStream]) -> None:
+        self._recordings = recordings
 
     def __getattr__(self, name: str) -> Callable[..., None]:
         def log(*args: Any, **options: Any) -> None:
-            for each in self._sink.open:
+            for each in self._recordings:
                 getattr(each, name)(*args, **options)
 
         return log
 
 
 def _viewer(connect: str | None) -> tuple[str, int]:
-    """Find a viewer, or open one."""
-    host, port = (HOST, PORT) if connect is None else _parsed(connect)
+    """Find the viewer at an address, or find or open one on this machine."""
+    host, port = HOST, PORT
+    if connect is not None:
+        match = ADDRESS.fullmatch(connect)
+        if match is None or not 0 < int(match["port"]) < 65536:
+            raise SinkError(
+                f"{connect!r} is no address of a viewer; expected PORT, HOST:PORT or"
+                " rerun+http://HOST:PORT/proxy"
+            )
+        host, port = match["host"] or HOST, int(match["port"])
     if viewer.listens(host, port):
         return host, port
     problem = "nothing listens there; `rerun` starts one"
@@ -170,16 +176,6 @@ def _viewer(connect: str | None) -> tuple[str, int]:
             f"no viewer at {host}:{port}, {problem}; use --connect HOST:PORT or --save FILE.rrd"
         )
     return host, port
-
-
-def _parsed(address: str) -> tuple[str, int]:
-    match = ADDRESS.fullmatch(address)
-    if match is None or not 0 < int(match["port"]) < 65536:
-        raise SinkError(
-            f"{address!r} is no address of a viewer; expected PORT, HOST:PORT or"
-            " rerun+http://HOST:PORT/proxy"
-        )
-    return match["host"] or HOST, int(match["port"])
 
 
 # Lines are drawn at once for this time, in [s]: a message costs more than the points in it.
@@ -214,8 +210,8 @@ class Messages:
         """Let rows wait; `columns` makes rerun's columns of all that waited."""
         if len(time):
             self._waiting.setdefault(path, (columns, []))[1].append((time, values))
-        if urgent and self._watched:
-            self._send(path)
+            if urgent and self._watched:
+                self._send(path)
 
     def passed(self, seconds: float) -> None:
         """Send what waits if enough time has passed."""
@@ -230,11 +226,10 @@ class Messages:
         self._held = 0.0
 
     def _send(self, path: str) -> None:
-        if path in self._waiting:
-            columns, pieces = self._waiting.pop(path)
-            time, values = (np.concatenate(each) for each in zip(*pieces, strict=True))
-            index = rr.TimeColumn(TIMELINE, duration=time)
-            self.recording.send_columns(path, indexes=[index], columns=columns(values))
+        columns, pieces = self._waiting.pop(path)
+        time, values = (np.concatenate(each) for each in zip(*pieces, strict=True))
+        index = rr.TimeColumn(TIMELINE, duration=time)
+        self.recording.send_columns(path, indexes=[index], columns=columns(values))
 
 
 def nanoseconds(time: Array) -> Times:
@@ -354,7 +349,6 @@ class Drawing:
         height = panels.ROW * len(self._rows) + views.AXIS
         self._classes = Panel("class", height) if classes else None
         self._told: str | None = None  # findings of the verdict that is drawn
-        self._begun = False
         self._plots: dict[str, dict[str, slice]] = {}  # columns of each entity, by signal
         self._titles: dict[str, list[str]] = {}  # entities of each plot
         size = panels.JOINTS_PER_PLOT
@@ -405,18 +399,14 @@ class Drawing:
 
     def begin(self, time: float, signals: Mapping[str, Array]) -> None:
         """Send the layout with the first sample, whose pose places the camera."""
-        if self._begun:
-            return
-        self._begun = True
         self.findings(time, ())
         camera = None if self._robot is None else self._robot.camera(signals)
         self._recording.send_blueprint(self._layout(camera))
 
-    def piece(self, time: Array, valid: Mask, velocity: Array, *, after_gap: bool) -> None:
-        """Draw the spectrogram of a stretch without missing samples."""
+    def piece(self, velocity: Array, valid: Mask, end: float, *, after_gap: bool) -> None:
+        """Draw the spectrogram of a stretch without missing samples that ends at a time in [s]."""
         if after_gap:
             self._spectrogram.skip()
-        end = float(time[-1]) + 1.0 / self._rate
         centres, level = self._spectrogram.push(velocity, valid, end)
         if self._sink.open:
             self._messages.add(BANDS_PATH, nanoseconds(centres), level, _heat_map)
@@ -435,8 +425,9 @@ class Drawing:
 
     def _lines(self, time: Array, values: Array, plots: Mapping[str, slice], points: float) -> None:
         shown, thin = extremes(time, values, points=max(2, round(points)))
+        index = nanoseconds(shown)
         for path, columns in plots.items():
-            self._messages.add(path, nanoseconds(shown), thin[:, columns])
+            self._messages.add(path, index, thin[:, columns])
 
     def labels(self, labels: Labels) -> None:
         """Draw the scores of frames at their centres, and their raw classes around these.
@@ -476,7 +467,7 @@ class Drawing:
 
     def finish(self, time: float, found: Sequence[Event]) -> None:
         """Show what waits, and the findings of the whole stream."""
-        if self._begun:
+        if self._told is not None:  # there were samples
             self.findings(time, found)
         self._messages.flush()
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 from pathlib import Path
+from statistics import median
 from typing import Self
 
 import numpy as np
@@ -117,18 +118,6 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
     return rows
 
 
-def widths_of(rows: Mapping[str, Array], joint_names: Sequence[str]) -> dict[str, int]:
-    """Fix the signals of a session, and their columns, by its first samples."""
-    joints = len(joint_names) or rows["velocity"].shape[1]
-    for name, array in rows.items():
-        width = {"base_velocity": 6, "base_pose": 7}.get(name, joints)
-        if array.shape[1] != width:
-            raise LiveError(
-                f"{name}: {array.shape[1]} columns in the first sample, expected {width}"
-            )
-    return {name: array.shape[1] for name, array in rows.items()}
-
-
 GAP_STEPS = 1.5  # steps after which a sample may be missing; timestamps may jitter by less
 MISSING = 0.75  # steps by which a sample is late after the others, if one before it is missing
 FEW = 4  # samples in a row that are interpolated if they are missing; more are a gap, as in a file
@@ -173,15 +162,13 @@ class Clock:
         if not self._unit and not self._begin(stamps, ended=ended):
             return np.zeros(0, dtype=bool), np.empty(0), np.empty(0)
         known = stamps * self._unit
-        kept, time = np.zeros(len(known), dtype=bool), np.empty(len(known))
+        time = np.full(len(known), np.nan)  # of those that are left out
         place, decided = 0, len(known)
         while place < decided:
             follows = self._follows(np.append(self._last, known[place:-1]), known[place:])
-            run = decided - place if follows.all() else int(follows.argmin())
-            part = slice(place, place + run)
-            kept[part], time[part] = True, known[part] + self._shift
-            place += run
-            if run:
+            first, place = place, place + int(np.append(follows, False).argmin())
+            if first < place:
+                time[first:place] = known[first:place] + self._shift
                 self._last = float(known[place - 1])
             if place < decided:
                 stop, found = self._ahead(known, place)
@@ -191,8 +178,9 @@ class Clock:
                 if found == "jump":
                     self._jump(float(known[stop]))
                 place = stop
-        time = time[:decided][kept[:decided]]
-        return kept[:decided], self._lost(time), time
+        kept = np.isfinite(time[:decided])
+        time = time[:decided][kept]
+        return kept, self._lost(time), time
 
     def _begin(self, stamps: Array, *, ended: bool) -> bool:
         """Take the unit of timestamps from the first ones, if there are enough."""
@@ -277,7 +265,7 @@ class Clock:
     def _missing(self, steps: Array) -> Array:
         """Samples that are missing before each: a late one after an early one tells of none."""
         lost = np.zeros(len(steps))
-        usual = float(np.clip(np.median(steps), 1.0 - RATE_TOLERANCE, 1.0 + RATE_TOLERANCE))
+        usual = min(max(median(steps.tolist()), 1.0 - RATE_TOLERANCE), 1.0 + RATE_TOLERANCE)
         late, done = self._late, 0
         for place in [*np.flatnonzero(steps >= GAP_STEPS).tolist(), len(steps)]:
             late += float((steps[done : place + 1] - usual).sum())
@@ -285,7 +273,7 @@ class Clock:
                 lost[place] = round(late)
                 late -= lost[place]
             done = place + 1
-        self._late = 0.5 * float(np.clip(late, -0.5, 0.5))  # errors must not add up
+        self._late = 0.5 * min(max(late, -0.5), 0.5)  # errors must not add up
         return lost
 
     def _note_dropped(self, stamps: Array) -> None:
@@ -458,12 +446,7 @@ class LiveSession:
         if not self._counts.total():
             status = Status.CANNOT_TELL
         reason = labeller.remark if not labeller.model else "no frame was labelled"
-        dropped = {kind: counts[kind] for kind in DROPPED if kind in counts}
-        if status is Status.OK and sum(dropped.values()) > MOST_DROPPED * max(samples, 1):
-            status = Status.CANNOT_TELL
-            told = ", ".join(f"{count} {kind}" for kind, count in dropped.items())
-            reason = f"more than {MOST_DROPPED:.0%} of the samples were left out ({told})"
-        elif status is Status.OK and (reason := self._untold(samples / self._rate)):
+        if status is Status.OK and (reason := self._doubt(samples)):
             status = Status.CANNOT_TELL
         return Summary(
             samples=samples,
@@ -478,9 +461,13 @@ class LiveSession:
             levels=self._levels,
         )
 
-    def _untold(self, seconds: float) -> str:
-        """Why labels of a stream that lasts so long are too few for a verdict; empty if not."""
-        labeller, count = self._labeller, self._counts.total()
+    def _doubt(self, samples: int) -> str:
+        """Why a stream of so many samples without findings is not `ok`; empty if it is."""
+        dropped = [(n, kind) for kind in DROPPED if (n := self._warnings.counts[kind])]
+        if sum(n for n, _ in dropped) > MOST_DROPPED * samples:
+            told = ", ".join(f"{n} {kind}" for n, kind in dropped)
+            return f"more than {MOST_DROPPED:.0%} of the samples were left out ({told})"
+        seconds, labeller, count = samples / self._rate, self._labeller, self._counts.total()
         if seconds < SHORTEST:
             return f"{seconds:.3g} s of samples; it takes {SHORTEST:g} s to tell what lasts"
         if self._added > MOST_ADDED * self._samples:
@@ -525,8 +512,12 @@ class LiveSession:
 
     def _begin(self, rows: Mapping[str, Array]) -> SampleBuffer:
         """Fix signals and names by the first samples."""
-        widths = widths_of(rows, self._names)
-        joints, robot = widths["velocity"], self._robot
+        widths, robot = {name: array.shape[1] for name, array in rows.items()}, self._robot
+        joints = len(self._names) or widths["velocity"]
+        for name, width in widths.items():
+            expected = {"base_velocity": 6, "base_pose": 7}.get(name, joints)
+            if width != expected:
+                raise LiveError(f"{name}: {width} columns in the first sample, expected {expected}")
         if joints > limit("joints"):
             raise LiveError(f"{joints} joints, {beyond('joints')}")
         names = self._names or unnamed(joints)
@@ -587,16 +578,15 @@ class LiveSession:
 
     def _work(self, buffer: SampleBuffer, *, ended: bool = False) -> None:
         """Show the samples that a buffer holds, and empty it; few may have to wait for others."""
-        if not buffer.held:
-            return
         kept, lost, time = self._clock.take(buffer.whole["time"], ended=ended)
         signals = buffer.take(kept)
         self._samples += len(kept)
         if not len(time):
             return
+        if self._last is None:
+            self._drawing.begin(float(time[0]), signals)
         time, signals, lost = self._filled(time, signals, lost)
         self._now = float(time[-1])
-        self._drawing.begin(float(time[0]), signals)
         motion = np.hstack([signals[name] for name in self._noisy])
         valid = np.asarray(np.isfinite(motion).all(axis=1))
         if not valid.all():
@@ -613,9 +603,9 @@ class LiveSession:
             piece = slice(first, stop)
             if lost[first]:
                 self._labeller.skip(int(lost[first]))
-            self._label(time[piece], motion[piece], valid[piece])
-            velocity, after_gap = signals["velocity"][piece], bool(lost[first])
-            self._drawing.piece(time[piece], valid[piece], velocity, after_gap=after_gap)
+            end, velocity = float(time[stop - 1]) + 1.0 / self._rate, signals["velocity"][piece]
+            self._label(motion[piece], valid[piece], end)
+            self._drawing.piece(velocity, valid[piece], end, after_gap=bool(lost[first]))
         if self._sink.open:
             self._drawing.batch(time, motion, valid, signals)
         if self._watch is not None:
@@ -649,9 +639,8 @@ class LiveSession:
         left[place.astype(int) - 1] = np.where(few, 0.0, lost)
         return np.interp(every, known, np.append(before[0], time)), found, left
 
-    def _label(self, time: Array, motion: Array, valid: Mask) -> None:
-        """Label and draw a stretch without missing samples."""
-        end = float(time[-1]) + 1.0 / self._rate
+    def _label(self, motion: Array, valid: Mask, end: float) -> None:
+        """Label and draw a stretch without missing samples that ends at a time in [s]."""
         labels = self._labeller.push(motion, valid, end)
         if labels is None:
             return
