@@ -24,6 +24,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
+from itertools import repeat
 from math import inf, isfinite, isnan
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -43,7 +44,7 @@ from noiseclassifier.jsontext import text_of
 from noiseclassifier.noisytest import END, parse_annotations
 from noisemodel import Block, Run
 from noisemodel.files import refuse_existing, replacing, write_whole
-from noisemodel.types import Array
+from noisemodel.types import Array, Real
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +126,8 @@ def arrow_table(content: Content) -> Any:
         }
         found |= {name: pa.array(each[nearest], mask=outside) for name, each in framed.items()}
     columns = {name: pa.array(values) for name, values in found.items()}
-    units = {name: {"unit": UNITS[name]} if name in UNITS else None for name in columns}
-    fields = [pa.field(name, each.type, metadata=units[name]) for name, each in columns.items()]
+    units = {name: {"unit": unit} for name, unit in UNITS.items()}
+    fields = [pa.field(name, c.type, metadata=units.get(name)) for name, c in columns.items()]
     about = {"format": "noise-export/1", "model": content.analysis.model, "extended": content.kind}
     return pa.table(list(columns.values()), pa.schema(fields, metadata=about))
 
@@ -161,8 +162,7 @@ NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 SPAN = {"label": TEXT, "start": NUMBER, "stop": NUMBER}
 NANOSECONDS = 10**9
 LATEST = 2**63  # stamps from here on are not valid, in [ns]
-Row = tuple[float, dict[str, Any]]  # time in [s], and a message
-Message = tuple[int, str, bytes]  # stamp in [ns], topic and serialised content
+Row = tuple[float, dict[str, Any]]  # time in [s], and the fields of a message
 
 
 def write_mcap(content: Content, path: Path) -> None:
@@ -175,43 +175,62 @@ def write_mcap(content: Content, path: Path) -> None:
             f"MCAP needs the extra `mcap` ({error}); pip install 'noise-inspector[mcap]'"
         ) from error
     ros, zero = get_typestore(Stores.ROS2_HUMBLE), _start_stamp(content)
+    state, header, clock = (
+        ros.types[kind]
+        for kind in (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+    )
+    joints, topics = _joint_states(content), _topics(content)
+
+    def stamp_of(sent: tuple[Row, str]) -> int:
+        """Time in the file of a message with its topic, in [ns]."""
+        return max(0, zero + round(sent[0][0] * NANOSECONDS))
+
     with path.open("wb") as stream:
         writer: Any = Writer(stream)
         writer.start(profile="ros2", library="noise-inspector")
-        channels, messages = {}, list[Iterator[Message]]()
-        if joints := _joint_signals(content):
-            definition, _ = ros.generate_msgdef(JOINT_STATE, ros_version=2)
-            schema = writer.register_schema(JOINT_STATE, "ros2msg", definition.encode())
-            channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in joints}
-        for topic, (fields, rows) in _topics(content).items():
+        definition, _ = ros.generate_msgdef(JOINT_STATE, ros_version=2)
+        schema = writer.register_schema(JOINT_STATE, "ros2msg", definition.encode())
+        channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in joints}
+        for topic, (fields, _) in topics.items():
             data = json.dumps({"type": "object", "properties": fields}).encode()
             schema = writer.register_schema(f"noise.{topic[1:]}", "jsonschema", data)
             channels[topic] = writer.register_channel(topic, "json", schema)
-            messages.append(_serialised(topic, rows, zero))
-        messages += [_states(content, topic, *each, ros) for topic, each in joints.items()]
-        for stamp, topic, data in heapq.merge(*messages, key=lambda each: each[0]):
+        messages = {topic: rows for topic, (_, rows) in topics.items()} | joints
+        rows = (zip(each, repeat(topic)) for topic, each in messages.items())
+        for sent in heapq.merge(*rows, key=stamp_of):
+            (_, message), topic = sent
+            stamp = stamp_of(sent)
+            if topic in joints:
+                sec, nanosec = divmod(stamp, NANOSECONDS)
+                head = header(stamp=clock(sec=sec, nanosec=nanosec), frame_id="")
+                data = bytes(ros.serialize_cdr(state(header=head, **message), JOINT_STATE))
+            else:
+                data = json.dumps(message, allow_nan=False).encode()
             writer.add_message(channels[topic], log_time=stamp, data=data, publish_time=stamp)
         about = {"model": content.analysis.model, "extended": content.kind, "time": "s"}
         writer.add_metadata("noise-inspector", about)
         writer.finish()
 
 
-def _joint_signals(content: Content) -> dict[str, tuple[tuple[str, ...], dict[str, Array]]]:
-    """What the JointStates hold: by topic the joints, and by field an array (samples, joints)."""
+def _joint_states(content: Content) -> dict[str, Iterator[Row]]:
+    """JointStates by topic."""
     run = content.analysis.run
-    measured = {"position": run.position, "velocity": run.velocity, "effort": run.effort}
-    desired = {"position": run.position_desired, "velocity": run.velocity_desired}
-    signals = {MEASURED: (run.joint_names, measured), DESIRED: (run.desired_joint_names, desired)}
-    known = {}
-    for topic, (names, parts) in signals.items():
-        there = {
-            name: np.ascontiguousarray(each[run.mask], float)
-            for name, each in parts.items()
-            if each is not None
-        }
-        if there:
-            known[topic] = names, there
-    return known
+    desired = run.position_desired, run.velocity_desired, None
+    topics = {MEASURED: _states(content, run.joint_names, run.position, run.velocity, run.effort)}
+    if any(each is not None for each in desired):
+        topics[DESIRED] = _states(content, run.desired_joint_names, *desired)
+    return topics
+
+
+def _states(content: Content, names: Sequence[str], *signals: Real | None) -> Iterator[Row]:
+    """A JointState for each sample, of the positions, velocities and efforts that there are."""
+    mask, none, joints = content.analysis.run.mask, np.zeros((len(content.time), 0)), list(names)
+    columns = [
+        none if each is None else np.ascontiguousarray(each[mask], float) for each in signals
+    ]
+    for time, *row in zip(content.time.tolist(), *columns, strict=True):
+        parts = dict(zip(("position", "velocity", "effort"), row, strict=True))
+        yield time, {"name": joints, **parts}
 
 
 def _start_stamp(content: Content) -> int:
@@ -253,15 +272,6 @@ def _topics(content: Content) -> dict[str, tuple[dict[str, Any], Iterator[Row]]]
     return topics
 
 
-def _stamp(zero: int, time: float) -> int:
-    return max(0, zero + round(time * NANOSECONDS))
-
-
-def _serialised(topic: str, rows: Iterator[Row], zero: int) -> Iterator[Message]:
-    for time, message in rows:
-        yield _stamp(zero, time), topic, json.dumps(message, allow_nan=False).encode()
-
-
 def _frames(labels: nc.Labels, alarm: float | None) -> Iterator[Row]:
     rows = zip(labels.start.tolist(), labels.stop.tolist(), labels.debounced.tolist(), strict=True)
     for (start, stop, label), scores in zip(rows, labels.scores.tolist(), strict=True):
@@ -274,26 +284,6 @@ def _frames(labels: nc.Labels, alarm: float | None) -> Iterator[Row]:
 def _spans(spans: Any, *more: str) -> Iterator[Row]:
     for each in spans:
         yield each.start, {name: getattr(each, name) for name in ("label", "start", "stop", *more)}
-
-
-def _states(
-    content: Content, topic: str, names: tuple[str, ...], parts: dict[str, Array], ros: Any
-) -> Iterator[Message]:
-    """A JointState for each sample."""
-    state, header, time = (
-        ros.types[kind]
-        for kind in (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
-    )
-    none = np.zeros((len(content.time), 0))
-    columns = {name: parts.get(name, none) for name in ("position", "velocity", "effort")}
-    zero = _start_stamp(content)
-    for sample, at in enumerate(content.time.tolist()):
-        stamp = _stamp(zero, at)
-        sec, nanosec = divmod(stamp, NANOSECONDS)
-        head = header(stamp=time(sec=sec, nanosec=nanosec), frame_id="")
-        rows = {name: each[sample] for name, each in columns.items()}
-        message = state(header=head, name=list(names), **rows)
-        yield stamp, topic, ros.serialize_cdr(message, JOINT_STATE)
 
 
 # Writers by suffix.
