@@ -81,14 +81,14 @@ class Sound:
 
     def description(self, gain: float) -> str:
         """Duration and gain in [dB] of the sound, and whether it is silent."""
-        factor, seconds = _factor(gain), len(self.signal) / self.rate / self.speed
-        scale = f"gain {gain:+.1f} dB: full scale is {1.0 / factor:.3g} rad/s"
+        seconds = len(self.signal) / self.rate / self.speed
+        scale = f"gain {gain:+.1f} dB: full scale is {10.0 ** (-gain / 20.0):.3g} rad/s"
         state = f"; silent: nothing reaches {SILENCE:g} rad/s" if self.silent else ""
         return f"{seconds:.2f} s, {scale}{state}"
 
     def file(self, gain: float) -> bytes:
         """WAV file of one channel of 16 bits; at a gain of 0 dB, full scale is 1 rad/s."""
-        samples = np.round(self.played * _factor(gain) * FULL_SCALE).astype("<i2")
+        samples = np.round(self.played * 10.0 ** (gain / 20.0) * FULL_SCALE).astype("<i2")
         stream = io.BytesIO()
         with wave.open(stream, "wb") as file:
             file.setnchannels(1)
@@ -161,9 +161,7 @@ def clip(run: nm.Run, *, around: float = 0.0) -> Sound | None:
         return None
 
 
-def mix(
-    signals: Iterable[Array], *, valid: Mask, rate: float, lowest: float = LOWEST_AUDIBLE
-) -> Array:
+def mix(signals: Iterable[Array], *, valid: Mask, rate: float, lowest: float) -> Array:
     """Audible part of several signals, taken one by one, mixed to one so that their powers add.
 
     Args:
@@ -221,10 +219,7 @@ def _high_passed(signal: Array, rate: float, lowest: float) -> Array:
     from scipy.fft import next_fast_len
 
     reach = min(round(3 * rate / lowest), len(signal) - 1)
-    # odd reflection at both ends, without a step
-    before = 2 * signal[0] - signal[reach:0:-1]
-    after = 2 * signal[-1] - signal[-2 : -reach - 2 : -1]
-    extended = np.concatenate((before, signal, after))
+    extended = np.pad(signal, reach, mode="reflect", reflect_type="odd")  # without a step
     extended -= np.linspace(extended[0], extended[-1], len(extended))
     size = next_fast_len(len(extended), real=True)
     frequency = fft.rfftfreq(size, 1 / rate)
@@ -265,7 +260,3 @@ def remarks(run: nm.Run, speed: float) -> Iterator[str]:
         yield "The run has no desired velocities: the sound is of the measured motion only."
     if not run.mask.all():
         yield "Gaps are silent."
-
-
-def _factor(gain: float) -> float:
-    return float(10.0 ** (gain / 20.0))
