@@ -146,10 +146,11 @@ class CsvReader:
     def __init__(self, head: bytes, names: tuple[str, ...]) -> None:
         text = head.decode("utf-8-sig", errors="replace").strip().lstrip("# ")
         self._delimiter = next((mark for mark in ",;\t" if mark in text), ",")
-        self._header = [cell.strip() for cell in text.split(self._delimiter)]
+        header = [cell.strip() for cell in text.split(self._delimiter)]
+        self._width = len(header)
         found: dict[str, dict[str, int]] = {}
-        naming = Naming.of(self._header)
-        for place, column in enumerate(self._header):
+        naming = Naming.of(header)
+        for place, column in enumerate(header):
             meaning = column_signal(column, naming)
             if meaning is None or meaning[0] not in SIGNALS:
                 continue
@@ -166,37 +167,33 @@ class CsvReader:
         if "velocity" not in found:
             raise LiveError(
                 "the header names no velocity; expected columns such as elbow.velocity,"
-                f" they are {listed(self._header)}"
+                f" they are {listed(header)}"
             )
         self.names = names or tuple(found["velocity"])
-        self._places: dict[str, list[int]] = {}
+        self._columns: dict[str, tuple[list[int], Array]] = {}  # with the sizes of their units
         for kind, by_joint in found.items():
             if lacking := [name for name in self.names if name not in by_joint]:
                 raise LiveError(f"the header has no {kind} of joint {lacking[0]!r}")
-            self._places[kind] = [by_joint[name] for name in self.names]
-        self._factors = {
-            kind: np.array([factor_of(self._header[place]) for place in places])
-            for kind, places in self._places.items()
-        }
-        time = time_column(self._header)
-        self._time = self._header.index(time) if time else None
+            places = [by_joint[name] for name in self.names]
+            self._columns[kind] = places, np.array([factor_of(header[place]) for place in places])
+        time = time_column(header)
+        self._time = header.index(time) if time else None
         self._second = float(UNITS[TIME_UNITS.get(without_unit(time)[1], "seconds")])
 
     def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
         """Read whole lines; those that cannot be read are noted."""
-        columns = range(len(self._header))
-        plain = numbers_in(lines, len(columns), self._delimiter, columns)
+        plain = numbers_in(lines, self._width, self._delimiter, range(self._width))
         table = self._read_lines(lines, first, note) if plain is None else plain[0]
         if len(table):
-            found = self._places.items()
-            rows = {name: table[:, places] * self._factors[name] for name, places in found}
+            columns = self._columns.items()
+            rows = {name: table[:, places] * factors for name, (places, factors) in columns}
             if self._time is not None:
                 rows["time"] = table[:, self._time] * self._second
             yield rows
 
     def _read_lines(self, lines: bytes, first: int, note: Note) -> Array:
         """Read rows one by one, of which some have cells that are empty, padded or no numbers."""
-        width = len(self._header)
+        width = self._width
 
         def parse(line: bytes) -> list[float]:
             cells = line.decode(errors="replace").split(self._delimiter)
@@ -303,26 +300,24 @@ class Gate:
     def _print(self, event: Finding, *, over: bool) -> None:
         self.failed = self.failed or event.fails
         if self._as_json:
-            line = {"event": "end" if over else "begin", **event.as_dict()}
+            line = {"format": FORMAT, "event": "end" if over else "begin", **event.as_dict()}
             del line["order"]
             if not over:
                 line["stop"] = None
             if self._reference is None:
                 del line["evidence"]
-            self._tell_json(line)
+            self._tell(json.dumps(line))
         elif not over:
             became = "" if self._reference is None else f": {event.evidence}"
             became = f" ({event.became})" if event.became else became
             self._tell(f"{event.label} from {event.start:.2f} s{event.novelty}{became}")
 
-    def _tell_json(self, line: dict[str, Any]) -> None:
-        self._tell(json.dumps({"format": FORMAT, **line}))
-
     def end(self, summary: Summary) -> int:
         """Print what became of the stream."""
         verdict = self._verdict(summary)
         if self._as_json:
-            line = {
+            line: dict[str, Any] = {
+                "format": FORMAT,
                 "event": "summary",
                 "version": program_version(),
                 "status": verdict.status.value,
@@ -340,7 +335,7 @@ class Gate:
             if self._reference is not None:
                 known = verdict.as_dict()
                 line |= {"reference": known["reference"], "findings": known["events"]}
-            self._tell_json(line)
+            self._tell(json.dumps(line))
             return EXIT[verdict.status]
         shown = summary.findings if self._reference is None else verdict.failing
         self._tell(str(replace(summary, status=verdict.status, findings=shown)))
@@ -366,8 +361,7 @@ class Gate:
             status = Status.FINDINGS if self._told else Status.OK
             verdict = replace(verdict, status=status, events=tuple(self._told))
         else:
-            verdict = replace(verdict, begin=summary.levels.start)
-            verdict = self._beside(verdict, summary.levels)
+            verdict = self._beside(replace(verdict, begin=summary.levels.start), summary.levels)
         if summary.status is Status.CANNOT_TELL and summary.model and verdict.status is Status.OK:
             return replace(verdict, status=Status.CANNOT_TELL)  # too little of it was seen
         return verdict
