@@ -46,7 +46,6 @@ class Labeller:
         self._base, self._joints, desired = (widths.get(name, 0) for name in NOISY)
         kinds = ("desired", "measured", "error") if desired else ("measured",)
         there = (NOISE, *kinds, *(f"{kind}_joints" for kind in kinds))
-        self._followed = [name for name in there if name in (MEASURED, ERROR)]
         try:
             model, chosen = nc.nearest(library, rate, there)
         except nc.ModelsError as error:
@@ -59,7 +58,9 @@ class Labeller:
             )
             return
         self.model, self.classes, self.length = model, chosen.classes, chosen.profile.duration
-        self.hop, self._names = chosen.profile.hop / rate, chosen.profile.signals
+        self.hop = chosen.profile.hop / rate
+        followed = [name for name in there if name in (MEASURED, ERROR)]
+        self._names = tuple(dict.fromkeys((*followed, *chosen.profile.signals)))
         self._stream = nc.Stream(chosen, rate=rate, joints=self._joints)
         self._windows = nc.Lasting(rate), nc.Bursts(rate)
 
@@ -68,8 +69,7 @@ class Labeller:
         self._samples += len(motion)
         if self._stream is None:
             return None
-        names = dict.fromkeys((*self._followed, *self._names))
-        signals = {n: noise_signal(n, motion, self._base, self._joints) for n in names}
+        signals = {n: noise_signal(n, motion, self._base, self._joints) for n in self._names}
         for each in self._windows:
             each.push(signals, valid)
         labels = self._stream.push(signals, valid)
