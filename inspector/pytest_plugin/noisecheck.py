@@ -22,7 +22,7 @@ from inspector.errors import Status
 from inspector.library import Library, load_library
 from inspector.reference import store
 from inspector.reference.judging import Comparison, Expected
-from inspector.reference.levels import Levels, levels
+from inspector.reference.levels import levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, classes_found, judge
 from inspector.report.formats import told
@@ -114,7 +114,7 @@ class Noise:
         analysis = with_links(analyse(run, self._library, name=self._node.name), "normal")
         verdict, comparison = Verdict.of(Path(scenario), analysis), None
         if reference is not None and reference.scenarios:
-            comparison = reference.compare(_levels(run, scenario))
+            comparison = reference.compare(levels(without_placeholder(run)[0], name=scenario))
             verdict = beside(verdict, comparison, reference, analysis.labels)
         return analysis, judge(verdict, reference, today=date.today()), comparison
 
@@ -125,7 +125,8 @@ class Noise:
         found, events = [], {}
         for place, (run, source) in enumerate(runs, 1):
             file = str(source) if source is not run else f"{self._node.nodeid} {place}"
-            found.append(_levels(run, scenario, file=file, sha256=store.digest(run)))
+            kept, digest = without_placeholder(run)[0], store.digest(run)
+            found.append(levels(kept, name=scenario, file=file, sha256=digest))
             events[file] = self._judged(run, scenario)[1].events
         store.accept_into(accepted, found, events=events, reason=reason, by=store.who())
 
@@ -165,10 +166,6 @@ class Noise:
         for what, path in left.items():
             self._node.user_properties.append((f"noise_{what}", str(path)))
         return left
-
-
-def _levels(run: Run, scenario: str, **known: str) -> Levels:
-    return levels(without_placeholder(run)[0], name=scenario, **known)
 
 
 def _told(verdict: Verdict, events: Sequence[Finding], shown: str, left: dict[str, Path]) -> str:
