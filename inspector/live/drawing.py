@@ -14,7 +14,6 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from rerun.blueprint import Blueprint
 
 import noisemodel as nm
 from inspector import colors
@@ -398,10 +397,31 @@ class Drawing:
         views.log_beside(recording, self._classes, named, nothing)
 
     def begin(self, time: float, signals: Mapping[str, Array]) -> None:
-        """Send the layout with the first sample, whose pose places the camera."""
+        """Send the layout with the first sample, whose pose places the camera.
+
+        Every plot shows the last ten seconds.
+        """
         self.findings(time, ())
-        camera = None if self._robot is None else self._robot.camera(signals)
-        self._recording.send_blueprint(self._layout(camera))
+        over_time = [
+            views.timed(NOISE_PANEL, title="Noise", between=None, last=SHOWN),
+            views.timed(SPECTROGRAM_PANEL, title="Spectrum", last=SHOWN),
+        ]
+        left = [(views.events("Events"), 2.4)]
+        if self._classes is not None:  # otherwise there is no verdict
+            over_time.insert(0, views.timed(self._classes, title="Classes", last=SHOWN))
+            left.insert(0, (views.drawing("/verdict"), 0.32))
+        if self._robot is not None:
+            left.insert(-1, (views.robot("Robot", "/robot", self._robot.camera(signals)), 4.4))
+        plots = [
+            views.timed(
+                SIGNALS_PANEL, "/joints", title=title, name=title, between=None, paths=paths,
+                legend=True, last=SHOWN,
+            )
+            for title, paths in self._titles.items()
+        ]  # fmt: skip
+        over_time.append((views.tabs(*(part for part, _ in plots)), SIGNALS_PANEL.height))
+        whole = views.beside((views.above(*left), 36.0), (views.above(*over_time), 64.0))
+        self._recording.send_blueprint(views.blueprint(whole, following=True))
 
     def piece(self, velocity: Array, valid: Mask, end: float, *, after_gap: bool) -> None:
         """Draw the spectrogram of a stretch without missing samples that ends at a time in [s]."""
@@ -470,29 +490,6 @@ class Drawing:
         if self._told is not None:  # there were samples
             self.findings(time, found)
         self._messages.flush()
-
-    def _layout(self, camera: Camera | None) -> Blueprint:
-        """Lay the recording out; every plot shows the last ten seconds."""
-        over_time = [
-            views.timed(NOISE_PANEL, title="Noise", between=None, last=SHOWN),
-            views.timed(SPECTROGRAM_PANEL, title="Spectrum", last=SHOWN),
-        ]
-        left = [(views.events("Events"), 2.4)]
-        if self._classes is not None:  # otherwise there is no verdict
-            over_time.insert(0, views.timed(self._classes, title="Classes", last=SHOWN))
-            left.insert(0, (views.drawing("/verdict"), 0.32))
-        if camera is not None:
-            left.insert(-1, (views.robot("Robot", "/robot", camera), 4.4))
-        plots = [
-            views.timed(
-                SIGNALS_PANEL, "/joints", title=title, name=title, between=None, paths=paths,
-                legend=True, last=SHOWN,
-            )
-            for title, paths in self._titles.items()
-        ]  # fmt: skip
-        over_time.append((views.tabs(*(part for part, _ in plots)), SIGNALS_PANEL.height))
-        whole = views.beside((views.above(*left), 36.0), (views.above(*over_time), 64.0))
-        return views.blueprint(whole, following=True)
 
 
 def _heat_map(level: Array) -> list[Any]:
