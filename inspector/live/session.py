@@ -17,6 +17,7 @@ from inspector.errors import InspectorError, Status
 from inspector.library import Library, load_library
 from inspector.live.drawing import Drawing, Sink
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
+from inspector.logs.clocks import UNITS
 from inspector.logs.mapping import check_joints
 from inspector.logs.motion import LONG, LimitWatch
 from inspector.recording.views import FARTHEST
@@ -58,7 +59,7 @@ class SampleBuffer:
     def __init__(self, size: int, widths: Mapping[str, int], warnings: Warnings) -> None:
         self._size, self._widths, self._warnings = size, widths, warnings
         self._pieces: list[dict[str, Array]] = []
-        self.held, self.room = 0, size  # samples here, and those that are missing from a batch
+        self.room = size  # samples that are missing from a batch
 
     def put(self, rows: Mapping[str, Array], time: Array) -> None:
         """Take samples; missing signals, or of other widths, are unknown."""
@@ -76,7 +77,7 @@ class SampleBuffer:
             known = widths.get(name) == width
             piece[name] = rows[name] if known else np.full((len(time), width), np.nan)
         self._pieces.append(piece)
-        self.held, self.room = self.held + len(time), self.room - len(time)
+        self.room -= len(time)
 
     @property
     def whole(self) -> dict[str, Array]:
@@ -94,7 +95,7 @@ class SampleBuffer:
         for values in signals.values():
             values[~(np.abs(values) < LARGEST)] = np.nan  # the square of others would overflow
         self._pieces = [{name: values[count:] for name, values in whole.items()}]
-        self.held, self.room = self.held - count, self._size
+        self.room = self._size
         return signals
 
 
@@ -127,8 +128,6 @@ AGREE = 5  # timestamps in a row that make a jump a new segment, and no outlier
 LONGEST_GAP = 3600.0
 RATE_TOLERANCE = 0.05  # share by which the rate of the timestamps may differ from the nominal one
 RATE_STEPS = 20  # steps from which a rate is estimated
-# Units of timestamps, by the power of ten by which their steps exceed the rate's.
-UNITS = {3: "milliseconds", 6: "microseconds", 9: "nanoseconds"}
 BACKWARDS, TIMELESS = "samples out of order", "samples without time"
 OUTLYING = "outlying timestamps"
 # Kinds of warnings of samples that are left out.
@@ -189,12 +188,11 @@ class Clock:
             return False
         steps = np.diff(finite[:RATE_STEPS])
         step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0 / self._rate
-        power = 3 * round(np.log10(step * self._rate) / 3)
-        self._unit = 1.0
-        if power in UNITS and 0.5 < step * self._rate / 10.0**power < 2.0:
-            self._unit = 10.0**-power
-            line = f"timestamps count {UNITS[power]} at {self._rate:g} Hz: read as such"
-            self._warnings.emit(line)
+        fit = [unit for unit in UNITS if 0.5 < step * self._rate * float(UNITS[unit]) < 2.0]
+        unit = fit[0] if fit else "seconds"
+        self._unit = float(UNITS[unit])
+        if unit != "seconds":
+            self._warnings.emit(f"timestamps count {unit} at {self._rate:g} Hz: read as such")
         first = float(finite[0]) * self._unit if len(finite) else 0.0
         self._last = first - 1.0 / self._rate
         self._shift = -first if abs(first) > FARTHEST else 0.0
@@ -211,21 +209,16 @@ class Clock:
         "old": that sample follows; "jump": from there on enough follow each other; "open": those
         from there on do, but are too few yet.
         """
-        first, agree, before = len(stamps), 0, 0.0
-        for index in range(place, len(stamps)):
-            stamp = float(stamps[index])
-            if not np.isfinite(stamp):
-                continue
-            if self._follows(self._last, stamp):
+        chain: list[int] = []  # places of stamps that follow each other
+        for index in (place + np.flatnonzero(np.isfinite(stamps[place:]))).tolist():
+            if self._follows(self._last, stamps[index]):
                 return index, "old"
-            if agree and self._follows(before, stamp):
-                agree += 1
-            else:
-                first, agree = index, 1
-            before = stamp
-            if agree == AGREE:
-                return first, "jump"
-        return first, "open"
+            if chain and not self._follows(stamps[chain[-1]], stamps[index]):
+                chain = []
+            chain.append(index)
+            if len(chain) == AGREE:
+                return chain[0], "jump"
+        return chain[0] if chain else len(stamps), "open"
 
     def _jump(self, stamp: float) -> None:
         """Go on at a timestamp that lies elsewhere."""
@@ -441,7 +434,7 @@ class LiveSession:
         if self._buffer is None:
             return Summary(0, self._rate, "", {}, counts, self._sink.where)
         labeller, findings = self._labeller, self._found
-        samples = self._samples + self._buffer.held
+        samples = self._samples + len(self._buffer.whole["time"])
         status = Status.FINDINGS if findings else Status.OK
         if not self._counts.total():
             status = Status.CANNOT_TELL
