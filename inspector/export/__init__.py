@@ -118,11 +118,12 @@ def arrow_table(content: Content) -> Any:
         steps = np.diff(middles) if len(middles) > 1 else labels.stop - labels.start
         nearest = np.searchsorted((middles[1:] + middles[:-1]) / 2, time)
         outside = np.abs(time - middles[nearest]) > np.median(steps) / 2 + 1e-6
-        framed: dict[str, Any] = {"frame_start": labels.start, "frame_stop": labels.stop}
-        framed["label"] = labels.debounced.astype(object)
-        framed |= {
-            f"score_{name}": each
-            for name, each in zip(labels.classes, labels.scores.T, strict=True)
+        scores = zip(labels.classes, labels.scores.T, strict=True)
+        framed = {
+            "frame_start": labels.start,
+            "frame_stop": labels.stop,
+            "label": labels.debounced.astype(object),
+            **{f"score_{name}": each for name, each in scores},
         }
         found |= {name: pa.array(each[nearest], mask=outside) for name, each in framed.items()}
     columns = {name: pa.array(values) for name, values in found.items()}
