@@ -267,7 +267,7 @@ class SpectrogramStream:
         level_windows = (windows - slope[..., None] * ramp).reshape(-1, length)
         amplitude = amplitudes(level_windows).reshape(*windows.shape[:2], -1).max(axis=1)
         level = 2 * decibel(in_bands(self._frequency, amplitude.T, self.edges))
-        level = np.nan_to_num(np.clip(SPECTRUM.place(level), 0.0, 1.0).T)
+        level = np.fmin(np.fmax(SPECTRUM.place(level), 0.0), 1.0).T  # 0 where one is NaN
         since = len(samples) - hop * np.arange(count)  # samples from starts to the end
         return np.asarray(end - (since - length / 2) / self._rate), level
 
