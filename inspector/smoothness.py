@@ -306,12 +306,14 @@ def as_text(ranking: Ranking) -> str:
     episodes = ranking.episodes
     if not episodes:
         return "0 episodes"
-    heads = [("rank", ""), ("episode", ""), ("duration", "s"), ("rate", "Hz")]
-    heads += [(score.title, score.unit) for score in SCORES.values()]
     parts = [Path(episode.name).parts for episode in episodes]
     folders = zip(*(each[:-1] for each in parts), strict=False)
     shared = len(list(takewhile(lambda names: len(set(names)) == 1, folders)))
     rows = [
+        ["rank", "episode", "duration", "rate", *(score.title for score in SCORES.values())],
+        ["", "", "s", "Hz", *(score.unit for score in SCORES.values())],
+    ]
+    rows += [
         [
             "" if rank is None else str(rank),
             str(Path(*path[shared:])),
@@ -321,7 +323,6 @@ def as_text(ranking: Ranking) -> str:
         ]
         for rank, path, episode in zip(ranking.ranks, parts, episodes, strict=True)
     ]
-    rows = [[title for title, _ in heads], [unit for _, unit in heads], *rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for row in rows:
@@ -335,36 +336,33 @@ def as_text(ranking: Ranking) -> str:
 
 def as_json(ranking: Ranking) -> str:
     """Write a ranking as JSON; a score that is missing is null, with its reason."""
-    scores = {
-        score.name: {
-            "meaning": score.meaning,
-            "unit": score.unit,
-            "smoother": "higher" if score.smooth > 0 else "lower",
-        }
-        for score in SCORES.values()
-    }
-    settings = {
-        "level_above_hz": FAST,
-        "sparc_cutoff_hz": CUTOFF,
-        "sparc_threshold": THRESHOLD,
-        "sparc_padding": PADDING,
-    }
-    episodes = [
-        {
-            "rank": rank,
-            **{name: getattr(each, name) for name in ("log", "episode", "duration", "rate")},
-            **each.scores,
-            "missing": dict(each.reasons),
-            "remarks": list(each.remarks),
-        }
-        for rank, each in zip(ranking.ranks, ranking.episodes, strict=True)
-    ]
     document = {
         "format": FORMAT,
         "by": ranking.by,
-        "scores": scores,
-        "settings": settings,
-        "episodes": episodes,
+        "scores": {
+            score.name: {
+                "meaning": score.meaning,
+                "unit": score.unit,
+                "smoother": "higher" if score.smooth > 0 else "lower",
+            }
+            for score in SCORES.values()
+        },
+        "settings": {
+            "level_above_hz": FAST,
+            "sparc_cutoff_hz": CUTOFF,
+            "sparc_threshold": THRESHOLD,
+            "sparc_padding": PADDING,
+        },
+        "episodes": [
+            {
+                "rank": rank,
+                **{name: getattr(each, name) for name in ("log", "episode", "duration", "rate")},
+                **each.scores,
+                "missing": dict(each.reasons),
+                "remarks": list(each.remarks),
+            }
+            for rank, each in zip(ranking.ranks, ranking.episodes, strict=True)
+        ],
         "failed": dict(ranking.failed),
     }
     return json.dumps(document, indent=2, ensure_ascii=False)

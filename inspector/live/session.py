@@ -112,7 +112,7 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
                 f"{name}: shape {array.shape}, expected (joints,) for one sample or"
                 " (samples, joints)"
             )
-        rows[name] = array if array.ndim == 2 else array.reshape(1, -1)
+        rows[name] = np.atleast_2d(array)
         if len(rows[name]) != len(rows["velocity"]):
             listed = ", ".join(f"{len(array)} of {name}" for name, array in rows.items())
             raise LiveError(f"samples differ in number: {listed}")
@@ -414,6 +414,7 @@ class LiveSession:
         stamps = self._stamps(time, len(rows["velocity"]))
         if not len(stamps):
             return
+        self._latest = float(stamps[-1])
         buffer = self._buffer = self._buffer or self._begin(rows)
         taken = 0
         while taken < len(stamps):
@@ -438,7 +439,7 @@ class LiveSession:
         status = Status.FINDINGS if findings else Status.OK
         if not self._counts.total():
             status = Status.CANNOT_TELL
-        reason = labeller.remark if not labeller.model else "no frame was labelled"
+        reason = labeller.remark or "no frame was labelled"
         if status is Status.OK and (reason := self._doubt(samples)):
             status = Status.CANNOT_TELL
         return Summary(
@@ -555,8 +556,6 @@ class LiveSession:
             stamps = np.asarray(time, dtype=np.float64).reshape(-1)
         if stamps.shape != (samples,):
             raise LiveError(f"time: shape {stamps.shape}, expected ({samples},)")
-        if samples:
-            self._latest = float(stamps[-1])
         return stamps
 
     @property
