@@ -17,7 +17,6 @@ from typing import TypeAlias
 import pytest
 
 from inspector.analysis import Analysis, analyse, with_links
-from inspector.audit.signals import without_placeholder
 from inspector.errors import Status
 from inspector.library import Library, load_library
 from inspector.reference import store
@@ -114,7 +113,7 @@ class Noise:
         analysis = with_links(analyse(run, self._library, name=self._node.name), "normal")
         verdict, comparison = Verdict.of(Path(scenario), analysis), None
         if reference is not None and reference.scenarios:
-            comparison = reference.compare(levels(without_placeholder(run)[0], name=scenario))
+            comparison = reference.compare(levels(analysis.run, name=scenario))
             verdict = beside(verdict, comparison, reference, analysis.labels)
         return analysis, judge(verdict, reference, today=date.today()), comparison
 
@@ -125,9 +124,10 @@ class Noise:
         found, events = [], {}
         for place, (run, source) in enumerate(runs, 1):
             file = str(source) if source is not run else f"{self._node.nodeid} {place}"
-            kept, digest = without_placeholder(run)[0], store.digest(run)
-            found.append(levels(kept, name=scenario, file=file, sha256=digest))
-            events[file] = self._judged(run, scenario)[1].events
+            analysis, verdict, _ = self._judged(run, scenario)
+            digest = store.digest(run)
+            found.append(levels(analysis.run, name=scenario, file=file, sha256=digest))
+            events[file] = verdict.events
         store.accept_into(accepted, found, events=events, reason=reason, by=store.who())
 
     def _allowed(self, allow: str | Iterable[Allowed]) -> tuple[Allowed, ...]:
@@ -159,8 +159,7 @@ class Noise:
         if not find_spec("matplotlib"):
             del left["picture"]
         elif comparison is not None and not comparison.empty:
-            drawn = over_reference(comparison, f"{shown}: {comparison}")
-            left["picture"].write_bytes(drawn)
+            left["picture"].write_bytes(over_reference(comparison, f"{shown}: {comparison}"))
         else:
             left["picture"].write_bytes(picture(analysis))
         for what, path in left.items():
