@@ -197,9 +197,10 @@ def scored(run: Run, log: str, *, episode: str = "") -> Episode:
     if rate < 2 * BAND * FAST:
         reason = f"a log of {rate:g} Hz has too little above {FAST:g} Hz"
     found["level"] = level_above(velocity, rate, FAST), reason
-    if len(velocity) and float(speed_of(velocity).max()) >= STANDING:
+    speed = speed_of(velocity)
+    if speed.max(initial=0.0) >= STANDING:
         reason = "the motion is too short, or has no jerk"
-        found["sparc"] = sparc(speed_of(velocity), rate), reason
+        found["sparc"] = sparc(speed, rate), reason
         found["ldlj"] = log_dimensionless_jerk(velocity, rate), reason
     else:
         found["sparc"] = found["ldlj"] = None, f"no joint is faster than {STANDING:g} rad/s"
