@@ -63,19 +63,19 @@ class SampleBuffer:
 
     def put(self, rows: Mapping[str, Array], time: Array) -> None:
         """Take samples; missing signals, or of other widths, are unknown."""
-        widths = {name: values.shape[1] for name, values in rows.items()}
-        for name in sorted(widths.keys() | self._widths.keys()):
-            now, first = widths.get(name, 0), self._widths.get(name, 0)
-            if now != first:
+        piece = {"time": time}
+        for name in sorted(rows.keys() | self._widths.keys()):
+            first = self._widths.get(name, 0)
+            given = rows.get(name, np.empty((len(time), 0)))
+            if (now := given.shape[1]) != first:
                 line = (
                     f"{name} has {now} columns from {time[0]:.3f} s on, and had {first} at first:"
                     " not shown, and not labelled where it makes noise"
                 )
                 self._warnings.note(f"samples with another width of {name}", line, len(time))
-        piece = {"time": time}
-        for name, width in self._widths.items():
-            known = widths.get(name) == width
-            piece[name] = rows[name] if known else np.full((len(time), width), np.nan)
+                given = np.full((len(time), first), np.nan)
+            if name in self._widths:
+                piece[name] = given
         self._pieces.append(piece)
         self.room -= len(time)
 
@@ -281,7 +281,6 @@ class Clock:
         self._warnings.note(TIMELESS, "a time is no number: left out", unknown)
 
 
-UNSEEN = "samples that the viewer may not have shown"
 BATCH = 0.05  # samples are worked on in batches of this duration, in [s]
 FASTEST = 1e6  # highest rate, in [Hz]
 MOST_DROPPED = 0.05  # share of the samples that may be left out for a verdict of `ok`
@@ -649,5 +648,5 @@ class LiveSession:
         """Count the samples since the viewer was last known to be there and to keep up."""
         rest = "the file goes on" if self._sink.saved else "samples are only labelled and counted"
         line = f"the viewer is gone or hangs, noticed at {self._now:.3f} s: {rest}"
-        self.note(UNSEEN, line, self._unconfirmed)
+        self.note("samples that the viewer may not have shown", line, self._unconfirmed)
         self._unconfirmed = 0
