@@ -117,15 +117,14 @@ class Sink:
 
     def close(self) -> bool:
         """Send what waits, and put the file in its place if it is whole."""
-        taken = not self.gone
-        if taken and self._viewer is not None:
+        if self._viewer is not None and not self.gone:
             try:
                 self._viewer.flush(timeout_sec=FLUSH_TIMEOUT)
             except RuntimeError:
-                taken = False
+                self.gone = True
         self._leave()
         self._stack.close()
-        return taken
+        return not self.gone
 
     def _leave(self) -> None:
         """Leave the viewer; of one that hangs or is late rerun waits without end."""

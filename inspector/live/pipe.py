@@ -337,8 +337,7 @@ class Gate:
                 line |= {"reference": known["reference"], "findings": known["events"]}
             self._tell(json.dumps(line))
             return EXIT[verdict.status]
-        shown = summary.findings if self._reference is None else verdict.failing
-        self._tell(str(replace(summary, status=verdict.status, findings=shown)))
+        self._tell(str(replace(summary, status=verdict.status, findings=verdict.failing)))
         compared = () if self._reference is None else verdict.events
         told = [(each, f": {each.evidence}") for each in compared if not each.evidence.excused]
         told += [(each, f" does not count: {each.became}") for each in verdict.excused]
