@@ -229,9 +229,8 @@ def _states(content: Content, names: Sequence[str], *signals: Real | None) -> It
     columns = [
         none if each is None else np.ascontiguousarray(each[mask], float) for each in signals
     ]
-    for time, *row in zip(content.time.tolist(), *columns, strict=True):
-        parts = dict(zip(("position", "velocity", "effort"), row, strict=True))
-        yield time, {"name": joints, **parts}
+    for time, position, velocity, effort in zip(content.time.tolist(), *columns, strict=True):
+        yield time, {"name": joints, "position": position, "velocity": velocity, "effort": effort}
 
 
 def _start_stamp(content: Content) -> int:
@@ -324,8 +323,7 @@ Entry = tuple[Block, str]
 
 def write_labels(spans: Sequence[Span], path: Path, *, overwrite: bool = False) -> None:
     """Write annotated blocks or findings to a file, in the format of its suffix."""
-    text = format_of(path).render(spans, path)
-    write_whole(path, text, overwrite=overwrite)
+    write_whole(path, format_of(path).render(spans, path), overwrite=overwrite)
 
 
 def read_labels(path: Path, run: Run) -> tuple[Block, ...]:

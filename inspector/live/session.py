@@ -158,11 +158,10 @@ class Clock:
         their times, always increasing, in [s].
         """
         stamps = np.where(np.abs(stamps) < 1e100, stamps, np.nan)  # differences would overflow
-        if not self._unit and not self._begin(stamps, ended=ended):
-            return np.zeros(0, dtype=bool), np.empty(0), np.empty(0)
+        begun = self._unit or self._begin(stamps, ended=ended)
+        place, decided = 0, len(stamps) if begun else 0
         known = stamps * self._unit
         time = np.full(len(known), np.nan)  # of those that are left out
-        place, decided = 0, len(known)
         while place < decided:
             follows = self._follows(np.append(self._last, known[place:-1]), known[place:])
             first, place = place, place + int(np.append(follows, False).argmin())
