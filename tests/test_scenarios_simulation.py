@@ -65,14 +65,16 @@ def test_a_healthy_robot_is_ok_all_the_time(runs):
 
 @pytest.mark.slow
 def test_runs_of_other_arms_contain_their_failure_too():
-    for robot, (name, failure) in zip(cycle(["ur5", "ur10"]), (FAILURE | MORE).items()):
+    # Runs of one robot, seed and motion follow on each other, since they share their twin.
+    for robot, name in reversed(list(zip(cycle(["ur5", "ur10"]), HEALTHY, strict=False))):
+        assert labels(simulated(robot, name, 1, duration=SHORT)) == {"ok"}, name
+    cases = zip(cycle(["ur5", "ur10"]), (FAILURE | MORE).items())
+    for robot, (name, failure) in sorted(cases, key=lambda each: each[0], reverse=True):
         # A limit cycle grows from rounding, which differs between processors: not in every seed is
         # it felt, and in which it is depends on the machine.
-        seeds = (1, 2, 3) if name == "limit-cycle" else (1,)
+        seeds = (2, 3, 1) if name == "limit-cycle" else (1,)
         found = (labels(simulated(robot, name, seed, duration=SHORT)) for seed in seeds)
         assert any(failure in each for each in found), name
-    for robot, name in zip(cycle(["ur5", "ur10"]), HEALTHY, strict=False):
-        assert labels(simulated(robot, name, 1, duration=SHORT)) == {"ok"}, name
 
 
 @pytest.mark.parametrize(("name", "stage"), STAGE.items())
