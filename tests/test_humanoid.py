@@ -375,7 +375,7 @@ def test_obstacles_under_any_part_of_a_sole_are_impacts_and_too_high_gains_oscil
 
 @pytest.mark.slow
 def test_a_partial_contact_at_the_edge_of_a_platform_is_labelled():
-    run = simulated("talos", "platform", 2)
+    run = simulated("talos", "platform", 2, duration=5.0)
     assert {"ok", "highaccelerations"} <= {block.label for block in run.blocks}
     assert run.base_pose[-1, 2] == pytest.approx(run.base_pose[0, 2] - 0.06, abs=0.02)
 
