@@ -7,7 +7,6 @@ import ctypes
 import os
 import resource
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -44,10 +43,7 @@ FILES = {
     "live": ("live", "--rate", "1000", "--save", "out/live.rrd"),
 }
 # One of each way in which a file grows: by rerun, in pieces, by pyarrow, by lines, at once.
-WRITERS = {
-    name: FILES[name]
-    for name in ("view", "export mcap", "export parquet", "resume", "import", "live")
-}
+WRITERS = ("view", "export mcap", "export parquet", "resume", "import", "live")
 # Commands that write a folder.
 FOLDERS = {
     "import": ("import", "logs", "-o", "out"),
@@ -63,15 +59,9 @@ def inputs(tmp_path_factory):
     """Runs and logs, to be copied for each command."""
     folder = tmp_path_factory.mktemp("inputs")
     demo = Run.load(demo_run())
-    run = Run(
-        time=demo.time[::10],
-        velocity=demo.velocity[::10],
-        velocity_desired=demo.velocity_desired[::10],
-        position=demo.position[::10],
-        joint_names=demo.joint_names,
-        robot=demo.robot,
-        blocks=demo.blocks,
-    )
+    kept = ("time", "velocity", "velocity_desired", "position")
+    thin = {name: getattr(demo, name)[::10] for name in kept}
+    run = Run(**thin, joint_names=demo.joint_names, robot=demo.robot, blocks=demo.blocks)
     run.save(folder / "run.npz")
     replace(run, robot=None).save(folder / "plain.npz")
     (folder / "good").mkdir()
@@ -99,9 +89,7 @@ def start(place, arguments, *, before=None, **environment):
         [sys.executable, "-m", "inspector", *arguments],
         cwd=place,
         env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        **dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE),
         text=True,
         preexec_fn=before,
     )
@@ -160,7 +148,7 @@ def without_override():
     ctypes.CDLL(None).prctl(drop_from_bounding_set, dac_override, 0, 0, 0)
 
 
-@pytest.mark.parametrize("arguments", WRITERS.values(), ids=WRITERS)
+@pytest.mark.parametrize("arguments", [*map(FILES.get, WRITERS)], ids=WRITERS)
 def test_a_read_only_folder_is_one_line_and_ends_with_5(place, arguments):
     (place / "out").chmod(0o555)
     try:
@@ -173,18 +161,15 @@ def test_a_read_only_folder_is_one_line_and_ends_with_5(place, arguments):
 
 def kill_while_writing(place, arguments):
     """Kill a command as soon as anything is in its folder."""
-    process = start(place, arguments)
-    if arguments[0] == "live":
-        process.stdin.write(ROWS)
-        process.stdin.flush()
-    else:
-        process.stdin.close()
-    while process.poll() is None and not os.listdir(place / "out"):
-        time.sleep(0.001)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    for stream in (process.stdin, process.stdout, process.stderr):
-        stream.close()
+    with start(place, arguments) as process:
+        if arguments[0] == "live":
+            process.stdin.write(ROWS)
+            process.stdin.flush()
+        else:
+            process.stdin.close()
+        while process.poll() is None and not os.listdir(place / "out"):
+            time.sleep(0.001)
+        process.kill()
 
 
 def finished(place):
@@ -192,7 +177,7 @@ def finished(place):
     return {name: size for name, size in written(place).items() if not name.startswith(".")}
 
 
-@pytest.mark.parametrize("arguments", WRITERS.values(), ids=WRITERS)
+@pytest.mark.parametrize("arguments", [*map(FILES.get, WRITERS)], ids=WRITERS)
 def test_a_command_that_was_killed_leaves_a_whole_file_or_none(place, undisturbed, arguments):
     status, whole = undisturbed(arguments)
     kill_while_writing(place, arguments)

@@ -48,9 +48,8 @@ def write(path, seconds):
                 header = {"descr": "<f8", "fortran_order": False, "shape": (count, JOINTS)}
                 npy.write_array_header_1_0(member, header)
                 for first in range(0, count, PIECE):
-                    member.write(
-                        motion(name, np.arange(first, min(count, first + PIECE))).tobytes()
-                    )
+                    rows = np.arange(first, min(count, first + PIECE))
+                    member.write(motion(name, rows).tobytes())
 
 
 def peak(command):
