@@ -103,7 +103,7 @@ def test_runs_are_compared_with_accepted_ones(project, tmp_path, processes):
     text = (tmp_path / "reference" / "reference.toml").read_text()
     assert text.count("[[scenario.repetition]]") == 4
     assert text.count('reason = "first release"') == 2
-    assert project(CHECKED.format(tone=0.0, first=5), *processes)[0] == 0
+    assert project(CHECKED.format(tone=0.0, first=5))[0] == 0
     status, out = project(CHECKED.format(tone=0.05, first=5), *processes)
     assert status == 1
     assert "2 failed" in out
@@ -116,7 +116,7 @@ def test_runs_are_compared_with_accepted_ones(project, tmp_path, processes):
     assert {"test_robot-test_one.rrd", "test_robot-test_one.png"} <= left
     loud = CHECKED.format(tone=0.05, first=5)
     assert project(loud, "--noise-accept", "a new gear", *processes)[0] == 0
-    assert project(loud, *processes)[0] == 0
+    assert project(loud)[0] == 0
 
 
 STRANGE = """
