@@ -123,13 +123,16 @@ def test_a_key_has_up_to_a_hundred_parts():
             jsontext.from_toml(f"{separator.join(parts)} = 1")
 
 
-def test_a_text_may_be_of_64_mib_and_no_more(monkeypatch, tmp_path):
+def test_a_text_may_be_of_64_mib_and_toml_of_16_and_no_more(monkeypatch, tmp_path):
     path = tmp_path / "text.json"
     with path.open("wb") as file:
         file.truncate(2**26 + 1)
     with pytest.raises(ValueError, match=r"^67108865 bytes, the limit is 67108864$"):
         jsontext.text_of(path)
+    with pytest.raises(ValueError, match=r"^16777217 characters, the limit is 16777216$"):
+        jsontext.from_toml("#" * (2**24 + 1))
     monkeypatch.setattr(jsontext, "MAX_CHARACTERS", 9)
+    monkeypatch.setattr(jsontext, "MAX_TOML", 9)
     path.write_bytes(b"\xef\xbb\xbf[1, 2]")  # a byte order mark and six characters
     assert jsontext.text_of(path) == "[1, 2]"
     assert jsontext.from_json("[1, 2, 3]") == [1, 2, 3]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 MAX_CHARACTERS = 64 * 2**20  # longest text that is parsed: a hundred times the longest manifest
+MAX_TOML = 16 * 2**20  # of TOML, of which `tomllib` reads two megabytes in a second
 DIGITS = 20  # most digits of an integer: enough for 64 bits
 PARTS = 100  # most parts of a TOML key; `tomllib` takes memory by their square
 LONG_KEY = re.compile(
@@ -31,7 +32,7 @@ def text_of(path: str | Path) -> str:
 
 def from_json(text: str | bytes) -> Any:
     """Value of a JSON text."""
-    _check_length(text)
+    _check_length(text, MAX_CHARACTERS)
     try:
         return json.loads(text, parse_int=_whole)
     except RecursionError as error:
@@ -40,7 +41,7 @@ def from_json(text: str | bytes) -> Any:
 
 def from_toml(text: str) -> dict[str, Any]:
     """Table of a TOML text."""
-    _check_length(text)
+    _check_length(text, MAX_TOML)
     if LONG_KEY.search(text):
         raise ValueError(f"a key of more than {PARTS} parts")
     try:
@@ -57,9 +58,9 @@ def from_toml(text: str) -> dict[str, Any]:
     return table
 
 
-def _check_length(text: str | bytes) -> None:
-    if len(text) > MAX_CHARACTERS:
-        raise ValueError(f"{len(text)} characters, the limit is {MAX_CHARACTERS}")
+def _check_length(text: str | bytes, most: int) -> None:
+    if len(text) > most:
+        raise ValueError(f"{len(text)} characters, the limit is {most}")
 
 
 def _whole(digits: str) -> int:
