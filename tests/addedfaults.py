@@ -9,14 +9,10 @@ LONG, SHORT = 1.0, 0.1  # how long tones and noise, and blows, last, in [s]
 
 
 def fault(time, kind, frequency, seed, *, start):
-    """A signal of level 1 while it lasts, 0 before.
+    """A signal of level 1 from its start on while it lasts, at uniform times, shape (samples,).
 
-    Args:
-        time: Of each sample, uniform, shape (samples,), in [s].
-        kind: One of ``KINDS``: a tone or noise an octave wide for ``LONG``, or a blow, a decaying
-            tone of level 1 in its first ``SHORT``.
-        frequency: Of the tone, or the middle of the octave, in [Hz].
-        start: When it starts, in [s].
+    It is a tone of a frequency or noise of the octave around it for ``LONG``, or a blow, a decaying
+    tone of level 1 in its first ``SHORT``.
     """
     since = time - start
     if kind == "blow":
@@ -34,12 +30,7 @@ def fault(time, kind, frequency, seed, *, start):
 
 
 def with_fault(signals, joint, added):
-    """Signals of a motion with something added to the measured velocity of a joint.
-
-    Args:
-        signals: By name, those that go joint by joint among them.
-        added: Shape (samples,), in [rad/s].
-    """
+    """Signals of a motion, by name, with something added to the measured velocity of a joint."""
     found = dict(signals)
     for name, sign, norms in (("measured", 1.0, ("measured", NOISE)), ("error", -1.0, ("error",))):
         if (before := signals.get(f"{name}_joints")) is None:

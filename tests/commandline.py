@@ -8,6 +8,17 @@ from unittest import mock
 
 from inspector.cli import main
 
+# Commands that take a run or a log, with the options that they need.
+TAKING_RUNS = [
+    ["classify"],
+    ["audit"],
+    ["noise"],
+    ["view", "-o", "out.rrd"],
+    ["view", "-o", "out.html"],
+    ["listen", "-o", "out.wav"],
+    ["export", "-o", "out.csv"],
+]
+
 
 def call(*arguments):
     """Call the command line; returns exit status, what it printed, and what it complained."""

@@ -25,6 +25,14 @@ MOTION = {f"Transform3D:{part}" for part in ("translation", "quaternion")}
 MOTION |= {"Transform3D:parent_frame", "Transform3D:child_frame"}
 MESH = {f"Asset3D:{part}" for part in ("blob", "media_type", "albedo_factor")}
 MESH |= {"CoordinateFrame:frame"}
+# The components of each entity that every recording has.
+EVERY = {
+    r"/span": LINE,
+    r"/verdict/band": STRIP,
+    r"/verdict/words": LABELS,
+    r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
+    r"/report": {"TextDocument:text", "TextDocument:media_type"},
+}
 
 
 def panda(scale: float = 1.0, *, seconds: float = 3.0, rate: float = 5000.0, **changes) -> Run:
@@ -112,14 +120,11 @@ def stretches(path: Path, entity: str):
 
 
 def check_columns(path: Path, columns: dict[str, set[str]]) -> None:
-    """Check that entities have the components that their pattern has, and that there is no other.
+    """Check that entities have the components of their pattern, each of which has to be matched.
 
-    What rerun writes is left out.
-
-    Args:
-        path: The recording.
-        columns: Components by pattern of entity paths; each pattern has to be matched.
+    There is no other entity, beside those of ``EVERY`` and what rerun writes.
     """
+    columns = EVERY | columns
     schema = RrdReader(path).store().schema()
     found = {}
     for column in schema.component_columns():

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import TAKING_RUNS, call
 from csvlogs import TIME, log, swing, write
 
 import inspector
@@ -181,20 +181,7 @@ def test_what_was_assumed_does_not_pollute_what_programs_read(tmp_path, format_)
         assert not [line for line in out.splitlines() if line and not line.startswith("::")]
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["classify"],
-        ["noise"],
-        ["audit"],
-        ["listen", "-o", "noise.wav"],
-        ["export", "-o", "noise.csv"],
-        ["view", "-o", "log.rrd"],
-        ["view", "-o", "log.html"],
-        ["import", "-o", "run.npz"],
-    ],
-    ids=" ".join,
-)
+@pytest.mark.parametrize("command", [*TAKING_RUNS, ["import", "-o", "out.npz"]], ids=" ".join)
 def test_every_command_that_takes_a_run_takes_a_log(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     time = np.arange(2000) / 1000

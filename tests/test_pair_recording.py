@@ -61,23 +61,18 @@ def scalars(path, entity):
 
 
 SIGNALS = "velocity|desired_velocity|position|effort|stage_planned"
-# The components of each entity.
+# The components of each entity beside ``EVERY``.
 COLUMNS = {
     r"/class/(before|after)/(found|annotated)/(impact|oscillations)": BAND,
     r"/(level/change|change/finding)/new": BAND,
     r"/(noise|level)/(before|after)": LINE,
     r"/change/(noise|none)": LINE,
-    r"/span": LINE,
     rf"/joints/({SIGNALS})/(before|after)/0": LINE,
     r"/spectrogram/(before|after|change)/\d\d": LINE,
-    r"/verdict/band": STRIP,
-    r"/verdict/words": LABELS,
     r"/robot_(before|after)/motion": MOTION,
     r"/robot_(before|after)/(_fixed|panda_.*)": MESH,
     r"/axis/\w+/(left|right)": LABELS,
     r"/axis/\w+/right/scale": STRIP,
-    r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
-    r"/report": {"TextDocument:text", "TextDocument:media_type"},
 }
 
 

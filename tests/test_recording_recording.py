@@ -73,7 +73,7 @@ def whole(tmp_path_factory):
     return folder / "out.rrd", run
 
 
-# The components of each entity.
+# The components of each entity beside ``EVERY``.
 COLUMNS = {
     r"/class/(found|annotated)/(ok|impact|oscillations)": BAND,
     r"/class/mark/impact": POINTS,
@@ -83,7 +83,6 @@ COLUMNS = {
     r"/noise/simplified": LINE,
     r"/level/noise": LINE,
     r"/probability/(failure|alarm)": LINE,
-    r"/span": LINE,
     r"/power/total": LINE,
     r"/joints/(velocity|velocity_desired|position)/0": LINE,
     r"/detail/0/(noise|velocity)": LINE,
@@ -91,12 +90,8 @@ COLUMNS = {
     r"/axis/(class|noise|level|probability|spectrogram|joints|links)/(left|right)": LABELS,
     r"/axis/key/right": LABELS,
     r"/axis/(spectrogram|joints|links|key)/right/scale": STRIP,
-    r"/verdict/band": STRIP,
-    r"/verdict/words": LABELS,
     r"/robot/motion": MOTION,
     r"/robot/(_fixed|panda_.*)": MESH,
-    r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
-    r"/report": {"TextDocument:text", "TextDocument:media_type"},
 }
 
 

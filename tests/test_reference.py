@@ -230,8 +230,8 @@ def test_a_reference_of_another_robot_is_told_and_the_general_model_decides(own,
     there, here = "shoulder, upperarm, elbow", "joint0, joint1, joint2"
     told = f"no reference: it is of a robot with joints {there}, and the run of a robot with joints"
     assert f"{told} {here}" in out
-    first = own / "runs" / "pick-1.npz"
-    status, out, err = call("diff", first, own / "pick-1.npz", "--report", own / "page")
+    pair = own / "runs" / "pick-1.npz", own / "pick-1.npz"
+    status, out, err = call("diff", *pair, "--report", own / "page")
     assert (status, err, f"{told} {here}" in out) == (4, "", True)
     assert not (own / "page" / "worst.png").exists()
     out = call("accept", own / "pick-1.npz", "--reason", "x", "-o", own / "reference")[1]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import TAKING_RUNS, call
 
 import noisemodel as nm
 from inspector.logs.mapping import WrongRobotError, check_joints
@@ -74,16 +74,7 @@ def test_a_fault_that_exceeds_limits_for_a_moment_is_not_another_robot():
     assert list(limit_warnings(run)) == []
 
 
-COMMANDS = [
-    ["classify"],
-    ["audit"],
-    ["noise"],
-    ["view", "-o", "run.rrd"],
-    ["view", "-o", "run.html"],
-    ["listen", "-o", "run.wav"],
-    ["export", "-o", "run.csv"],
-    ["accept", "--reason", "good"],
-]
+COMMANDS = [*TAKING_RUNS, ["accept", "--reason", "good"]]
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
@@ -103,7 +94,7 @@ def test_every_command_remarks_limits_that_are_exceeded_by_far(tmp_path, monkeyp
     panda(factor=180 / np.pi).save(tmp_path / "run.npz")
     name, *options = command
     _, out, err = call(name, "run.npz", *options)
-    page = (tmp_path / "run.html").read_text() if "run.html" in options else ""
+    page = (tmp_path / "out.html").read_text() if "out.html" in options else ""
     assert "far beyond the" in out + err + page
 
 
