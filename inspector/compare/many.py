@@ -85,7 +85,7 @@ NAMED = 16.0  # least distance of two names
 # Most height of a line, in points: thick ones have round ends, so a row is several of them.
 LINE = 8.0
 LETTERS = 16  # most letters of a name beside a row
-SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"  # the markers of `panels.MARKERS` as text
+SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc*"  # the markers of `panels.MARKERS` as text
 
 
 def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
