@@ -8,9 +8,9 @@ import pytest
 from commandline import python
 from numpy.lib import format as npy
 
-# Durations in [s] of runs of 60 joints at 1 kHz: signals of 77 MB and of 230 MB each.
-SHORT, LONG = 160.0, 480.0
-GROWTH = 80e6  # most growth of the peak in [B]; the three signals grow by 460 MB
+# Durations in [s] of runs of 60 joints at 1 kHz: signals of 77 MB and of 154 MB each.
+SHORT, LONG = 160.0, 320.0
+GROWTH = 80e6  # most growth of the peak in [B]; the three signals grow by 230 MB
 JOINTS, PIECE = 60, 20_000  # samples that are made at once
 MEASURE = """
 import resource, subprocess, sys
