@@ -40,8 +40,7 @@ def perfect(blocks, seconds=5.0):
 
 def predicted(name, blocks, labels=None, *, seconds=5.0, scores=None, cut=None, start=0.0):
     """Predictions on a recording; by default without errors, also of frames cut from blocks."""
-    labels = perfect(blocks, seconds) if labels is None else labels
-    labels = np.array(labels)
+    labels = np.array(perfect(blocks, seconds) if labels is None else labels)
     begins = start + frames(seconds)
     if scores is None:
         scores = np.array([np.eye(4)[CLASSES.index(label)] - 0.5 for label in labels])

@@ -120,10 +120,7 @@ def stretches(path: Path, entity: str):
 
 
 def check_columns(path: Path, columns: dict[str, set[str]]) -> None:
-    """Check that entities have the components of their pattern, each of which has to be matched.
-
-    There is no other entity, beside those of ``EVERY`` and what rerun writes.
-    """
+    """Check that all entities match a pattern here or in ``EVERY``, and each pattern one of them."""
     columns = EVERY | columns
     schema = RrdReader(path).store().schema()
     found = {}

@@ -67,6 +67,12 @@ def test_a_bad_log_is_one_line_that_names_the_row(tmp_path, body, message):
     assert "\n" not in str(caught.value)
 
 
+def test_of_two_columns_of_nanoseconds_the_usual_name_counts(tmp_path):
+    rows = "".join(f"0,{n}0000000,0,{n}\n" for n in range(90))
+    (tmp_path / "log.csv").write_text(f"sec,nsec,nanosec,elbow.velocity\n{rows}")
+    assert read_log(tmp_path / "log.csv").run.rate == 100.0
+
+
 def test_a_file_that_is_no_log_is_named(tmp_path):
     (tmp_path / "log.csv").write_bytes(b"\x89PNG\r\n\x1a\n\x00\xff\xfe")
     with pytest.raises(LogError, match="not a CSV log: not text in UTF-8"):

@@ -25,8 +25,7 @@ def test_a_uniform_log_is_imported_bit_for_bit(tmp_path):
 def test_a_joint_without_positions_leaves_all_positions_out(tmp_path):
     imported = read_log(log(tmp_path, **{"wrist.velocity": TIME, "elbow.effort": TIME}))
     assert imported.run.joint_names == ("elbow", "wrist")
-    assert imported.run.position is None
-    assert imported.run.effort is None
+    assert imported.run.position is imported.run.effort is None
     assert imported.remarks == (
         "position: left out, missing for wrist",
         "effort: left out, missing for wrist",

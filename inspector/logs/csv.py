@@ -213,10 +213,9 @@ def _times(header: Sequence[str], options: ReadOptions) -> tuple[int, ...]:
     """Place of the stamps, and of the nanoseconds beside whole seconds, as ROS has them."""
     if not (name := options.stamps_in(header)):
         return ()
-    seconds = SECONDS.fullmatch(name)
+    seconds, places = SECONDS.fullmatch(name), {each.lower(): n for n, each in enumerate(header)}
     words = [f"{seconds['record']}{word}".lower() for word in NANOSECONDS if seconds]
-    rest = [place for place, each in enumerate(header) if each.lower() in words]
-    return header.index(name), *rest[-1:]
+    return header.index(name), *[places[word] for word in words if word in places][:1]
 
 
 def _wanted(path: Path, layout: Layout, times: Sequence[int], options: ReadOptions) -> list[int]:

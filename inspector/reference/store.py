@@ -37,7 +37,17 @@ from inspector.reference.judging import (
     robot_fits,
     share_of_motion,
 )
-from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encoded, levels, octaves
+from inspector.reference.levels import (
+    BINS,
+    HOP,
+    LEAST_DB,
+    SIGNALS,
+    Levels,
+    decoded,
+    encoded,
+    levels,
+    octaves,
+)
 from inspector.text import counted, natural, toml_shown
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_toml, text_of
@@ -189,8 +199,6 @@ def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Leve
             for source in sources([path], reading)[0]:
                 opened = open_source(source, reading)
                 name = scenario_of(opened.run, source.shown, root)
-                if not opened.run.joint_names:
-                    raise InspectorError(f"{source.shown}: no joints, whose levels a reference has")
                 run, file = without_placeholder(opened.run)[0], str(source.shown)
                 found.append(levels(run, name=name, file=file, sha256=opened.sha256))
     except NoiseModelError as error:
@@ -261,6 +269,11 @@ def accept_into(
     for each in runs:
         if f"{each.name}{each.run}" != f"{each.name}{each.run}".encode(errors="ignore").decode():
             raise InspectorError(f"{each.run}: its name is no text in UTF-8; rename it")
+        if not each.joints:
+            raise InspectorError(f"{each.run}: no joints, whose levels a reference has")
+        if not len(each.guide):
+            least = f"a reference needs {BINS * HOP:g} s"
+            raise InspectorError(f"{each.run}: {each.duration:.3g} s; {least}")
     with _alone_in(folder):
         there = os.path.lexists(folder / NAME)
         kept = {each.name: each for each in (Reference.load(folder).scenarios if there else ())}
