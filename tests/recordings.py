@@ -120,7 +120,7 @@ def stretches(path: Path, entity: str):
 
 
 def check_columns(path: Path, columns: dict[str, set[str]]) -> None:
-    """Check that all entities match a pattern here or in ``EVERY``, and each pattern one of them."""
+    """Check that all entities match a pattern, here or in ``EVERY``, and each pattern an entity."""
     columns = EVERY | columns
     schema = RrdReader(path).store().schema()
     found = {}
