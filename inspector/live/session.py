@@ -58,7 +58,8 @@ class SampleBuffer:
 
     def __init__(self, size: int, widths: Mapping[str, int], warnings: Warnings) -> None:
         self._size, self._widths, self._warnings = size, widths, warnings
-        self._pieces: list[dict[str, Array]] = []
+        none = {name: np.empty((0, width)) for name, width in widths.items()}
+        self._pieces: list[dict[str, Array]] = [{"time": np.empty(0), **none}]
         self.room = size  # samples that are missing from a batch
 
     def put(self, rows: Mapping[str, Array], time: Array) -> None:
