@@ -184,8 +184,7 @@ def analyse(
     """
     assumed = ""
     if isinstance(run, (str, Path)):
-        name = name or Path(run).stem
-        opened = open_run(run)
+        opened, name = open_run(run), name or Path(run).stem
         run, assumed = opened.run, opened.assumed
     library = load_library() if library is None else library
     run, left_out = without_placeholder(run)
@@ -206,13 +205,7 @@ def analyse(
         spans, findings = extents(run, labels, labelled.lasting, labelled.bursts)
     except (CannotTellError, nc.SignalError, nm.RunError) as error:
         return replace(found, reason=str(error))
-    status, reason = Status.FINDINGS if findings else Status.CANNOT_TELL, ""
-    if not findings and not found.audit.observable:
-        reason = " ".join(summary(found.audit))
-    elif not findings and (labels.label == nc.UNKNOWN).all():
-        reason = f"every frame is {nc.UNKNOWN}"
-    elif not findings:
-        status = Status.OK
+    status, reason = _status(found.audit, labels, findings)
     return replace(
         found,
         status=status,
@@ -225,6 +218,17 @@ def analyse(
         findings=findings,
         notes=(*found.notes, *filter(None, [labelled.remark])),
     )
+
+
+def _status(seen: Audit, labels: nc.Labels, findings: Sequence[Event]) -> tuple[Status, str]:
+    """Status of a run that has labels, and why it cannot be told."""
+    if findings:
+        return Status.FINDINGS, ""
+    if not seen.observable:
+        return Status.CANNOT_TELL, " ".join(summary(seen))
+    if (labels.label == nc.UNKNOWN).all():
+        return Status.CANNOT_TELL, f"every frame is {nc.UNKNOWN}"
+    return Status.OK, ""
 
 
 def analyse_file(
