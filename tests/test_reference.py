@@ -238,16 +238,16 @@ def test_a_reference_of_another_robot_is_told_and_the_general_model_decides(own,
     assert "pick: 1 repetition replace the accepted, of a robot with other joints" in out
 
 
-def test_a_base_without_joints_or_less_than_a_frame_is_not_accepted(own):
+def test_a_base_without_joints_and_a_run_of_less_than_a_frame_are_not_accepted(own):
     still, base = np.zeros((3000, 0)), np.random.default_rng(0).normal(size=(3000, 6))
     path, time = own / "base-1.npz", np.arange(3000) / 1000
     nm.Run(time=time, joint_names=(), velocity=still, base_velocity=base).save(path)
-    refused = f"inspector: {path}: no joints, whose levels a reference has\n"
+    refused = f"inspector: {path}: the run has no joints, and a reference holds levels of joints\n"
     assert call("accept", path, "--reason", "x")[::2] == (3, refused)
     out = call("classify", path, "--reference", own / "reference")[1]
     assert "upperarm, elbow, and the run of a robot without joints" in out
     nm.Run(time=time[:150], joint_names=("a",), velocity=np.zeros((150, 1))).save(own / "b.npz")
-    short = f"inspector: {own / 'b.npz'}: 0.15 s; a reference needs 0.2 s\n"
+    short = f"inspector: {own / 'b.npz'}: 0.15 s is too short, a reference needs 0.2 s\n"
     assert call("accept", own / "b.npz", "--reason", "x")[::2] == (3, short)
 
 

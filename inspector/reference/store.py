@@ -270,10 +270,11 @@ def accept_into(
         if f"{each.name}{each.run}" != f"{each.name}{each.run}".encode(errors="ignore").decode():
             raise InspectorError(f"{each.run}: its name is no text in UTF-8; rename it")
         if not each.joints:
-            raise InspectorError(f"{each.run}: no joints, whose levels a reference has")
+            problem = "the run has no joints, and a reference holds levels of joints"
+            raise InspectorError(f"{each.run}: {problem}")
         if not len(each.guide):
-            least = f"a reference needs {BINS * HOP:g} s"
-            raise InspectorError(f"{each.run}: {each.duration:.3g} s; {least}")
+            problem = f"{each.duration:.3g} s is too short, a reference needs {BINS * HOP:g} s"
+            raise InspectorError(f"{each.run}: {problem}")
     with _alone_in(folder):
         there = os.path.lexists(folder / NAME)
         kept = {each.name: each for each in (Reference.load(folder).scenarios if there else ())}
