@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from noiseclassifier.errors import SignalError
 from noiseclassifier.profile import STATISTICS, Profile, Resolution, columns, spectra
-from noiseclassifier.signals import BY_JOINT, Array, Index, Mask, Real, Signals, stacked
+from noiseclassifier.signals import BY_JOINT, Array, Index, Mask, Real, Signals, Tail, stacked
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -507,7 +507,7 @@ class FrameFeatures:
         self.count = 0  # samples so far
         self._frame = first_sample(self._profile)  # start of the next frame
         self._base = 0  # number of the first sample that is held
-        self._held: list[tuple[Array, Mask]] = []
+        self._samples, self._valid = Tail(self._rows), Tail(dtype=np.bool_)
         self._windows = self._no_windows  # starts and energies, of frames to come
         self._relative = RunningReference()
 
@@ -554,7 +554,7 @@ class FrameFeatures:
         found = self._nothing
         # A last frame, flush with the end, covers the tail of a signal.
         if self._profile.bands == "log" and last > first and (last - first) % self._profile.hop:
-            found = self._features(np.array([last]), *self._all_held())
+            found = self._features(np.array([last]))
         self._begin()
         return found
 
@@ -565,25 +565,22 @@ class FrameFeatures:
         """Features of the frames that samples complete; they are held for the next ones."""
         length, hop = self._profile.length, self._profile.hop
         self.count += len(valid)
+        self._samples.more(len(valid))[:] = samples
+        self._valid.more(len(valid))[:] = valid
         if self.count < self._frame + length:
-            self._held.append((samples.copy(), valid.copy()))
             return self._nothing
-        self._held.append((samples, valid))
         frames = np.arange(self._frame, self.count - length + 1, hop)
         self._frame += len(frames) * hop
-        samples, valid = self._all_held()
-        found = self._features(frames, samples, valid)
+        found = self._features(frames)
         over = self._frame - hop - self._base  # no later frame begins before, also not a last one
-        self._held, self._base = [(samples[:, over:], valid[over:])], self._base + over
+        self._samples.drop(over)
+        self._valid.drop(over)
+        self._base += over
         return found
 
-    def _all_held(self) -> tuple[Array, Mask]:
-        samples, valid = zip(*self._held, strict=True)
-        return np.concatenate(samples, axis=1), np.concatenate(valid)
-
-    def _features(self, frames: Index, samples: Array, valid: Mask) -> Frames:
+    def _features(self, frames: Index) -> Frames:
         """Features of those frames that no gap touches, by the samples that are held."""
-        places = frames - self._base
+        samples, valid, places = self._samples.samples, self._valid.samples, frames - self._base
         length = self._profile.length
         kept = [bool(valid[place : place + length].all()) for place in places]
         whole = frames[kept]

@@ -16,7 +16,7 @@ has no one frequency. Files and streams have the same windows, hence the same nu
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -26,7 +26,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from noiseclassifier.labels import UNKNOWN, Event
-from noiseclassifier.signals import JOINTS, Array, Index, Mask, Real
+from noiseclassifier.signals import JOINTS, Array, Index, Mask, Real, Tail
 
 WINDOW, HOP = 1.0, 0.25  # duration of a window, and time from one to the next, in [s]
 # Time by which a finding begins after the first of its windows, and ends before the last, in [s],
@@ -91,9 +91,10 @@ class Windows(ABC):
         self.rate, self.start = rate, start
         self._length, self._hop = round(window * rate), max(1, round(hop * rate))
         self._first = 0  # number of the first sample that is held
-        # Samples of the stretch from where the next window begins, in pieces, and how many.
-        self._held: list[Array] = []
-        self._count = 0
+        self._count = 0  # samples of the stretch from where the next window begins
+        self._last: list[Array] = []  # of these, the latest one
+        # Their differences: slow motion, which is far louder, would leak into all frequencies.
+        self._slopes = Tail(0, 0)
 
     def push(self, signals: Mapping[str, Real], valid: Mask | None = None) -> None:
         """Take samples.
@@ -106,14 +107,14 @@ class Windows(ABC):
         if MEASURED not in signals:
             return
         names = [name for name in self.SIGNALS if name in signals]
-        fresh = np.stack([np.asarray(signals[name], np.float64) for name in names])
+        fresh = [np.asarray(signals[name], np.float64) for name in names]
         if valid is None or valid.all():
             self._take(fresh)
             return
         gaps = np.flatnonzero(np.diff(valid, prepend=True)).tolist()
-        for first, stop in pairwise([0, *gaps, fresh.shape[2]]):
+        for first, stop in pairwise([0, *gaps, len(valid)]):
             if first == stop or valid[first]:
-                self._take(fresh[..., first:stop])
+                self._take([each[:, first:stop] for each in fresh])
             else:
                 self.skip(stop - first)
 
@@ -124,33 +125,36 @@ class Windows(ABC):
 
     def finish(self) -> None:
         """End a stretch: the signal ends, or a gap begins."""
-        self._end(self._samples())
+        self._end(self._slopes.samples)
         self._first += self._count
-        self._held, self._count = [], 0
+        self._count = 0
 
-    def _take(self, fresh: Array) -> None:
-        self._held.append(fresh)
-        self._count += fresh.shape[2]
+    def _take(self, fresh: Sequence[Array]) -> None:
+        joints, count = fresh[0].shape
+        if not count:
+            return
+        begun = int(self._count > 0)
+        if not begun:
+            self._slopes = Tail(len(fresh), joints)
+        slopes = self._slopes.more(count - 1 + begun)
+        for number, samples in enumerate(fresh):
+            np.subtract(samples[:, 1:], samples[:, :-1], out=slopes[number, :, begun:])
+            if begun:
+                np.subtract(samples[:, 0], self._last[number], out=slopes[number, :, 0])
+        self._last = [samples[:, -1].copy() for samples in fresh]
+        self._count += count
         windows = max(0, 1 + (self._count - self._length) // self._hop)
         if not windows:
             return
-        samples = self._samples()
-        # Of the differences: slow motion, which is far louder, would leak into all frequencies.
-        slopes = np.diff(samples[..., : (windows - 1) * self._hop + self._length], axis=2)
-        cut = sliding_window_view(slopes, self._length - 1, axis=2)[:, :, :: self._hop]
-        at_once = max(self.LEAST, AT_ONCE // (slopes.shape[1] * self._length))
+        cut = sliding_window_view(self._slopes.samples, self._length - 1, axis=2)
+        cut = cut[:, :, : windows * self._hop : self._hop]
+        at_once = max(self.LEAST, AT_ONCE // (joints * self._length))
         for first in range(0, windows, at_once):
             for found in self._found(cut[:, :, first : first + at_once]):
                 self._follow(found)
                 self._first += self._hop
-        rest = samples[..., windows * self._hop :].copy()
-        self._held, self._count = [rest], rest.shape[2]
-
-    def _samples(self) -> Array:
-        """All samples that are held; a single piece is not copied."""
-        if len(self._held) == 1:
-            return self._held[0]
-        return np.concatenate(self._held, axis=2) if self._held else np.empty((0, 0, 0))
+        self._slopes.drop(windows * self._hop)
+        self._count -= windows * self._hop
 
     @abstractmethod
     def _found(self, slopes: Array) -> Iterable[Any]:
@@ -162,7 +166,7 @@ class Windows(ABC):
 
     @abstractmethod
     def _end(self, rest: Array) -> None:
-        """End a stretch, of which a rest is in no window or in earlier ones."""
+        """End a stretch, of which a rest is in no window or in earlier ones: its differences."""
 
 
 class Lasting(Windows):
@@ -218,9 +222,9 @@ class Lasting(Windows):
         return found
 
     def _end(self, rest: Array) -> None:
-        length = rest.shape[2]
+        length = self._count
         if not self._windows and length >= SHORTEST * self.rate:
-            slopes = np.diff(rest)[:, :, None]
+            slopes = rest[:, :, None]
             (peaks,) = strong(slopes, self.rate, np.ones(slopes.shape[1:3], dtype=bool))
             self._follow(peaks, length)
         for line in self._lines:

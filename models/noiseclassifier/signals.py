@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from noiseclassifier.errors import MissingSignalError, SignalError
 
@@ -68,3 +68,36 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
         more = ", and (joints, samples) joint by joint" * any(name in BY_JOINT for name in names)
         raise SignalError(f"a signal has another shape, {found}, expected (samples,){more}")
     return chosen[0] if len(chosen) == 1 else np.vstack(chosen)
+
+
+class Tail:
+    """The latest samples of a signal that comes in chunks, as one array, shape (..., samples).
+
+    A chunk is copied once, and the rest seldom: there is room for as many samples more.
+    """
+
+    def __init__(self, *shape: int, dtype: DTypeLike = np.float64) -> None:
+        self._room: NDArray[Any] = np.empty((*shape, 0), dtype)
+        self._first = self._stop = 0
+
+    @property
+    def samples(self) -> NDArray[Any]:
+        """Those that are held; they are written over later."""
+        return self._room[..., self._first : self._stop]
+
+    def more(self, count: int) -> NDArray[Any]:
+        """Where so many samples that follow are to be written."""
+        if self._stop + count > self._room.shape[-1]:
+            held = self.samples
+            needed = held.shape[-1] + count
+            self._room = np.empty((*held.shape[:-1], needed + held.shape[-1]), held.dtype)
+            self._room[..., : held.shape[-1]] = held
+            self._first, self._stop = 0, held.shape[-1]
+        self._stop += count
+        return self._room[..., self._stop - count : self._stop]
+
+    def drop(self, count: int) -> None:
+        """Drop the oldest samples."""
+        self._first += count
+        if self._first == self._stop:
+            self._first = self._stop = 0
