@@ -7,7 +7,7 @@ import noisemodel as nm
 from inspector.levels import SPECTRUM
 from inspector.library import label_run
 from inspector.live.drawing import LiveRobot, Messages, SpectrogramStream
-from inspector.live.labels import Labeller, noise_signal
+from inspector.live.labels import Labeller, noise_signals
 from inspector.live.session import Clock, Warnings
 from inspector.recording import robot as scene
 from inspector.recording.robot import FIELD_OF_VIEW, sight
@@ -218,5 +218,7 @@ def test_columns_make_the_norms_and_joints_that_a_run_makes(missing):
     }
     run = nm.Run(time=np.arange(50) / 1000, joint_names=("a", "b", "c", "d"), **columns)
     motion, base = np.hstack(list(columns.values())), 6 * ("base_velocity" in columns)
-    for name, signal in {**nm.norms(run), **nm.by_joint(run)}.items():
-        np.testing.assert_allclose(noise_signal(name, motion, base, 4), signal, rtol=1e-12)
+    signals = {**nm.norms(run), **nm.by_joint(run)}
+    found = noise_signals(tuple(signals), motion, base, 4)
+    for name, signal in signals.items():
+        np.testing.assert_allclose(found[name], signal, rtol=1e-12)

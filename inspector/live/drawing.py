@@ -243,31 +243,32 @@ class SpectrogramStream:
         self._hop = max(1, self._length // 4)
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
         self.edges = np.geomspace(self._frequency[0], self._frequency[-1], panels.BANDS + 1)
-        self._samples = np.empty((0, 1))  # that wait for those that follow; NaN where not valid
+        # Joint by joint those that wait for others, NaN where not valid.
+        self._samples = np.empty((1, 0))
 
     def skip(self) -> None:
         """Begin anew after a gap, with a window that touches it and is dark."""
-        self._samples = np.full((self._hop, 1), np.nan)
+        self._samples = np.full((1, self._hop), np.nan)
 
     def push(self, velocity: Array, valid: Mask, end: float) -> tuple[Array, Array]:
         """Take samples; centres of windows in [s], and levels, shape (columns, bands)."""
         length, hop = self._length, self._hop
-        held = np.broadcast_to(self._samples, (len(self._samples), velocity.shape[1]))
-        samples = np.concatenate((held, np.where(valid[:, None], velocity, np.nan)))
-        count = max(0, (len(samples) - length) // hop + 1)
-        self._samples = samples[count * hop :]
+        held = np.broadcast_to(self._samples, (velocity.shape[1], self._samples.shape[1]))
+        samples = np.concatenate((held, np.where(valid, velocity.T, np.nan)), axis=1)
+        count = max(0, (samples.shape[1] - length) // hop + 1)
+        self._samples = samples[:, count * hop :]
         if not count:
             return np.empty(0), np.empty((0, panels.BANDS))
-        # Shape (windows, joints, length).
-        windows = np.lib.stride_tricks.sliding_window_view(samples, length, axis=0)[::hop]
+        # Shape (joints, windows, length).
+        windows = np.lib.stride_tricks.sliding_window_view(samples, length, axis=1)[:, ::hop]
         # In a window, slow motion is a line all but: what is left of it is below 10 Hz.
         ramp = np.arange(length) - (length - 1) / 2
         slope = windows @ ramp / (ramp @ ramp)
         level_windows = (windows - slope[..., None] * ramp).reshape(-1, length)
-        amplitude = amplitudes(level_windows).reshape(*windows.shape[:2], -1).max(axis=1)
+        amplitude = amplitudes(level_windows).reshape(*windows.shape[:2], -1).max(axis=0)
         level = 2 * decibel(in_bands(self._frequency, amplitude.T, self.edges))
         level = np.fmin(np.fmax(SPECTRUM.place(level), 0.0), 1.0).T  # 0 where one is NaN
-        since = len(samples) - hop * np.arange(count)  # samples from starts to the end
+        since = samples.shape[1] - hop * np.arange(count)  # samples from starts to the end
         return np.asarray(end - (since - length / 2) / self._rate), level
 
 

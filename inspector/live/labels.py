@@ -19,17 +19,19 @@ from noisemodel.types import Array, Mask
 NOISY = ("base_velocity", "velocity", "velocity_desired")
 
 
-def noise_signal(name: str, motion: Array, base: int, joints: int) -> Array:
-    """A norm of a motion, or joint by joint what it is of, as `noisemodel` makes them."""
-    if name == NOISE:
-        return nm.simplified(motion)
-    each, moved = name in JOINTS, base + joints
-    measured, desired = motion[:, base:moved], motion[:, moved:]
-    if name.startswith("measured"):
-        chosen = measured if each else motion[:, :moved]
-    else:
-        chosen = desired if name.startswith("desired") else desired - measured
-    return chosen.T if each else nm.simplified(chosen)
+def noise_signals(names: Sequence[str], motion: Array, base: int, joints: int) -> dict[str, Array]:
+    """Norms of a motion, and joint by joint what they are of, as `noisemodel` makes them."""
+    moved = base + joints
+    of_joints = {"measured": motion[:, base:moved], "desired": motion[:, moved:]}
+    if any(name.startswith("error") for name in names):
+        of_joints["error"] = of_joints["desired"] - of_joints["measured"]
+    norms_of = {**of_joints, "measured": motion[:, :moved], NOISE: motion}
+    return {
+        name: of_joints[name.removesuffix("_joints")].T
+        if name in JOINTS
+        else nm.simplified(norms_of[name])
+        for name in names
+    }
 
 
 class Labeller:
@@ -69,7 +71,7 @@ class Labeller:
         self._samples += len(motion)
         if self._stream is None:
             return None
-        signals = {n: noise_signal(n, motion, self._base, self._joints) for n in self._names}
+        signals = noise_signals(self._names, motion, self._base, self._joints)
         for each in self._windows:
             each.push(signals, valid)
         labels = self._stream.push(signals, valid)

@@ -170,12 +170,16 @@ class CsvReader:
                 f" they are {listed(header)}"
             )
         self.names = names or tuple(found["velocity"])
-        self._columns: dict[str, tuple[list[int], Array]] = {}  # with the sizes of their units
+        # With the sizes of their units, where one is not 1. Columns side by side are not copied.
+        self._columns: dict[str, tuple[list[int] | slice, Array | None]] = {}
         for kind, by_joint in found.items():
             if lacking := [name for name in self.names if name not in by_joint]:
                 raise LiveError(f"the header has no {kind} of joint {lacking[0]!r}")
             places = [by_joint[name] for name in self.names]
-            self._columns[kind] = places, np.array([factor_of(header[place]) for place in places])
+            factors = np.array([factor_of(header[place]) for place in places])
+            beside = places == list(range(places[0], places[0] + len(places)))
+            chosen = slice(places[0], places[-1] + 1) if beside else places
+            self._columns[kind] = chosen, None if (factors == 1.0).all() else factors
         time = time_column(header)
         self._time = header.index(time) if time else None
         self._second = float(UNITS[TIME_UNITS.get(without_unit(time)[1], "seconds")])
@@ -185,8 +189,9 @@ class CsvReader:
         plain = numbers_in(lines, self._width, self._delimiter, range(self._width))
         table = self._read_lines(lines, first, note) if plain is None else plain[0]
         if len(table):
-            columns = self._columns.items()
-            rows = {name: table[:, places] * factors for name, (places, factors) in columns}
+            rows = {}
+            for name, (places, factors) in self._columns.items():
+                rows[name] = table[:, places] if factors is None else table[:, places] * factors
             if self._time is not None:
                 rows["time"] = table[:, self._time] * self._second
             yield rows

@@ -91,10 +91,12 @@ class SampleBuffer:
 
     def take(self, kept: Mask) -> dict[str, Array]:
         """Take out the signals of the samples that are kept; those after them wait."""
-        whole, count = self.whole, len(kept)
-        signals = {name: whole[name][:count][kept] for name in self._widths}
-        for values in signals.values():
-            values[~(np.abs(values) < LARGEST)] = np.nan  # the square of others would overflow
+        whole, count, signals = self.whole, len(kept), {}
+        for name in self._widths:
+            values = whole[name][:count]
+            values = values if kept.all() else values[kept]
+            usable = np.abs(values) < LARGEST  # the square of others would overflow
+            signals[name] = values if usable.all() else np.where(usable, values, np.nan)
         self._pieces = [{name: values[count:] for name, values in whole.items()}]
         self.room = self._size
         return signals
@@ -586,7 +588,7 @@ class LiveSession:
                 " such samples make no noise, frames with one have no label"
             )
             self.note("samples without noise", line, int((~valid).sum()))
-        motion = np.where(valid[:, None], motion, 0.0)
+            motion[~valid] = 0.0
         if self._stream is not None:
             self._stream.push(float(time[0]), signals, valid, lost)
         edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(time)]
