@@ -118,6 +118,7 @@ class Findings:
     def __init__(self) -> None:
         self._closed: list[Event] = []
         self._open: Labels | None = None
+        self._quiet = True  # whether all frames that are kept are `ok`, as most often
 
     def add(self, labels: Labels) -> None:
         """Take the labels of the next frames."""
@@ -130,7 +131,7 @@ class Findings:
         last = int(apart[-1]) if len(apart) else 0
         if not quiet[:last].all():  # most often all of it is `ok`, and a label must not wait
             self._closed += waiting.part(slice(last + 1)).events()
-        self._open = waiting.part(slice(last, None))
+        self._open, self._quiet = waiting.part(slice(last, None)), bool(quiet[last:].all())
 
     @property
     def decided(self) -> float:
@@ -140,7 +141,7 @@ class Findings:
     @property
     def confirmed(self) -> tuple[Event, ...]:
         """The events that will not vanish, whatever comes: as if an `ok` frame came next."""
-        if self._open is None:
+        if self._open is None or self._quiet:
             return tuple(self._closed)
         last = self._open.part(slice(-1, None))
         quiet = replace(last, label=np.full_like(last.label, "ok"))
@@ -149,7 +150,9 @@ class Findings:
     @property
     def events(self) -> tuple[Event, ...]:
         """The events so far, as if the signal ended here."""
-        return (*self._closed, *(() if self._open is None else self._open.events()))
+        if self._open is None or self._quiet:
+            return tuple(self._closed)
+        return (*self._closed, *self._open.events())
 
 
 class News:
