@@ -141,8 +141,16 @@ class Run:
 
     @cached_property
     def rate(self) -> float:
-        """Nominal sample rate: the inverse of the mean step, in [Hz]."""
-        return float(f"{(len(self.time) - 1) / float(self.time[-1] - self.time[0]):.9g}")
+        """Nominal sample rate: the inverse of the mean step, in [Hz].
+
+        It has the fewest digits, up to nine, that the precision of the times allows: dates in
+        seconds since 1970 have the rate of the same samples from 0 s on.
+        """
+        first, last = float(self.time[0]), float(self.time[-1])
+        rate = (len(self.time) - 1) / (last - first)
+        unsure = rate * 2.0 * float(np.spacing(max(abs(first), abs(last)))) / (last - first)
+        found = (float(f"{rate:.{digits}g}") for digits in range(1, 10))
+        return next((each for each in found if abs(each - rate) <= unsure), float(f"{rate:.9g}"))
 
     @property
     def duration(self) -> float:
