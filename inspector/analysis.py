@@ -19,7 +19,7 @@ from inspector.audit.signals import without_placeholder
 from inspector.errors import IGNORED, InspectorError, Status, Unknown
 from inspector.levels import FLOOR_DB, STEP, velocity_levels
 from inspector.library import CannotTellError, Library, label_run, load_library
-from inspector.localisation import Localisation, extent, localise
+from inspector.localisation import Localisation, extent, line_extent, localise
 from inspector.localisation.order import Order, order
 from inspector.logs.clocks import without_hold
 from inspector.logs.mapping import check_joints
@@ -273,19 +273,30 @@ def extents(
 
     Those that overlap or touch are one, of the class that lasts longer.
     """
+
+    def length(event: Event) -> float:
+        return event.stop - event.start
+
     frame, pairs = float(labels.stop[0] - labels.start[0]), list[tuple[Event, Event]]()
-    found = [(event, 0.0, frame, labels.step) for event in labels.events()]
-    found += [(e, nc.lasting.MARGIN, nc.lasting.WINDOW, nc.lasting.HOP) for e in lasting]
+    found = [(event, 0.0) for event in labels.events()]
     # A line fills most of its windows: it begins before the last hop of the first.
-    found += [(e, nc.bursts.MARGIN + nc.bursts.HOP, frame, labels.step) for e in bursts]
-    for span, more, length, step in sorted(found, key=lambda each: (each[0].start, each[0].stop)):
-        start, stop = extent(run, span.start - more, span.stop + more, frame=length, hop=step)
+    found += [(event, nc.lasting.MARGIN + nc.lasting.HOP) for event in lasting]
+    found += [(event, nc.bursts.MARGIN + nc.bursts.HOP) for event in bursts]
+    for span, more in sorted(found, key=lambda each: (each[0].start, each[0].stop)):
+        if span.line is None:
+            start, stop = extent(run, span.start, span.stop, frame=frame, hop=labels.step)
+        else:
+            start, stop = line_extent(run, span, more)
         # As JSON has them, so that a verdict that is read again says the same.
         own = replace(span, start=round(start, 6), stop=round(stop, 6))
-        if pairs and pairs[-1][0].stop >= span.start:
+        if pairs and (pairs[-1][0].stop >= span.start or pairs[-1][1].stop >= own.start):
             before, located = pairs.pop()
             span = joined(before, span)
             start, stop = min(located.start, own.start), max(located.stop, own.stop)
+            if span.line is None and span.label == "oscillations":  # a line may be most of it
+                longer = max(located, own, key=lambda each: (each.line is not None, length(each)))
+                most = 2.0 * length(longer) >= stop - start
+                span = replace(span, line=longer.line if most else None)
             own = replace(span, start=start, stop=stop)
         pairs.append((span, own))
     return tuple(span for span, _ in pairs), tuple(finding for _, finding in pairs)

@@ -132,6 +132,49 @@ def _gain(power: Array, known: Mask, shortest: int) -> Array:
     return np.asarray(np.where(enough & (high > low), gain, 0.0).mean(axis=1))
 
 
+BRIEF, PERIODS = 0.05, 3.0  # least length of a window on a line, in [s], and in periods
+LOUDEST = 90.0  # percentile of the amplitudes around an edge that is taken for that of the line
+NEAR = 1.0  # time within a finding that is looked at for its edges, in [s]
+
+
+def line_extent(run: Run, event: Event, reach: float) -> tuple[float, float]:
+    """When the line of a finding sets in and ends, in [s]: at half of its amplitude in its joint.
+
+    It is looked for up to a time ``reach`` before and after the finding, also beyond a gap.
+    """
+    begin, last = float(run.time[0]), len(run.time) - 1
+    edges = []
+    for edge, sign in ((event.start, 1.0), (event.stop, -1.0)):
+        outer, inner = edge - sign * reach, edge + sign * min(NEAR, event.stop - event.start)
+        ends = sorted(round((time - begin) * run.rate) for time in (outer, inner))
+        part = slice(max(0, ends[0]), min(last, ends[1]) + 1)
+        amplitude = _amplitude(run, event, part)
+        loud = np.flatnonzero(amplitude >= 0.5 * np.percentile(amplitude, LOUDEST))
+        edges.append(begin + (part.start + int(loud[0] if sign > 0 else loud[-1])) / run.rate)
+    return edges[0], edges[1] + 1.0 / run.rate
+
+
+def _amplitude(run: Run, event: Event, part: slice) -> Array:
+    """Amplitude of a finding's line around each sample of a part, in any unit; 0 in gaps."""
+    joint, frequency = _line(run, event)
+    # Of differences: slow motion, which is far louder, would leak.
+    velocity, valid = run.velocity[part, joint].astype(np.float64), run.mask[part]
+    slope = np.diff(velocity, prepend=velocity[:1])
+    slope[~valid | ~np.append(False, valid[:-1])] = 0.0
+    wave = slope * np.exp(-2j * np.pi * frequency / run.rate * np.arange(len(slope)))
+    size = min(round(max(BRIEF, PERIODS / frequency) * run.rate), len(slope) - 1)
+    taper = np.hanning(size + 2)[1:-1]
+    there = np.convolve(valid, taper, "same")
+    return np.asarray(valid * np.abs(np.convolve(wave, taper, "same")) / np.maximum(there, 1e-9))
+
+
+def _line(run: Run, event: Event) -> tuple[int, float]:
+    """Column of the joint of a finding's line, and its frequency, in [Hz]."""
+    assert event.line is not None
+    row, frequency = event.line
+    return row if run.velocity_desired is None else in_both(run)[0][row], frequency
+
+
 # --- stage and joints
 
 MOST = 16  # most stretches that are picked; a long run is not read whole
@@ -503,6 +546,27 @@ def band(run: Run, failure: Failure, failures: Sequence[Failure]) -> tuple[float
     return float(frequency[best]), float(frequency[stops[best] - 1])
 
 
+def _of_line(run: Run, event: Event) -> Localisation:
+    """Joints by their shares of a line's power, and its frequency with the resolution."""
+    _, frequency = _line(run, event)
+    duration = min(max(event.stop - event.start, BRIEF), NEAR, run.duration)
+    size = max(3, round(duration * run.rate))
+    first = min(round((event.start - float(run.time[0])) * run.rate), len(run.time) - size)
+    last = round((event.stop - float(run.time[0])) * run.rate)
+    starts = np.arange(first, max(first + 1, last - size + 1), size)
+    power, wave = np.zeros(run.velocity.shape[1]), 2.0 * np.pi * frequency / run.rate
+    for part in _spread(starts, size):
+        slope = np.diff(run.velocity[part].astype(np.float64), axis=0)
+        taper = np.hanning(len(slope) + 2)[1:-1] * np.exp(-1j * wave * np.arange(len(slope)))
+        power += np.square(np.abs(taper @ slope))
+    shares = power / (power.sum() or 1.0)
+    ranked = np.argsort(-shares, kind="stable")[:JOINTS].tolist()
+    return Localisation(
+        joints=tuple((run.joint_names[i], float(shares[i])) for i in ranked if shares[i] > 0.0),
+        band=(max(0.0, frequency - 1.0 / duration), frequency + 1.0 / duration),
+    )
+
+
 def _spectrum(velocity: Real) -> Array:
     """Power of all joints together, shape (frequency,)."""
     # A trend would leak into all frequencies.
@@ -568,9 +632,13 @@ def localise(
     failures: list[Failure] = [*found, *annotated]
     if not failures:
         return {}
-    quiet, localised = quiet_statistics(run, failures), {}
+    quiet, localised = quiet_statistics(run, failures), dict[Failure, Localisation]()
     for failure in failures:
         reach = max(ANNOTATED, frame) if failure in found else ANNOTATED
         known = first_stage(run, quiet, failure, reach=reach)
-        localised[failure] = replace(known, band=band(run, failure, failures))
+        if isinstance(failure, Event) and failure.line is not None:
+            line = _of_line(run, failure)
+            localised[failure] = replace(known, joints=line.joints, band=line.band, onset=None)
+        else:
+            localised[failure] = replace(known, band=band(run, failure, failures))
     return localised

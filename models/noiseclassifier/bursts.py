@@ -152,10 +152,12 @@ class Bursts(Windows):
         needed = 10.0 ** (ABOVE / 10.0) * rest
         faster = needed * np.maximum(lines.motion / np.maximum(motion, TINY), 1.0)
         ripple = np.maximum(10.0 ** (RIPPLE / 10.0) * lines.motion, needed)
-        if not (lines.power >= np.minimum(faster, ripple)).any():
+        above = lines.power * (lines.power >= np.minimum(faster, ripple))
+        if not above.any():
             return None
-        first = self.start + lines.first / self.rate
-        return Event("oscillations", first + MARGIN, first + WINDOW - MARGIN, SCORE)
+        first, best = self.start + lines.first / self.rate, int(above.argmax())
+        line = int(lines.row[best]), float(self._frequency[lines.place[best]])
+        return Event("oscillations", first + MARGIN, first + WINDOW - MARGIN, SCORE, line=line)
 
 
 def summed(power: Array, row: Index, place: Index) -> Array:

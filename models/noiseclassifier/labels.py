@@ -15,7 +15,7 @@ From frames to findings, the same for every estimator that gives probabilities:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -38,6 +38,9 @@ class Event:
     #: too; of a model without one, the highest score of the class.
     score: float
     novel: bool = False  #: whether one of its frames is out of distribution
+    #: Of a line that was followed, the joint, as a row of the signals that go joint by joint, and
+    #: the frequency, in [Hz].
+    line: tuple[int, float] | None = field(default=None, compare=False)
 
     @property
     def novelty(self) -> str:

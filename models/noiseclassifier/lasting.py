@@ -264,7 +264,8 @@ class Lasting(Windows):
         first = line.first + (self._margin if line.windows < self._windows else 0)
         times = self.start + first / self.rate, self.start + stop / self.rate
         score = 1.0 - 0.5 * 10.0 ** (-max(line.strength - STRONG, 0.0) / 10.0)
-        self._events = [*merged(*self._events, Event("oscillations", *times, score))]
+        event = Event("oscillations", *times, score, line=(line.row, line.frequency))
+        self._events = [*merged(*self._events, event)]
 
 
 def strong(slopes: Array, rate: float, heard: Mask) -> list[list[Peak]]:
@@ -362,10 +363,13 @@ def merged(*events: Event) -> tuple[Event, ...]:
 
 
 def joined(event: Event, other: Event) -> Event:
-    """One event of two that overlap or touch, of the class that lasts longer and is known."""
-    known = event.label != UNKNOWN, other.label != UNKNOWN
-    durations = event.stop - event.start, other.stop - other.start
-    longer = event if (known[0], durations[0]) >= (known[1], durations[1]) else other
+    """One event of two that overlap or touch, of the class that is known and lasts longer.
+
+    Of two that last equally long, that of the higher score gives the line.
+    """
+    longer = max(
+        event, other, key=lambda each: (each.label != UNKNOWN, each.stop - each.start, each.score)
+    )
     return replace(
         longer,
         start=min(event.start, other.start),
