@@ -241,7 +241,7 @@ def urdfs(tmp_path_factory):
     return [arm(tmp_path_factory.mktemp("arm"), *kinds) for kinds in (ARM, SLIDING)]
 
 
-def test_a_run_brings_its_robot_and_its_motion(urdfs, tmp_path):
+def test_a_run_brings_its_robot_and_its_motion_a_robot_the_excitation_of_a_seed(urdfs, tmp_path):
     robot = Robot.load(urdfs[0])
     run = excitation(robot, seed=3)
     run.save(tmp_path / "run.npz")
@@ -251,7 +251,10 @@ def test_a_run_brings_its_robot_and_its_motion(urdfs, tmp_path):
     assert [one.name for one in found] == [urdfs[0], str(paths[0]), paths[1]]
     for one in found:
         np.testing.assert_array_equal(one.pressure, expected.pressure)
-        assert one.events == run.blocks
+        assert (one.events, one.rate) == (run.blocks, 4000.0)
+    first, zero = (alone(urdfs[0], **seed).pressure for seed in ({}, {"seed": 0}))
+    np.testing.assert_array_equal(first, zero)
+    assert not np.array_equal(first, expected.pressure)
 
 
 def test_a_robot_that_kills_its_worker_is_left_out(tmp_path, monkeypatch):
@@ -325,13 +328,6 @@ def test_runs_and_robots_that_do_not_suffice_are_left_out(tmp_path):
 def test_what_cannot_be_compared_is_refused_before_any_work(options, error, message):
     with pytest.raises(error, match=message):
         compare(**({"robots": ["panda", "go2"]} | options))
-
-
-def test_the_motion_is_the_excitation_of_seed_0_unless_another_is_named(urdfs):
-    found, zero, one = (alone(urdfs[1], FEW, **seed) for seed in ({}, {"seed": 0}, {"seed": 1}))
-    np.testing.assert_array_equal(found.pressure, zero.pressure)
-    assert not np.array_equal(found.pressure, one.pressure)
-    assert found.rate == 4000.0
 
 
 KINDS = ("paper", "normal", "C")

@@ -177,12 +177,13 @@ def test_desired_motion_adds_its_own_power_with_a_resting_base(solo):
         ({"q": np.zeros(19)}, r"q has shape \(19,\), expected \(19, 19\)"),
         ({"v": np.full((40, 18), np.nan)}, "v: nan in row 0, column 0"),
         ({"q": np.full((40, 19), np.inf)}, "q: inf in row 0, column 0"),
+        ({"kind": "loud"}, "no kind 'loud' of noise; there are paper, A, B"),
     ],
 )
-def test_motions_that_cannot_be_are_refused(solo, options, message):
+def test_motions_and_kinds_that_cannot_be_are_refused(solo, options, message):
     robot, surface = solo
     q, v = motion(robot)
-    with pytest.raises(NoiseModelError, match=message):
+    with pytest.raises(UnknownKindError if "kind" in options else NoiseModelError, match=message):
         extended(robot, surface, **({"q": q, "v": v} | options))
 
 
@@ -284,11 +285,6 @@ def test_mean_squares_are_the_kinetic_energy_of_bodies_with_the_surfaces_for_mas
     assert np.allclose(squares, energy, rtol=1e-12)
 
 
-def test_an_unknown_kind_is_refused_with_those_that_there_are(solo):
-    with pytest.raises(UnknownKindError, match=r"no kind 'loud' of noise; there are paper, A, B"):
-        extended(*solo, *motion(solo[0]), "loud")
-
-
 def test_the_surface_of_another_robot_is_refused(solo, tmp_path):
     robot = chain(tmp_path, "revolute")
     with pytest.raises(GeometryError, match="a surface of 13 links for 'chain', which has 1"):
@@ -333,11 +329,14 @@ def test_desired_velocities_without_positions_are_taken_where_the_robot_is():
     np.testing.assert_allclose(both.vibration, once.vibration, rtol=1e-12)
 
 
-def test_the_loudest_link_is_the_one_with_the_largest_peak():
+def test_the_loudest_link_is_the_one_with_the_largest_peak_and_joints_that_move_it_are_named():
     found = link_noise(arm_run(rattling=3))
     peaks = found.vibration.max(axis=0)
     assert [peaks[link] for link in found.loudest] == sorted(peaks, reverse=True)
     assert "wrist_1_joint" in found.movers[found.loudest[0]]
+    movers = dict(zip(found.links, found.movers, strict=True))
+    assert movers["shoulder_link"] == {"shoulder_pan_joint"}
+    assert movers["wrist_3_link"] == set(Robot.load("ur5").joint_names)
     assert 200 <= found.vibration[:, found.loudest[0]].argmax() < 250
 
 
@@ -380,13 +379,6 @@ def test_a_base_is_heard_without_its_pose(tmp_path):
     run = as_run(robot, *motion(robot, samples=400))
     for heard in (lambda one: link_noise(one).power, lambda one: estimate(one, "normal").power):
         np.testing.assert_allclose(heard(replace(run, base_pose=None)), heard(run), rtol=1e-6)
-
-
-def test_each_link_names_the_joints_that_move_it():
-    found = link_noise(arm_run())
-    movers = dict(zip(found.links, found.movers, strict=True))
-    assert movers["shoulder_link"] == {"shoulder_pan_joint"}
-    assert movers["wrist_3_link"] == set(Robot.load("ur5").joint_names)
 
 
 def test_a_long_run_has_no_more_bins_than_a_short_one():

@@ -98,9 +98,7 @@ def handler(_):
 @pytest.mark.parametrize("address", ["localhost", "tcp://localhost", "tcp://:8786", "8786"])
 def test_an_address_has_a_protocol_a_host_and_a_port_and_needs_the_extra(address, monkeypatch):
     pytest.importorskip("distributed")
-    with pytest.raises(
-        NoiseModelError, match=r"is no address of a Dask scheduler, tcp://HOST:PORT"
-    ):
+    with pytest.raises(NoiseModelError, match="no address of a Dask scheduler, tcp://HOST:PORT"):
         list(in_order(invert, [1], jobs=address, died=dead))
     assert list(in_order(invert, [], jobs=address, died=dead)) == []  # none is asked
     monkeypatch.setattr(parallel, "find_spec", lambda name: None)

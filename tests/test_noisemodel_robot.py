@@ -332,9 +332,8 @@ def welds(joints):
 
 def test_a_urdf_gives_its_name_and_mimic_joints(tmp_path):
     path = tmp_path / "arm.urdf"
-    path.write_text(
-        GOOD.replace("<axis", '<mimic joint="wrist" multiplier="-2" offset="0.5"/><axis')
-    )
+    wrist = '<mimic joint="wrist" multiplier="-2" offset="0.5"/><axis'
+    path.write_text(GOOD.replace("<axis", wrist))
     assert checked(path).get("name") == "arm"
     assert mimics(path, checked(path)) == {"elbow": Mimic("wrist", multiplier=-2.0, offset=0.5)}
     path.write_text(GOOD.replace("<axis", '<mimic joint="wrist"/><axis'))
@@ -380,22 +379,17 @@ def test_a_bad_urdf_is_one_line_that_names_the_file_and_the_problem(tmp_path, ca
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("old", "new", "message"),
     [
-        (welds(3).replace("</robot>", "<a ixx='1 2'/></robot>"), "ixx of <a> is '1 2', expected 1"),
-        *(
-            (
-                welds(3).replace("</robot>", f"{mass}</robot>"),
-                "value of <mass> is '.*', expected 1 f",
-            )
-            for mass in ("<mass/>", "<mass value='1 2'/>")
-        ),
-        (welds(3).replace('<child link="l3"', '<child link="l1"'), "'l1' go round in a circle"),
+        ("</robot>", "<a ixx='1 2'/></robot>", "ixx of <a> is '1 2', expected 1 f"),
+        ("</robot>", "<mass/></robot>", "value of <mass> is '', expected 1 f"),
+        ("</robot>", "<mass value='1 2'/></robot>", "value of <mass> is '1 2', expected 1 f"),
+        ('<child link="l3"', '<child link="l1"', "'l1' go round in a circle"),
     ],
 )
-def test_numbers_and_trees_that_pinocchio_takes_though_they_are_wrong(tmp_path, text, message):
+def test_numbers_and_trees_that_pinocchio_takes_though_they_are_wrong(tmp_path, old, new, message):
     path = tmp_path / "arm.urdf"
-    path.write_text(text)
+    path.write_text(welds(3).replace(old, new))
     with pytest.raises(RobotError, match=message):
         checked(path)
 

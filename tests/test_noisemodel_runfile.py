@@ -219,10 +219,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path, name, hint, content):
         (BASE | {"meta": '{"differentiated": 3}'}, OBJECT),
         ({"robot": "a", "velocity": VELOCITY}, f"it has robot, velocity, {NEEDED}"),
         ({}, f"it has nothing, {NEEDED}"),
-        (
-            {"time": TIME, "velocty": VELOCITY},
-            f"unknown array 'velocty' (did you mean 'velocity'?); {KNOWN}",
-        ),
+        (BASE | {"velocty": TIME}, f"unknown array 'velocty' (did you mean 'velocity'?); {KNOWN}"),
         (BASE | {"camera": TIME}, f"unknown array 'camera'; {KNOWN}"),
         (BASE | {"velocity": TIME}, "velocity has shape (40,), expected (samples, joints)"),
         ({"time": TIME, "position": 3.0}, "position has shape (), expected (samples, joints)"),
