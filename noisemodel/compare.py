@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -338,13 +338,14 @@ def contrasts(pressure: Array, time: Array, rate: float, events: Sequence[Block]
 
 
 def _estimates(
-    robot: Robot, surface: Surface, q: Real, v: Real, kinds: Sequence[str]
-) -> tuple[Array, Array, Array, Array]:
-    """Pressure and power, shape (kinds, samples), energy, (kinds, links), and shares of terms."""
-    power, energy = np.zeros((len(kinds), len(q))), np.zeros((len(kinds), len(surface.links)))
-    terms: Array = np.zeros((len(surface.links), len(TERMS)))
-    for start in range(0, len(q), CHUNK):
-        rows = slice(start, start + CHUNK)
+    robot: Robot, surface: Surface, motions: Sequence[tuple[Real, Real]], kinds: Sequence[str]
+) -> tuple[Array, Array, Array]:
+    """Power, shape (kinds, samples), energy, (kinds, links), and shares of terms of all motions."""
+    samples, links = len(motions[0][0]), len(surface.links)
+    power, energy = np.zeros((len(kinds), samples)), np.zeros((len(kinds), links))
+    terms: Array = np.zeros((links, len(TERMS)))
+    chunks = [slice(start, start + CHUNK) for start in range(0, samples, CHUNK)]
+    for (q, v), rows in product(motions, chunks):
         motion = (robot, surface, q[rows], v[rows])
         each = np.array([chunk_speeds(*motion, term) for term in TERMS])
         known = dict(zip(TERMS, each, strict=True))
@@ -355,20 +356,18 @@ def _estimates(
             if kind != SIMPLIFIED:
                 speed = known[kind] if kind in known else chunk_speeds(*motion, kind)
                 radiated = sound_power(speed**2, surface.area[:, None]).T
-                power[place, rows] = radiated.sum(axis=1)
+                power[place, rows] += radiated.sum(axis=1)
                 energy[place] += radiated.sum(axis=0)
-    pressure = np.sqrt(power)
     if SIMPLIFIED in kinds:
         place = kinds.index(SIMPLIFIED)
-        pressure[place] = simplified(v)
-        power[place] = pressure[place] ** 2
+        power[place] = sum(simplified(v) ** 2 for _, v in motions)
         # Squared velocities of each link's joint; a joint that follows another one has none.
-        squares = np.einsum("sj,sj->j", v, v, dtype=np.float64)
+        squares = sum(np.einsum("sj,sj->j", v, v, dtype=np.float64) for _, v in motions)
         for link, index in enumerate(surface.joint):
             joint = robot.joints[index - 1]
             if joint.name not in robot.mimics:
                 energy[place, link] = squares[joint.first_v : joint.first_v + joint.nv].sum()
-    return pressure, power, energy, terms / max(terms.sum(), TINY)
+    return power, energy, terms / max(terms.sum(), TINY)
 
 
 # The motion of each robot.
@@ -585,7 +584,9 @@ def _compare(
     surface = Surface.of(robot, geometry)
     if not surface.area.any():
         raise GeometryError(f"no link has a surface by geometry {geometry!r}")
-    pressure, power, energy, terms = _estimates(robot, surface, *robot.configuration(run), kinds)
+    motions = [robot.configuration(run), *filter(None, [robot.desired(run)])]
+    power, energy, terms = _estimates(robot, surface, motions, kinds)
+    pressure = np.sqrt(power)
     events = tuple(block for block in run.blocks if block.label != "ok")
     squares = spectral_distances([log_spectra(np.sqrt(each), window) for each in power])
     rms = np.sqrt(np.mean(pressure**2, axis=1, keepdims=True))

@@ -48,25 +48,25 @@ def compared(robot, q, v, kinds=COMPARED, *, rate=RATE):
     return alone(as_run(robot, q, v, rate), kinds, surface="visual")
 
 
-@pytest.fixture(scope="module")
-def comparison(panda):
-    return compared(panda[0], *swinging(panda[0]))
-
-
-def test_shares_are_those_of_the_noise_and_of_squared_velocities_by_terms_they_add_up(
-    panda, comparison
-):
+def test_a_run_has_the_noise_of_its_measured_and_desired_motion_and_shares_of_its_terms(panda):
     robot, surface = panda
-    q, v = swinging(robot)
-    shares = dict(zip(comparison.kinds, comparison.shares, strict=True))
+    (q, v), (q_desired, v_desired) = swinging(robot), motion(robot, samples=2000)
+    wanted = {"position_desired": q_desired, "velocity_desired": v_desired}
+    found = alone(as_run(robot, q, v, **wanted), COMPARED, surface="visual")
+    shares = dict(zip(found.kinds, found.shares, strict=True))
+    pressure = dict(zip(found.kinds, found.pressure, strict=True))
+    powers = {"simplified": simplified(v, v_desired) ** 2}
     for kind in ("paper", "normal"):
-        noise = extended(robot, surface, q, v, kind)
+        noise = extended(robot, surface, q, v, kind, q_desired=q_desired, v_desired=v_desired)
         assert np.allclose(shares[kind], noise.shares, rtol=1e-12)
-    squares = (v**2).sum(axis=0)
+        powers[kind] = noise.total
+    for kind, power in powers.items():
+        assert np.allclose(pressure[kind] ** 2, power / power.mean(), rtol=1e-12)
+    squares = (v**2 + v_desired**2).sum(axis=0)
     assert np.allclose(shares["simplified"], squares / squares.sum(), rtol=1e-12)
-    assert np.allclose(comparison.shares.sum(axis=1), 1.0, rtol=1e-12)
-    assert comparison.terms.shape == (9, 3)
-    assert np.allclose(comparison.terms.sum(axis=1), shares["paper"], rtol=1e-12)
+    assert np.allclose(found.shares.sum(axis=1), 1.0, rtol=1e-12)
+    assert found.terms.shape == (9, 3)
+    assert np.allclose(found.terms.sum(axis=1), shares["paper"], rtol=1e-12)
 
 
 def test_a_joint_that_follows_has_no_share_of_the_simplified_noise():
@@ -110,7 +110,8 @@ def test_silence_is_compared_without_a_warning(panda):
     assert np.isnan(contrasts(found.pressure, found.time, RATE, [Block(0.1, 0.2, "jerk")])).all()
 
 
-def test_without_events_or_without_anything_else_there_is_no_contrast(comparison):
+def test_without_events_or_without_anything_else_there_is_no_contrast(panda):
+    comparison = compared(panda[0], *swinging(panda[0]))
     whole = Block(-1.0, 3.0, "fall")
     for events in ((), (whole,), (Block(0.1, 0.2, "jerk"), whole)):
         found = contrasts(comparison.pressure, comparison.time, RATE, events)
