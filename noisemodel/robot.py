@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from math import inf, isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -234,7 +235,7 @@ class Robot:
         """
         if run.position is None:
             raise RunError(f"the run has no 'position'; {self.name!r} cannot be moved without")
-        q = self._positions(run.joint_names, run.position)
+        q = self._positions((run.joint_names, run.position))
         v = self._velocities(run.joint_names, run.velocity)
         if self.floating_base:
             if run.base_pose is not None:
@@ -246,23 +247,23 @@ class Robot:
     def desired(self, run: Run) -> tuple[Array, Array] | None:
         """Order a run's desired motion as Pinocchio does, q and v; its base is stationary.
 
-        Without desired positions the joints are where they were measured. It is None where the run
-        has no desired velocities; errors are those of `configuration`.
+        Joints without desired positions are where they were measured. It is None where the run has
+        no desired velocities; errors are those of `configuration`.
         """
         if run.velocity_desired is None:
             return None
-        v = self._velocities(run.desired_joint_names, run.velocity_desired)
-        names, position = run.desired_joint_names, run.position_desired
-        if position is None:
-            names, position = run.joint_names, run.position
-        if position is None:
+        if run.position is None and run.position_desired is None:
             raise RunError(f"the run has no positions; {self.name!r} cannot be moved without")
-        return self._positions(names, position), v
+        wanted = (run.desired_joint_names, run.position_desired)
+        q = self._positions((run.joint_names, run.position), wanted)
+        return q, self._velocities(run.desired_joint_names, run.velocity_desired)
 
-    def _positions(self, names: tuple[str, ...], position: Real) -> Array:
+    def _positions(self, *known: tuple[tuple[str, ...], Real | None]) -> Array:
+        """Configurations of positions that are known by name, the last ones first."""
+        given = [(names, position) for names, position in known if position is not None]
         # Samples lie next to each other in memory, as batch kinematics reads them.
-        q = np.tile(self.neutral[:, None], len(position))
-        for joint, angle in self._named(names, position):
+        q = np.tile(self.neutral[:, None], len(given[0][1]))
+        for joint, angle in chain.from_iterable(self._named(*each) for each in given):
             if joint.kind == "continuous":
                 q[joint.first_q], q[joint.first_q + 1] = np.cos(angle), np.sin(angle)
             else:
