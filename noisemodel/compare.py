@@ -12,7 +12,7 @@ import numpy as np
 from noisemodel.noise import CHUNK, KINDS, chunk_speeds, decibel, simplified, sound_power, vibrating
 from noisemodel.parallel import DIED, Jobs, in_order
 from noisemodel.robot import Robot, is_name, limits_of
-from noisemodel.run import Block, Run, is_robot_file, part, stretches
+from noisemodel.run import Block, Run, is_robot_file, stretches
 from noisemodel.surface import GEOMETRIES, TINY, Surface
 from noisemodel.types import (
     Array,
@@ -473,9 +473,7 @@ def moving(source: Source, seed: int = 0) -> tuple[Robot, Run, tuple[str, ...]]:
     if not run.mask.all():
         parts = stretches(run.mask, len(run.time))
         longest = max(parts, key=lambda each: each.stop - each.start, default=slice(0, 1))
-        time = run.time[longest]
-        within = [b for b in run.blocks if b.start >= time[0] and b.stop <= time[-1]]
-        run = part(run, longest.start, longest.stop, blocks=tuple(within))
+        run = run.cut(*np.append(run.time, np.inf)[[longest.start, longest.stop]].tolist())
         remarks.append(f"The run has gaps: compared from {run.time[0]:.2f} s on.")
     missing = [joint for joint in robot.joint_names if joint not in run.joint_names]
     if missing:
