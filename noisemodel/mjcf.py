@@ -82,15 +82,16 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
     for name in ("qpos0", "body_pos", "body_quat", "jnt_pos", "jnt_axis", "geom_pos", "geom_size"):
         if not np.isfinite(getattr(compiled, name)).all():
             raise RobotError(f"{path}: {name} of the compiled model is not finite")
-    drawn, triangles = {}, 0
+    drawn, triangles, bodies = {}, 0, _body_names(compiled)
     for geom in range(compiled.ngeom):
-        if (shape := _shape(compiled, geom, meshes.get(geom))) is not None:
+        link = bodies[int(compiled.geom_bodyid[geom])]
+        if (shape := _shape(compiled, geom, link, meshes.get(geom))) is not None:
             drawn[geom] = shape
             triangles += 0 if isinstance(shape.body, str) else len(shape.body)
         if triangles > limit("triangles"):
             raise RobotError(f"{path}: its shapes have too many triangles, {beyond('triangles')}")
     visual = _visual(compiled)
-    model, floating = _model(path, compiled, floating_base)
+    model, floating = _model(path, compiled, bodies, floating_base)
     return Mjcf(
         model=model,
         floating_base=floating,
@@ -262,7 +263,9 @@ def _rotation(quaternion: Array) -> Array:
     )
 
 
-def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, bool]:
+def _model(
+    path: Path, compiled: Any, bodies: Sequence[str], floating_base: bool | None
+) -> tuple[Any, bool]:
     """Add bodies and joints to a Pinocchio model, in their order; and whether its base floats."""
     import pinocchio as pin
     from mujoco import mjtJoint
@@ -271,13 +274,14 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
     model.name = path.stem
     free = bool(compiled.njnt) and compiled.jnt_type[0] == mjtJoint.mjJNT_FREE
     floating = free if floating_base is None else floating_base
+    joints, frames = {compiled.joint(index).name for index in range(compiled.njnt)}, set(bodies)
     base = 0
     if floating and not free:
-        base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root_joint")
+        title = unused("root_joint", joints)
+        base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), title)
         model.addFrame(pin.Frame("world", base, pin.SE3.Identity(), pin.FrameType.BODY))
     carrier = {0: (base, pin.SE3.Identity())}  # of each body: the joint, and its pose there
     for body in range(1, compiled.nbody):
-        name = _body_name(compiled, body)
         joint, place = carrier[int(compiled.body_parentid[body])]
         place = place * pin.SE3(_rotation(compiled.body_quat[body]), compiled.body_pos[body])
         first = int(compiled.body_jntadr[body])
@@ -285,7 +289,8 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
         for index in range(first, first + count):
             kind = compiled.jnt_type[index]
             unnamed = "_free" if kind == mjtJoint.mjJNT_FREE else f"Joint_{index - first}"
-            title = compiled.joint(index).name or name + unnamed  # as Pinocchio names them
+            # As Pinocchio names them
+            title = compiled.joint(index).name or unused(bodies[body] + unnamed, joints)
             if kind == mjtJoint.mjJNT_BALL:
                 raise RobotError(f"{path}: joint {title!r} is a ball joint, which is not supported")
             if kind == mjtJoint.mjJNT_FREE:
@@ -295,10 +300,10 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
                 continue
             joint, place = _add_joint(model, joint, place, compiled, index, title)
             if index < first + count - 1:  # the next joint of the body moves against this one
-                frame = pin.Frame(f"{name}:{title}", joint, place, pin.FrameType.BODY)
-                model.addFrame(frame)
+                name = unused(f"{bodies[body]}:{title}", frames)
+                model.addFrame(pin.Frame(name, joint, place, pin.FrameType.BODY))
         carrier[body] = (joint, place)
-        model.addFrame(pin.Frame(name, joint, place, pin.FrameType.BODY))
+        model.addFrame(pin.Frame(bodies[body], joint, place, pin.FrameType.BODY))
     return model, floating
 
 
@@ -330,9 +335,19 @@ def _add_joint(
     return joint, pin.SE3(np.eye(3), -origin)
 
 
-def _body_name(compiled: Any, body: int) -> str:
-    """The name of a body, or one that stands for it."""
-    return compiled.body(body).name or f"body{body}"
+def _body_names(compiled: Any) -> list[str]:
+    """The names of all bodies, or ones that stand for them."""
+    names = [compiled.body(body).name for body in range(compiled.nbody)]
+    taken = set(names)
+    return [name or unused(f"body{body}", taken) for body, name in enumerate(names)]
+
+
+def unused(name: str, taken: set[str]) -> str:
+    """A name that stands for none, with underscores after it if it is taken; from now on it is."""
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
 
 
 def _mimics(compiled: Any) -> Iterator[tuple[str, Mimic]]:
@@ -355,16 +370,17 @@ def _mimics(compiled: Any) -> Iterator[tuple[str, Mimic]]:
         yield names[0], Mimic(names[1], linear, offset)
 
 
-def _shape(compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None) -> LinkShape | None:
+def _shape(
+    compiled: Any, geom: int, link: str, mesh: tuple[str, Array, Array] | None
+) -> LinkShape | None:
     """A geom in its body's axes; None for planes, height fields and what is fixed to the world."""
     from mujoco import mjtGeom
 
-    body = int(compiled.geom_bodyid[geom])
     x, y, z = compiled.geom_size[geom].tolist()
     matrix, shift = np.eye(3), np.zeros(3)
     drawn: str | Array
     match mjtGeom(compiled.geom_type[geom]):
-        case _ if body == 0:
+        case _ if compiled.geom_bodyid[geom] == 0:
             return None
         case _ if mesh is not None:
             drawn, matrix, shift = mesh
@@ -388,7 +404,7 @@ def _shape(compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None) -> L
             return None
     turn = _rotation(compiled.geom_quat[geom])
     place = turn @ shift + compiled.geom_pos[geom]
-    return LinkShape(_body_name(compiled, body), turn @ matrix, place, drawn)
+    return LinkShape(link, turn @ matrix, place, drawn)
 
 
 def _opacity(compiled: Any, geom: int) -> float:

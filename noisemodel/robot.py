@@ -205,8 +205,10 @@ class Robot:
         else:
             if floating_base is None:
                 floating_base = listed is not None and listed.floating_base
-            mimics = urdf.mimics(path, urdf.checked(path))
-            model = _model(path, floating_base)
+            root = urdf.checked(path)
+            mimics = urdf.mimics(path, root)
+            names = {joint.get("name", "") for joint in root.findall("joint")}
+            model = _model(path, mjcf.unused("root_joint", names) if floating_base else None)
         table = table_of(model)
         mimics = mimics if mimic else {}
         if mimic:
@@ -362,11 +364,14 @@ def _is_wide(folder: Path) -> bool:
     return a_home or any(home.is_relative_to(folder) for home in homes)
 
 
-def _model(path: Path, floating_base: bool) -> Any:
-    """Read a URDF with Pinocchio, whose words on file descriptor 2 become the error's."""
+def _model(path: Path, floating: str | None) -> Any:
+    """Read a URDF with Pinocchio, whose words on file descriptor 2 become the error's.
+
+    The base floats by a joint of the name ``floating``, or is fixed if that is None.
+    """
     import pinocchio
 
-    root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
+    root = () if floating is None else (pinocchio.JointModelFreeFlyer(), floating)
     with tempfile.TemporaryFile() as kept:
         terminal = os.dup(2)
         os.dup2(kept.fileno(), 2)

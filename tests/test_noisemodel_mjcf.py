@@ -126,6 +126,18 @@ def test_joints_without_a_name_are_named_after_their_body_and_numbered(tmp_path)
     assert link_names(robot) == ("upper:lift", "upper", "body3", "tip")
 
 
+@pytest.mark.parametrize("name", ["body3", "upper:lift", "body3Joint_0"])
+def test_names_that_stand_for_none_are_those_of_no_other(tmp_path, name):
+    """Renaming the last body and its joint changes nothing but their names."""
+    one = Robot.load(written(tmp_path, ARM))
+    other = Robot.load(written(tmp_path, re.sub("tip|wrist", name, ARM)))
+    assert len({*other.joint_names}) == len({*link_names(other)}) == 4
+    assert (other.joint_names[-1], link_names(other)[-1]) == (name, name)
+    q, v = np.random.default_rng(0).normal(size=(2, 5, 4))
+    powers = [nm.extended(each, Surface.of(each), q, v).power for each in (one, other)]
+    np.testing.assert_array_equal(*powers)
+
+
 def test_limits_are_those_of_the_file(tmp_path):
     found = limits_of(Robot.load(written(tmp_path, ARM)))
     ranges = [each.upper - each.lower for each in found.values()]

@@ -23,6 +23,7 @@ from noisemodel import (
     link_twists,
 )
 from noisemodel.robot import Limits, joint_limits, package_roots
+from noisemodel.surface import link_names
 from noisemodel.urdf import Mimic, checked, mimics
 
 ARM = """
@@ -66,6 +67,10 @@ def test_a_urdf_of_ones_own_has_a_fixed_base_unless_requested(tmp_path):
     assert robot.joint_names == ("shoulder", "elbow", "finger")
     assert (robot.nq, robot.nv) == (4, 3)
     assert arm(tmp_path, floating_base=True).nq == 11
+    (tmp_path / "root.urdf").write_text(ARM.format(follows="").replace("elbow", "root_joint"))
+    robot = Robot.load(tmp_path / "root.urdf", floating_base=True)
+    assert robot.joint_names == ("shoulder", "root_joint", "finger")
+    assert link_names(robot) == ("l0", "l1", "l2", "l3")  # the base's joint has another name
 
 
 def test_neutral_is_pinocchios_for_every_kind_of_joint(tmp_path):
