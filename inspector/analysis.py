@@ -22,13 +22,12 @@ from inspector.library import CannotTellError, Library, label_run, load_library
 from inspector.localisation import Localisation, extent, line_extent, localise
 from inspector.localisation.order import Order, order
 from inspector.logs.clocks import without_hold
-from inspector.logs.mapping import check_joints
 from inspector.logs.read import Opened, open_run
 from noiseclassifier import Event
 from noiseclassifier.lasting import joined
 from noisemodel import Block, Run
 from noisemodel.files import replacing
-from noisemodel.noise import LinkNoise, link_noise, vibrating
+from noisemodel.noise import LinkNoise, assumed, link_noise, vibrating
 from noisemodel.robot import is_name
 from noisemodel.run import is_robot_file
 from noisemodel.runfile import pieces
@@ -457,18 +456,13 @@ def estimate(run: Run, kind: str) -> Estimate:
     if run.robot is None or not robot_known(run):
         names = "none" if run.robot is None else repr(run.robot)
         raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {names}")
-    floats = run.base_pose is not None or run.base_velocity is not None
-    robot = nm.Robot.load(run.robot, floating_base=floats or None)
+    robot = nm.Robot.of(run)
     surface = nm.Surface.of(robot, "auto")
     q_desired, v_desired = robot.desired(run) or (None, None)
     noise = nm.extended(
         robot, surface, *robot.configuration(run), kind, q_desired=q_desired, v_desired=v_desired
     )
-    without = surface.without_geometry
-    remarks = [f"links without geometry: {', '.join(without)}"] if without else []
-    if lacking := check_joints(run.joint_names, run.robot):
-        remarks.append(f"not in the log, assumed stationary: {', '.join(lacking)}")
-    return Estimate(kind, "√W", noise.power, noise.names, tuple(remarks))
+    return Estimate(kind, "√W", noise.power, noise.names, tuple(assumed(run, robot, surface)))
 
 
 def noise_level(run: Run, estimate: Estimate) -> str:

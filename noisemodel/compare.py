@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from noisemodel.noise import CHUNK, KINDS, chunk_speeds, decibel, simplified, sound_power, vibrating
+from noisemodel.noise import (
+    CHUNK,
+    KINDS,
+    assumed,
+    chunk_speeds,
+    decibel,
+    simplified,
+    sound_power,
+    vibrating,
+)
 from noisemodel.parallel import DIED, Jobs, in_order
 from noisemodel.robot import Robot, is_name, limits_of
 from noisemodel.run import Block, Run, is_robot_file, stretches
@@ -464,21 +473,15 @@ def moving(source: Source, seed: int = 0) -> tuple[Robot, Run, tuple[str, ...]]:
             remarks.append("Its mimic joints cannot be coupled: they move independently.")
         return robot, excitation(robot, seed=seed), tuple(remarks)
     run = source if isinstance(source, Run) else Run.load(str(source))
-    if run.robot is None:
-        raise RunError("the run names no robot; `inspector import --robot` adds one")
+    robot = Robot.of(run)
     if run.position is None:
         raise RunError("the run has no positions, which the extended noise needs")
-    floating = run.base_pose is not None or run.base_velocity is not None
-    robot = Robot.load(run.robot, floating_base=True if floating else None)
     if not run.mask.all():
         parts = stretches(run.mask, len(run.time))
         longest = max(parts, key=lambda each: each.stop - each.start, default=slice(0, 1))
         run = run.cut(*np.append(run.time, np.inf)[[longest.start, longest.stop]].tolist())
         remarks.append(f"The run has gaps: compared from {run.time[0]:.2f} s on.")
-    missing = [joint for joint in robot.joint_names if joint not in run.joint_names]
-    if missing:
-        remarks.append(f"Not in the log, assumed stationary: {', '.join(missing)}.")
-    return robot, run, tuple(remarks)
+    return robot, run, (*remarks, *assumed(run, robot))
 
 
 def _is_run(source: Source) -> bool:

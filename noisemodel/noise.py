@@ -332,9 +332,7 @@ class LinkNoise:
 
 def link_noise(run: Run, kind: str = "normal") -> LinkNoise:
     """The extended noise of a run with a robot and positions, in bins, by one of ``KINDS``."""
-    assert run.robot is not None
-    floats = run.base_pose is not None or run.base_velocity is not None
-    robot = Robot.load(run.robot, floating_base=floats or None)
+    robot = Robot.of(run)
     surface = Surface.of(robot, "auto")
     samples = len(run.time)
     size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
@@ -358,8 +356,9 @@ def link_noise(run: Run, kind: str = "normal") -> LinkNoise:
     if kind not in QUADRATIC:
         power = [by_samples(robot, surface, run, kind, bins)]
     movers = {0: frozenset[str]()}  # of the universe
+    leaders = _leaders(robot)
     for index, joint in enumerate(robot.joints, start=1):
-        movers[index] = movers[joint.parent] | {joint.name}
+        movers[index] = movers[joint.parent] | {leaders[joint.first_v]}
     return LinkNoise(
         kind=kind,
         links=surface.names,
@@ -367,7 +366,7 @@ def link_noise(run: Run, kind: str = "normal") -> LinkNoise:
         time=run.time[bins[:-1]] + np.diff(bins) / 2 / run.rate,
         power=np.sum(power, axis=0),
         vibration=vibration,
-        remarks=tuple(_remarks(run, robot, surface)),
+        remarks=tuple(assumed(run, robot, surface)),
     )
 
 
@@ -453,11 +452,18 @@ def _moments(
     return moments.transpose(2, 0, 1)
 
 
-def _remarks(run: Run, robot: Robot, surface: Surface) -> Iterator[str]:
-    missing = [name for name in robot.joint_names if name not in run.joint_names]
-    if missing:
+def _leaders(robot: Robot) -> dict[int, str]:
+    """The joint that each first entry of the velocity belongs to, and that others may follow."""
+    return {each.first_v: each.name for each in robot.joints if each.name not in robot.mimics}
+
+
+def assumed(run: Run, robot: Robot, surface: Surface | None = None) -> Iterator[str]:
+    """What the noise of a run lacks or assumes, a sentence each."""
+    leaders, known = _leaders(robot), run.joint_names
+    ones = [joint for joint in robot.joints if joint.nv == 1]
+    if missing := [one.name for one in ones if leaders[one.first_v] not in known]:
         yield f"Not in the log, assumed stationary: {', '.join(missing)}."
-    if surface.without_geometry:
+    if surface is not None and surface.without_geometry:
         yield f"Links without geometry make no noise: {', '.join(surface.without_geometry)}."
     if robot.floating_base and run.base_velocity is None:
         yield "The run has no base velocity: its base is assumed stationary."
@@ -522,20 +528,22 @@ def second_moments(velocity: Real, valid: Mask, *, size: int) -> Array:
 
 def _jacobians(robot: Robot, q: Array) -> Callable[[int], tuple[Index, Array]]:
     """Move the joints one after the other, those on different branches at once."""
-    chains: dict[int, list[int]] = {0: []}
+    moves = np.zeros((len(robot.joints) + 1, robot.nv))  # the entries that move each joint
     for index, joint in enumerate(robot.joints, start=1):
-        chains[index] = [*chains[joint.parent], *range(joint.first_v, joint.first_v + joint.nv)]
-    # Each entry's turn is its place in the chain from the root: none in a chain share one.
-    turn = np.zeros(robot.nv, dtype=np.intp)
-    for chain in chains.values():
-        turn[chain] = np.arange(len(chain))
+        moves[index] = moves[joint.parent]
+        moves[index, joint.first_v : joint.first_v + joint.nv] = 1.0
+    together = moves.T @ moves > 0.0
+    turn = np.zeros(robot.nv, dtype=np.intp)  # of each entry: none that move a joint share one
+    for entry in range(robot.nv):
+        taken = turn[:entry][together[entry, :entry]]
+        turn[entry] = np.setdiff1d(np.arange(entry + 1), taken)[0]
     unit = (turn == np.arange(turn.max(initial=0) + 1)[:, None]).astype(np.float64)
     v = np.repeat(unit, len(q), axis=0)
     twists = link_twists(robot, np.tile(q, (len(unit), 1)), v)
     twists = twists.transpose(1, 2, 0).reshape(-1, 6, len(unit), len(q))
 
     def jacobian(joint: int) -> tuple[Index, Array]:
-        entries = np.array(chains[joint], dtype=np.intp)
+        entries = np.flatnonzero(moves[joint])
         return entries, twists[joint].take(turn[entries], axis=1)
 
     return jacobian

@@ -4,7 +4,7 @@ import os
 import re
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -181,6 +181,7 @@ class Robot:
         *,
         floating_base: bool | None = None,
         mimic: bool = False,
+        apart: Collection[str] = (),
         package_root: str | Path | None = None,
     ) -> Self:
         """Read a robot; a RobotError if it is not known or cannot be read.
@@ -192,6 +193,7 @@ class Robot:
             floating_base: Whether the base moves freely; unless given, as listed, False for a URDF
                 of its own, and as an MJCF has it.
             mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
+            apart: Names of joints that do not follow all the same.
             package_root: A further folder that meshes may lie in, see `package_roots`.
         """
         listed = ROBOTS.get(str(name))
@@ -210,13 +212,29 @@ class Robot:
             names = {joint.get("name", "") for joint in root.findall("joint")}
             model = _model(path, mjcf.unused("root_joint", names) if floating_base else None)
         table = table_of(model)
-        mimics = mimics if mimic else {}
-        if mimic:
+        mimics = {name: each for name, each in mimics.items() if mimic and name not in apart}
+        if mimics:
             table = _coupled(table, mimics, path)
         own = [joint for joint in table if joint.name not in mimics]
         nq, nv = sum(joint.nq for joint in own), sum(joint.nv for joint in own)
         title = str(name) if is_name(str(name)) else path.stem
         return cls(title, path, roots, model, table, nq, nv, floating_base, mimics, description)
+
+    @classmethod
+    def of(cls, run: Run) -> Self:
+        """Read the robot of a run; errors are those of `load`, and a RunError if it names none.
+
+        Its base floats if the run has a pose or a velocity of it. Joints that mimic another one
+        follow it where the run does not have them, unless one of them cannot.
+        """
+        if run.robot is None:
+            raise RunError("the run names no robot; `inspector import --robot` adds one")
+        floats = run.base_pose is not None or run.base_velocity is not None or None
+        apart = {*run.joint_names, *run.desired_joint_names}
+        try:
+            return cls.load(run.robot, floating_base=floats, mimic=True, apart=apart)
+        except RobotError:
+            return cls.load(run.robot, floating_base=floats)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -9,17 +9,17 @@ from noisemodel.noise import chunk_speeds
 BAR = '<visual><origin xyz="0.1 0 0.3"/><geometry><box size="0.2 0.1 0.6"/></geometry></visual>'
 
 
-def chain(folder, *kinds, shapes=None, axis="0 0 1", follow="", **options):
-    """A robot with a joint of each kind, and a bar on each link unless other geometry is given."""
+def chain(folder, *kinds, shapes=None, axis="0 0 1", follow="", branch=1, **options):
+    """A robot with a joint of each kind; ``branch`` is at the base, those after it may follow."""
     shapes = [BAR] * len(kinds) if shapes is None else shapes
     text = '<robot name="chain"><link name="link0"/>'
     for number, (kind, shape) in enumerate(zip(kinds, shapes, strict=True), start=1):
         text += f"""
           <link name="link{number}">{shape}</link>
           <joint name="joint{number}" type="{kind}">
-            <parent link="link{number - 1}"/><child link="link{number}"/>
+            <parent link="link{0 if number == branch else number - 1}"/><child link="link{number}"/>
             <origin xyz="0.1 0.2 0.6" rpy="0.3 0.5 0.7"/><axis xyz="{axis}"/>
-            <limit lower="-9" upper="9" effort="1" velocity="1"/>{follow if number > 1 else ""}
+            <limit lower="-9" upper="9" effort="1" velocity="1"/>{follow if number > branch else ""}
           </joint>"""
     path = folder / "chain.urdf"
     path.write_text(text + "</robot>")

@@ -25,6 +25,7 @@ from noisemodel import (
     extended,
     simplified,
 )
+from noisemodel.compare import moving
 from noisemodel.noise import by_moments, by_samples, link_noise, second_moments, vibrating
 
 VELOCITIES = arrays(
@@ -246,16 +247,6 @@ def test_a_revolute_joint_alone_drives_its_link_at_rate_times_lever(tmp_path):
     assert np.allclose(c, mean, rtol=5e-4)
 
 
-def test_a_mimic_joint_drives_its_link_by_its_multiple_of_the_leader(tmp_path):
-    mimic = '<mimic joint="joint1" multiplier="-3" offset="0.2"/>'
-    robot = Robot.load(chain(tmp_path, "revolute", "revolute", follow=mimic).path, mimic=True)
-    surface = Surface.of(robot)
-    q, v = motion(robot)
-    _, b, c = terms(robot, surface, q, v)
-    assert np.allclose(c, np.abs(v) * [1, 3] * [link.lever for link in surface.links], rtol=1e-12)
-    assert b[:, 1].all()
-
-
 def test_a_floating_base_is_carried_by_nothing(solo):
     robot, surface = solo
     q, v = motion(robot)
@@ -365,13 +356,36 @@ def test_what_is_missing_is_said_in_a_sentence_each(tmp_path):
         robot=str(robot.path),
         base_pose=pose,
     )
-    assert link_noise(run).remarks == (
+    said = (
         "Not in the log, assumed stationary: joint1.",
         "Links without geometry make no noise: link0, link2.",
         "The run has no base velocity: its base is assumed stationary.",
     )
-    moving = replace(run, base_velocity=np.zeros((200, 6)))
-    assert len(link_noise(moving).remarks) == 2
+    assert link_noise(run).remarks == estimate(run, "paper").remarks == said
+    assert moving(run)[2] == said[::2]
+    assert len(link_noise(replace(run, base_velocity=np.zeros((200, 6)))).remarks) == 2
+
+
+@pytest.mark.parametrize("kind", ["normal", "paper"])
+def test_joints_that_mimic_one_follow_it_unless_the_run_has_them(tmp_path, kind):
+    """The last two joints of a branch follow the first one of the other, three times as fast."""
+    follow = '<mimic joint="joint1" multiplier="-3" offset="0.2"/>'
+    chained = chain(tmp_path, *["revolute"] * 6, follow=follow, branch=4, mimic=True)
+    surface, phase = Surface.of(chained), np.outer(np.arange(100) / 100, range(1, 5))
+    v = np.cos(phase)
+    _, b, c = terms(chained, surface, 0.01 * np.sin(phase), v)
+    speeds = np.abs(v[:, [0, 1, 2, 3, 0, 0]]) * [1, 1, 1, 1, 3, 3]
+    assert np.allclose(c, speeds * [link.lever for link in surface.links], rtol=1e-12)
+    assert b[:, 4:].all()
+    run = as_run(chained, 0.01 * np.sin(phase), v)
+    power = extended(chained, surface, run.position, v, kind).power
+    found = link_noise(run, kind)
+    np.testing.assert_allclose(found.power.mean(axis=0), power.mean(axis=0), rtol=1e-3)
+    np.testing.assert_array_equal(estimate(run, kind).power, power)
+    np.testing.assert_array_equal(moving(run)[0].joint_names, chained.joint_names)
+    assert (found.remarks, found.movers[-1]) == ((), {"joint4", "joint1"})
+    also = {"joint_names": (*run.joint_names, "joint5"), "position": np.hstack((v, v))[:, :5]}
+    assert list(Robot.of(replace(run, velocity=0 * also["position"], **also)).mimics) == ["joint6"]
 
 
 def test_a_base_is_heard_without_its_pose(tmp_path):
