@@ -148,9 +148,13 @@ def read_xml(path: Path, kind: str) -> ET.Element:
     if not text.strip():
         raise RobotError(f"{path}: the {kind} is empty")
     try:
-        return parsed_xml(text)
+        root = parsed_xml(text)
+        text.decode()  # names in other encodings reach no program
+    except UnicodeDecodeError as error:
+        raise RobotError(f"{path}: the {kind} is not in UTF-8 ({error.reason})") from error
     except ValueError as error:
         raise RobotError(f"{path}: {error}") from error
+    return root
 
 
 def parsed_xml(text: bytes) -> ET.Element:

@@ -32,6 +32,7 @@ SLENDEREST = 1e-3  # thinner than this share of its length, a surface counts as 
 # Points of a tetrahedron: mean 0 and covariance 1 in all directions.
 CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float64)
 SIDE = 96  # cells along one side of the table of turning; between its nodes it is right to 3e-4
+FARTHEST = 1e6  # coordinates that a surface may have, in [m]: squares of much larger ones overflow
 TINY = 1e-300  # keeps the direction of no rotation finite
 ALL: Indices = np.zeros(1, dtype=np.intp)  # where the only cell begins, if all points are in one
 
@@ -58,6 +59,8 @@ def triangles(robot: Robot, geometry: str = "visual", *, world: bool = False) ->
         else:
             shapes = tuple(shapes_in(robot.path, use)) if waiting else ()
         for shape in shapes:
+            if shape.link not in places:  # readers of XML differ about tabs and ends of lines
+                raise GeometryError(f"{robot.path}: Pinocchio names link {shape.link!r} otherwise")
             joint, rotation, translation = places[shape.link]
             if joint not in waiting:
                 continue
@@ -100,9 +103,13 @@ def _placed(
     a, b, c = np.moveaxis(surface, 1, 0)
     with np.errstate(over="ignore", invalid="ignore"):  # then it is refused
         area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+    address = shape.body if isinstance(shape.body, str) else f"of link {shape.link!r}"
     if not 0 < area < np.inf:
-        address = shape.body if isinstance(shape.body, str) else f"of link {shape.link!r}"
         raise MeshError(address, f"has an area of {area:g} m² with its scale, expected a surface")
+    if (reach := np.abs(points).max()) > FARTHEST:
+        raise MeshError(
+            address, f"lies {reach:g} m from its joint, expected {FARTHEST:g} m at most"
+        )
     return surface
 
 

@@ -7,6 +7,7 @@ the ends of a capsule by 0.20 % (0.01 dB; a test holds these).
 """
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -82,6 +83,9 @@ def mimics(path: Path, root: ET.Element) -> dict[str, Mimic]:
 
 def _check_numbers(path: Path, root: ET.Element) -> None:
     for element in root.iter():
+        if re.match(r"\{[^}]*xacro\}(?!property)", element.tag):
+            word = element.tag.rpartition("}")[2]
+            raise RobotError(f"{path}: <xacro:{word}> is not expanded; run xacro first")
         counts = {name: count for name, count in NUMBERS.items() if name in element.attrib}
         if element.tag == "mass":
             counts["value"] = 1

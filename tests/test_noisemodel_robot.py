@@ -323,6 +323,8 @@ JOINT = """
   <limit lower="-1" upper="1" effort="1" velocity="1"/>
 </joint>"""
 GOOD = f'<robot name="arm">{LINKS}{JOINT}</robot>'
+LATIN = '<?xml version="1.0" encoding="ISO-8859-1"?>'
+XACRO = 'xmlns:xacro="http://ros.org/wiki/xacro"'
 
 
 def welds(joints):
@@ -341,7 +343,7 @@ def test_a_urdf_gives_its_name_and_mimic_joints(tmp_path):
     path.write_text(GOOD.replace("<axis", wrist))
     assert checked(path).get("name") == "arm"
     assert mimics(path, checked(path)) == {"elbow": Mimic("wrist", multiplier=-2.0, offset=0.5)}
-    path.write_text(GOOD.replace("<axis", '<mimic joint="wrist"/><axis'))
+    path.write_text(GOOD.replace("<axis", f'<xacro:property {XACRO}/><mimic joint="wrist"/><axis'))
     assert mimics(path, checked(path)) == {"elbow": Mimic("wrist", multiplier=1.0, offset=0.0)}
 
 
@@ -371,11 +373,13 @@ def test_welds_may_have_an_axis_of_length_0(tmp_path):
         (GOOD.replace('"tip"/><origin', '"toe"/><origin'), r"child link \[toe\] of joint"),
         (GOOD.replace(JOINT, JOINT * 2), "joint 'elbow' is not unique"),
         (GOOD.replace(JOINT, ""), "Two root links found"),
+        (LATIN + GOOD.replace("elbow", "\udce9lbow"), r"the URDF is not in UTF-8 \(invalid"),
+        (GOOD.replace(JOINT, f"{JOINT}<xacro:leg {XACRO}/>"), "<xacro:leg> is not expanded; run"),
     ],
 )
 def test_a_bad_urdf_is_one_line_that_names_the_file_and_the_problem(tmp_path, capfd, text, message):
     path = tmp_path / "arm.urdf"
-    path.write_text(text)
+    path.write_text(text, errors="surrogateescape")
     with pytest.raises(RobotError, match=message) as caught:
         Robot.load(path)
     assert str(caught.value).startswith(str(path))

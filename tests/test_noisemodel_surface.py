@@ -190,6 +190,7 @@ def test_a_shape_of_impossible_size_is_named_with_its_link(tmp_path, geometry, m
         (TRIANGLE.replace("0 1 0", "2 0 0"), "1 1 1", "a.obj: has an area of 0 m² with its scale"),
         (TRIANGLE, "1e-170 1e-170 1", "a.obj: has an area of 0 m²"),
         (TRIANGLE, "1e200 1e200 1", "a.obj: has an area of inf m²"),
+        (TRIANGLE.replace("v", "v 1e7"), "1 1 1", r"lies 1e\+07 m from its joint, .* 1e\+06 m at"),
     ],
 )
 def test_a_mesh_without_a_surface_is_named(tmp_path, content, scale, message):
@@ -198,6 +199,13 @@ def test_a_mesh_without_a_surface_is_named(tmp_path, content, scale, message):
     built = robot(tmp_path, arm=visual(MESH.format("a.obj", f'scale="{scale}"')))
     with pytest.raises(MeshError, match=message):
         triangles(built)
+
+
+def test_a_link_with_geometry_that_pinocchio_names_otherwise_is_refused(tmp_path):
+    path = tmp_path / "tab.urdf"
+    path.write_text(robot(tmp_path, arm=visual(BOX)).path.read_text().replace('"arm"', '"a\tm"'))
+    with pytest.raises(GeometryError, match=r"tab.urdf: Pinocchio names link 'a m' otherwise"):
+        triangles(Robot.load(path))
 
 
 def test_a_mesh_may_be_addressed_in_every_way_that_urdfs_do(tmp_path):
