@@ -3,8 +3,8 @@
 trimesh reads STL and OBJ too, and the tests hold these readers to it, file by file. It is not used
 here: it takes faces of an OBJ that count backwards for others, turns a mesh flat for one short
 line, logs tracebacks over damaged files, and takes a second to import. pycollada drops all geometry
-whose material is broken and keeps 7 digits; with Assimp, units and upward axes turn and scale what
-URDF readers take as it is written.
+whose material is broken and keeps 7 digits; with Assimp, upward axes turn what RViz takes as it is
+written.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ from noisemodel.types import Array, Indices, MeshError
 Mesh: TypeAlias = tuple[Array, Indices]
 # Elements by the address that others call them: # and their id.
 Named: TypeAlias = Mapping[str, ET.Element]
-VERSION = 1  # of the code that reads triangles; to be raised with every change of its results
+VERSION = 2  # of the code that reads triangles; to be raised with every change of its results
 TRIANGLE_BYTES = 134  # most bytes of a file by triangle: more than a binary STL has, 256 MiB in all
 TAIL = 1024  # bytes at the end of a file among which its closing word is
 HEADER = 84  # bytes before the facets of a binary STL, the last four of them their number
@@ -37,7 +37,7 @@ WITHOUT_SURFACE = {"source", "vertices", "lines", "linestrips", "extra"}
 def read(path: Path) -> Array:
     """Triangles of all parts of an STL, OBJ or COLLADA file, shape (triangles, 3 corners, 3).
 
-    They are in the file's own numbers: its unit and its upward axis are ignored.
+    They are in the file's own numbers, of COLLADA in [m] by its unit; its upward axis is ignored.
     """
     data, kind = _content(path), path.suffix.lower()
     if kind == ".stl":  # as fast as what would be kept of it
@@ -133,7 +133,8 @@ def _stl(data: bytes) -> Mesh:
 
 def _is_text(head: bytes, tail: bytes) -> bool:
     """Whether an STL is ASCII; some binary files begin with the same word."""
-    return head.startswith(b"solid") and b"endsolid" in tail
+    starts = re.match(rb"\s*solid", head, re.IGNORECASE)
+    return bool(starts and re.search(rb"endsolid", tail, re.IGNORECASE))
 
 
 def _facets(head: bytes) -> int:
@@ -169,16 +170,19 @@ def _obj(data: bytes) -> Mesh:
 def _collada(data: bytes) -> Mesh:
     """Read the geometry of a COLLADA file where its scene puts it, but no skins and no holes.
 
-    ``unit`` and ``up_axis`` are ignored, as URDF readers do.
+    ``unit`` scales it to [m] and ``up_axis`` is ignored, as in RViz.
     """
     root = parsed_xml(data)
+    unit = root.find("{*}asset/{*}unit")
+    metres = 1.0 if unit is None else float(unit.get("meter", 1.0))
     named = {
         f"#{element.attrib['id']}": element for element in root.iter() if "id" in element.attrib
     }
     scene = _target(named, _child(root, "scene/{*}instance_visual_scene"))
     points, faces = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
     count = triangles = 0
-    for placed, corners in _instances(named, scene, np.eye(4), iter(range(MAX_NODES))):
+    whole = np.diag([metres, metres, metres, 1.0])
+    for placed, corners in _instances(named, scene, whole, iter(range(MAX_NODES))):
         points.append(placed)
         faces.append(corners + count)
         count += len(placed)

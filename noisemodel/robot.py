@@ -33,7 +33,9 @@ from noisemodel.urdf import Mimic
 
 MENAGERIE = "menagerie/"  # the names of MuJoCo Menagerie's robots begin so: menagerie/unitree_go2
 PACKAGE_ROOT = "NOISE_PACKAGE_ROOT"  # environment variable: a further folder of meshes
-PACKAGE = re.compile(rb"package:///?([^/\"'<>\s]+)/")  # the package in the address of a mesh
+PACKAGE = re.compile(
+    rb"(?:package|model):///?([^/\"'<>\s]+)/"
+)  # the package in the address of a mesh
 # Folders beside a URDF's or MJCF's own that belong to the robot if no package says so.
 BESIDE = ("meshes", "visual", "collision", "assets")
 # Pinocchio's joint types by what they do; a URDF has no others.

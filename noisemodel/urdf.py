@@ -25,6 +25,7 @@ NUMBERS = {"xyz": 3, "rpy": 3, "ixx": 1, "iyy": 1, "izz": 1, "ixy": 1, "ixz": 1,
 AXIAL = {"revolute", "continuous", "prismatic", "planar"}  # types whose axis may not be 0
 SECTIONS = 64  # flat sides of a cylinder or capsule
 SUBDIVISIONS = 4  # how often an icosahedron's triangles are cut in four to make a sphere
+IN_PACKAGES = ("package", "model")  # schemes of addresses that begin with a package's name
 HINT = "--package-root (`package_root=`) names a folder of meshes elsewhere"
 
 
@@ -286,15 +287,19 @@ SOLIDS: Mapping[str, tuple[tuple[str, ...], int, Callable[..., Array]]] = Mappin
 def find_mesh(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
     """Find the file of a mesh, with links resolved.
 
-    Its address is ``package://`` (two slashes or three), ``file://``, or a path relative to the
-    URDF. ``roots`` are packages, or folders of packages; meshes lie in one of these.
+    Its address is ``package://`` (two slashes or three) or Gazebo's ``model://``, ``file://``, or a
+    path relative to the URDF. ``roots`` are packages, or folders of packages, which meshes lie in.
     """
     if not address:
         raise MeshError("''", f"{urdf.name} names a mesh without a file")
     scheme, _, rest = address.rpartition("://")
+    if scheme not in ("", "file", *IN_PACKAGES) or "$(" in address:
+        raise MeshError(
+            address, "expected a path, file://, package:// or model://; xacro replaces $(…)"
+        )
     places = [urdf.parent / rest] if scheme in ("", "file") else []
     try:
-        for root in roots if scheme == "package" else ():
+        for root in roots if scheme in IN_PACKAGES else ():
             places.append(root / rest.lstrip("/"))
             package, _, inside = rest.lstrip("/").partition("/")
             if root.name == package or (root / "package.xml").is_file():

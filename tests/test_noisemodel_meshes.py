@@ -90,10 +90,11 @@ NODE_H = NODE.replace("#g", "#h")
         ("brick.obj", obj(BRICK)),
         ("brick.dae", dae(geometry(BRICK), NODE)),
         (
-            "millimetres.dae",
-            dae(geometry(BRICK), NODE, '<unit meter="0.001"/><up_axis>Y_UP</up_axis>'),
+            "mm.dae",
+            dae(geometry(1e3 * BRICK), NODE, '<unit meter="0.001"/><up_axis>Y_UP</up_axis>'),
         ),
         ("latin.stl", ascii_stl(BRICK).replace(b"part", b"\xe4")),
+        ("shouted.stl", b"\r\n " + ascii_stl(BRICK).upper()),
         ("two.stl", ascii_stl(BRICK[:5], "a") + ascii_stl(BRICK[5:], "b")),
         ("two.dae", dae(geometry(BRICK[:5]) + geometry(BRICK[5:], "h"), NODE + NODE_H)),
         ("two.obj", obj(BRICK).replace(b"f 7", b"o second\nusemtl paint\nf 7")),

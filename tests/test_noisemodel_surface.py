@@ -175,6 +175,8 @@ def test_an_unknown_geometry_is_named(tmp_path):
         ('<cylinder radius="inf" length="1"/>', "radius and length of <cylinder> is 'inf 1'"),
         ('<mesh filename="package://a.stl" scale="1 0 1"/>', "scale '1 0 1' flattens the mesh"),
         ('<mesh filename="package://a.stl" scale="nan 1 1"/>', "scale of <mesh> is 'nan 1 1'"),
+        ('<mesh filename="https://r/a.stl"/>', "mesh https://r/a.stl: expected a path, file://,"),
+        ('<mesh filename="$(find r)/a.stl"/>', r"expected a path, .* xacro replaces \$\(…\)"),
     ],
 )
 def test_a_shape_of_impossible_size_is_named_with_its_link(tmp_path, geometry, message):
@@ -210,7 +212,9 @@ def test_a_link_with_geometry_that_pinocchio_names_otherwise_is_refused(tmp_path
 
 def test_a_mesh_may_be_addressed_in_every_way_that_urdfs_do(tmp_path):
     name = mesh_of(urdf.box(1, 2, 3), tmp_path)
-    for address in (f"package:///{name}", f"package://{name}", name, f"file://{tmp_path}/{name}"):
+    (tmp_path / "package.xml").write_text("<package/>")
+    schemes = ("package:///", "package://", "package://p/", "model://p/", "", f"file://{tmp_path}/")
+    for address in (scheme + name for scheme in schemes):
         geometry = f'<geometry><mesh filename="{address}"/></geometry>'
         links = triangles(robot(tmp_path, arm=visual(geometry)))
         assert np.isclose(areas(links)[0], 22.0, rtol=1e-15)
