@@ -92,6 +92,7 @@ def test_runs_without_robot_are_one_line_and_nothing_else_is_left(tmp_path):
     [
         ([], 2, "name run files, or robots with --robots"),
         (["--robots", "panda", "--kind", "paper,loud"], 2, "no kind 'loud' of noise"),
+        (["--robots", "panda", "--kind", "normal"], 2, "--kind names normal alone; name two kinds"),
         (["--robots", "panda", "--csv", "/no/such/folder/x.csv"], 5, "cannot be written"),
         (["--robots", "robby"], 3, "no robot 'robby'"),
     ],

@@ -289,6 +289,8 @@ def noise(
     sources = list(dict.fromkeys([*(runs or ()), *names]))
     if not sources:
         raise typer.BadParameter("name run files, or robots with --robots")
+    if len(set(kinds)) == 1:
+        raise typer.BadParameter(f"--kind names {kinds[0]} alone; name two kinds to compare")
     if csv:  # before long work is done for it
         refuse_existing(csv, overwrite=overwrite)
     found = nm.compare(
