@@ -21,11 +21,12 @@ from pathlib import Path
 import numpy as np
 
 from inspector.errors import without_path
-from inspector.logs.clocks import hold_length, without_hold
+from inspector.logs.clocks import without_hold
 from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.text import counted, progress
 from inspector.verdict import EXPECTED
 from noisemodel import Run
+from noisemodel.hold import hold_length
 from noisemodel.run import stretches
 from noisemodel.types import Array, Real
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from noisemodel import runfile
 from noisemodel.files import beyond, limit
+from noisemodel.hold import joined, moments, updates
 from noisemodel.runfile import OnDemand, either_way, one_line, pieces, rows_at_once
 from noisemodel.types import Array, Mask, Real, RunError, RunFileError
 
@@ -480,28 +481,41 @@ def with_velocities(
     return filled, {name: METHOD for name in filled if name not in signals}
 
 
+def derived(run: Run, signal: str) -> str:
+    """How a signal of a run was differentiated, as its ``meta`` states; empty if it was logged."""
+    differentiated = run.meta.get("differentiated")
+    return str(differentiated.get(signal, "")) if isinstance(differentiated, Mapping) else ""
+
+
 def joint_velocity(time: Array, position: Real, valid: Mask | None = None) -> Array:
     """Velocities of joints, shape (samples, joints), from their positions at uniform times.
 
-    Angles that wrap are made continuous first. Velocities are 0 in gaps, where ``valid`` is False,
-    and in stretches of a single sample.
+    Angles that wrap are made continuous first, and held positions are interpolated between the
+    samples that set them. Velocities are 0 in gaps, where ``valid`` is False, and in stretches of a
+    single sample.
     """
     step = median_step(time)
-    return _by_stretch(
-        lambda values: _slope(np.unwrap(values, axis=0), step), position, position.shape[1], valid
-    )
+
+    def unwrapped(values: Array) -> Array:
+        return np.unwrap(values, axis=0)
+
+    width = position.shape[1]
+    return _by_stretch(unwrapped, lambda values: _slope(values, step), position, width, valid)
 
 
 def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
     """Linear, then angular velocity of a floating base in its own axes, shape (samples, 6).
 
-    ``pose`` is x, y, z and quaternion x, y, z, w, shape (samples, 7); gaps as in `joint_velocity`.
+    ``pose`` is x, y, z and quaternion x, y, z, w, shape (samples, 7); gaps and held poses as in
+    `joint_velocity`.
     """
     step = median_step(time)
 
+    def continuous(pose: Array) -> Array:
+        return np.hstack((pose[:, :3], continuous_quaternions(pose[:, 3:])))
+
     def twist(pose: Array) -> Array:
         quaternion = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
-        quaternion = continuous_quaternions(quaternion)
         vector, scalar = quaternion[:, :3], quaternion[:, 3:]
         rate = _slope(quaternion, step)
         # omega = 2 vec(conj(q) q_dot), v = R(q)^T p_dot
@@ -511,21 +525,33 @@ def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
         linear = world + scalar * across + np.cross(-vector, across)
         return np.hstack((linear, angular))
 
-    return _by_stretch(twist, pose, 6, valid)
+    return _by_stretch(continuous, twist, pose, 6, valid)
 
 
 def _by_stretch(
-    derivative: Callable[[Array], Array], signal: Real, width: int, valid: Mask | None
+    continuous: Callable[[Array], Array],
+    derivative: Callable[[Array], Array],
+    signal: Real,
+    width: int,
+    valid: Mask | None,
 ) -> Array:
     """Derivative of each stretch between gaps, on demand of a signal on demand."""
+    hold, places = updates(signal, valid)
+    set_at = moments(places) if hold > 1 else places
+    # The fit reaches three samples to each side, and a window at the end of a stretch; what is
+    # between two samples that set values depends on three more to each side.
+    reach = WINDOW + (round(5 * hold) if hold > 1 else 0)
 
     def rows(first: int, stop: int) -> Array:
-        # The fit reaches three samples to each side, and a window at the end of a stretch.
-        low, high = max(0, first - WINDOW), min(len(signal), stop + WINDOW)
+        low, high = max(0, first - reach), min(len(signal), stop + reach)
         values, around = signal[low:high], None if valid is None else valid[low:high]
         found = np.zeros((high - low, width))
         for stretch in stretches(around, len(found)):
-            found[stretch] = derivative(values[stretch].astype(np.float64))
+            some = continuous(values[stretch].astype(np.float64))
+            if hold > 1:
+                start = low + stretch.start
+                some = joined(some, places - start, set_at - start)
+            found[stretch] = derivative(some)
         return found[first - low : stop - low]
 
     return either_way((signal,), (len(signal), width), rows)
@@ -560,6 +586,9 @@ def resample(
 ) -> tuple[Array, Mask]:
     """Values at other instants: monotone between samples (PCHIP), without overshoot.
 
+    Held values stay held, unless the instants come less than twice as often as they are set: then
+    they are interpolated between the samples that set them.
+
     Stamps and instants rise, in [s]; values, (samples, columns), are continuous, also angles.
     ``between`` has the samples of each stretch between gaps; an instant may lie outside of one by a
     slack, in [s]. Returns values, 0 in gaps, (instants, columns), and which are in no gap.
@@ -568,6 +597,9 @@ def resample(
 
     found = np.zeros((len(instants), values.shape[1]))
     reached = np.zeros(len(instants), dtype=bool)
+    hold, places = updates(values)
+    if hold > 1 and hold * median_step(stamps) < 2 * np.ptp(instants[:2]):
+        hold, values = 1.0, joined(values.astype(np.float64), places, moments(places))
     for stretch in between or [slice(0, len(stamps))]:
         known = stamps[stretch]
         if len(known) < 2:
@@ -575,8 +607,10 @@ def resample(
         first = int(np.searchsorted(instants, known[0] - slack))
         stop = int(np.searchsorted(instants, known[-1] + slack, side="right"))
         if first < stop:
-            curve = PchipInterpolator(known, values[stretch], axis=0)
-            found[first:stop] = curve(instants[first:stop])
+            some, inside = values[stretch], instants[first:stop]
+            nearest = np.searchsorted((known[1:] + known[:-1]) / 2, inside)
+            held = hold > 1
+            found[first:stop] = some[nearest] if held else PchipInterpolator(known, some)(inside)
             reached[first:stop] = True
     return found, reached
 

@@ -68,11 +68,8 @@ def test_a_run_that_lacks_the_signals_of_all_models_shows_nothing_and_the_reason
     alone = {"norms": fixed(MOTION)}
     found = audit(noisy_run(1000.0), alone)
     assert not found.observable
-    for each in found.classes:
-        assert (each.needed, each.reason) == (
-            None,
-            "no signal desired, error; there is noise, measured, measured_joints",
-        )
+    reason = "no signal desired, error; there is noise, measured, measured_joints"
+    assert {(each.needed, each.reason) for each in found.classes} == {(None, reason)}
 
 
 def test_without_the_faster_model_twice_the_frequency_is_required():
@@ -89,14 +86,7 @@ def test_the_bands_are_those_of_the_profile():
     assert tuple(band_edges(profile)) == profile.edges
 
 
-@pytest.mark.parametrize(
-    ("cutoff", "degree"),
-    [
-        (15.0, Observability.CANNOT_TELL),
-        (100.0, Observability.PARTLY),
-        (None, Observability.OBSERVABLE),
-    ],
-)
+@pytest.mark.parametrize(("cutoff", "degree"), [*zip((None, 100, 15), Observability, strict=True)])
 def test_a_filter_limits_observability(cutoff, degree):
     velocity = noise((8000, 3), level=0.001)
     if cutoff:
@@ -181,8 +171,7 @@ def test_simulated_runs_have_no_warnings_at_any_rate():
 
 def test_the_order_of_joints_does_not_matter():
     run = Run.load(demo_run())
-    turned = run_of(run.velocity[:, ::-1], run.rate)
-    plain = run_of(run.velocity, run.rate)
+    turned, plain = (run_of(run.velocity[:, ::step], run.rate) for step in (-1, 1))
     assert audit(turned, LIBRARY).classes == audit(plain, LIBRARY).classes
 
 

@@ -1,15 +1,19 @@
-"""Desired positions that are held from target to target."""
+"""Positions that are held from sample to sample, in logs and in run files."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from samplelogs import motion
 
 from inspector import read_log
-from inspector.logs.clocks import updates
+from noisemodel import Recorder, Run
+from noisemodel.hold import updates
 
 RATE, SAMPLES = 500, 4000
 TIME = np.arange(SAMPLES) / RATE
 POSITION, VELOCITY = motion(TIME, 4)
+NOISE = np.random.default_rng(0).uniform(-1, 1, SAMPLES)
 HELD = "position_desired: each target is held for "
 
 
@@ -38,14 +42,15 @@ def held(every, start=0):
 def test_held_targets_are_interpolated_from_target_to_target(tmp_path, every, start, said):
     run, remarks = read(tmp_path, held(every, start))
     assert remarks == [HELD + said.format("interpolated from target to target")]
-    inside = slice(2 * every, -2 * every)
-    truth = VELOCITY[: len(run.time)][inside]
+    inside = slice(2 * every, -3 * every)
+    truth = VELOCITY[inside]
     error = run.velocity_desired[inside] - truth
     assert np.abs(error).max() < 0.05 * np.abs(truth).max()
     pulses = np.gradient(held(every, start), 1 / RATE, axis=0)
     assert np.abs(pulses).max() > 3 * np.abs(run.velocity_desired).max()
-    assert len(run.time) > SAMPLES - every
-    assert np.array_equal(run.velocity, VELOCITY[: len(run.time)])
+    assert np.array_equal(run.velocity, VELOCITY)
+    replace(run, velocity_desired=None, meta={}).save(tmp_path / "run.npz")
+    assert np.array_equal(Run.load(tmp_path / "run.npz").velocity_desired, run.velocity_desired)
 
 
 def test_a_policys_rate_need_not_divide_the_logs(tmp_path):
@@ -66,22 +71,27 @@ def test_a_target_that_rests_stays_at_rest(tmp_path):
     assert np.abs(run.position_desired - desired[: len(run.time)])[2030:2960].max() < 1e-9
 
 
-PLACES = np.arange(SAMPLES) // 10 * 10
-
-
 @pytest.mark.parametrize(
     ("desired", "more"),
-    [
-        (POSITION, {}),
-        (np.round(POSITION, 3), {}),  # steps of an encoder
-        (held(10), {"dq_des": VELOCITY}),
-        (held(10), {"q": POSITION[PLACES], "dq": VELOCITY[PLACES]}),  # all of the log is held
-    ],
+    # The second has the steps of an encoder.
+    [(POSITION, {}), (np.round(POSITION, 3), {}), (held(10), {"dq_des": VELOCITY})],
 )
-def test_targets_of_every_sample_or_with_velocities_are_left_as_they_are(tmp_path, desired, more):
+def test_targets_of_every_sample_or_with_velocities_are_not_interpolated(tmp_path, desired, more):
     run, remarks = read(tmp_path, desired, **more)
     assert not remarks
     assert np.array_equal(run.position_desired, desired)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 2e-4])
+def test_the_targets_of_a_recorder_are_held_too_and_so_are_measured_positions(jitter):
+    recorder, stamps = Recorder(None, RATE), TIME + 1 + jitter * NOISE
+    held = (motion(np.floor(stamps * rate) / rate, 4)[0] for rate in (100, 50))
+    for time, there, wanted in zip(stamps, *held, strict=True):
+        recorder.push(time=time, position=there, position_desired=wanted)
+    run = recorder.run()
+    for found in (run.velocity, run.velocity_desired):
+        error = (found - motion(run.time + stamps[0], 4)[1])[50:-50]
+        assert np.sqrt(np.mean(error**2)) < 0.02 * VELOCITY.std()
 
 
 def test_updates_are_where_values_are_set_before_the_first_sample_too():

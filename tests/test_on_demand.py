@@ -9,10 +9,10 @@ import pytest
 import noiseclassifier as nc
 from inspector.analysis import analyse
 from inspector.library import load_library, signal_names, signals_of
-from inspector.logs.clocks import hold_length
 from inspector.logs.read import open_run
 from inspector.verdict import Verdict
 from noisemodel import Run, RunError, RunFileError, decimated, runfile
+from noisemodel.hold import hold_length
 from noisemodel.run import pieces_of
 from noisemodel.runfile import OnDemand
 
@@ -106,7 +106,8 @@ def test_a_run_on_demand_has_the_labels_findings_and_audit_of_one_in_memory(tmp_
 
 def held(run, count):
     rows = np.arange(len(run.time)) // count * count
-    return replace(run, velocity=run.velocity[rows], velocity_desired=run.velocity_desired[rows])
+    names = ("velocity", "velocity_desired", "position")
+    return replace(run, **{name: getattr(run, name)[rows] for name in names})
 
 
 def without(name, run):
@@ -117,6 +118,7 @@ def without(name, run):
 
 VARIANTS = {
     "held": lambda: arrays_of(held(shaken(gap=False), 5)),
+    "held positions": lambda: without("velocity", held(shaken(gap=False), 5)),
     "without velocities": lambda: without("velocity", shaken(gap=False)),
     "no desired motion": lambda: arrays_of(replace(shaken(), velocity_desired=np.zeros((4000, 3)))),
     "desired is measured": lambda: arrays_of(replace(shaken(), velocity_desired=shaken().velocity)),

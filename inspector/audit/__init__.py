@@ -23,7 +23,7 @@ import noiseclassifier as nc
 from inspector.audit.signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library, signal_names
-from inspector.logs.clocks import hold_length, without_hold
+from inspector.logs.clocks import without_hold
 from inspector.logs.mapping import check_joints
 from inspector.logs.motion import limit_warnings
 from inspector.logs.read import Reading, Source, open_source
@@ -32,6 +32,7 @@ from noiseclassifier import Profile
 from noiseclassifier.lasting import SHORTEST
 from noiseclassifier.profile import FEWEST, HIGHEST, LOWEST
 from noisemodel import NoiseModelError, Run
+from noisemodel.hold import hold_length
 from noisemodel.run import part
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
@@ -239,7 +240,7 @@ def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
     if reach.differentiator:
         yield (
             f"velocities are differentiated positions ({reach.differentiator.name}),"
-            f" attenuated above {plain(reach.differentiator.corner(run.rate))} Hz"
+            f" attenuated above {plain(reach.limits['velocities were differentiated'])} Hz"
         )
     if run.velocity_desired is None:
         yield "there is no desired motion"

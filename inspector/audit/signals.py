@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from inspector.logs.clocks import hold_length
-from inspector.logs.motion import contradictions, derived
+from inspector.logs.motion import contradictions
 from noiseclassifier import LogBands
 from noisemodel import Run
+from noisemodel.hold import hold_length
 from noisemodel.noise import in_both
-from noisemodel.run import ORDER, WINDOW, stretches
+from noisemodel.run import ORDER, WINDOW, derived, stretches
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask, Real
 
@@ -234,7 +234,8 @@ class Bandwidth:
         if self.hold > 1:
             limits[f"zero-order hold of {self.hold:.3g} samples"] = self.nyquist / self.hold
         if self.differentiator:
-            limits["velocities were differentiated"] = self.differentiator.corner(rate)
+            corner = self.differentiator.corner(rate / self.hold)
+            limits["velocities were differentiated"] = corner
         if self.corner:
             limits["the log looks filtered"] = self.corner
         return limits
@@ -465,7 +466,8 @@ def _coarse(run: Run) -> str:
     thinned = valid[:: max(1, len(valid) // MOST_SAMPLES)]
     step = max(step_of(position) for position in run.position_desired[thinned].T)
     # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12.
-    noise = step / 12**0.5 * run.rate * float(np.linalg.norm(SMOOTH.weights))
+    rate = run.rate / hold_length(run.position_desired, run.mask)
+    noise = step / 12**0.5 * rate * float(np.linalg.norm(SMOOTH.weights))
     if noise <= FAINTEST:
         return ""
     return (

@@ -3,13 +3,11 @@
 Stamps of separate clocks are aligned by cross-correlation of the desired and the measured
 velocities of the same joints, which gives the offset.
 An offset below ``LAG`` is attributed to the controller, not to the clocks.
-A zero-order hold is a slow signal that was sampled faster by holding its values.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
-from itertools import pairwise
 from math import log
 from pathlib import Path
 from typing import Any
@@ -22,8 +20,18 @@ from inspector.logs.mapping import SAMPLES, UNIFORM, ReadOptions, Stamps, Track
 from inspector.logs.names import TIME_UNITS, time_column, without_unit
 from inspector.text import counted
 from noisemodel import Run
-from noisemodel.run import SAMPLED, continuous_quaternions, resample
-from noisemodel.runfile import either_way, pieces
+from noisemodel.hold import jumps
+from noisemodel.run import (
+    METHOD,
+    SAMPLED,
+    SOURCES,
+    base_velocity,
+    continuous_quaternions,
+    derived,
+    joint_velocity,
+    resample,
+)
+from noisemodel.runfile import either_way
 from noisemodel.types import Array, Indices, Mask, Real
 
 # The units that stamps may have, in [s].
@@ -472,43 +480,27 @@ def _correlation(one: Array, other: Array) -> Array:
 
 # A hold: slow signals that were sampled faster
 
-FEWEST = 10  # fewest jumps that show a hold
-REGULAR = 0.8  # least share of the jumps that come at the median distance
 ALIGNED = 0.99  # least share of the jumps that come a multiple of the hold after each other
-EXAMINED = 100_000  # jumps whose size is examined, evenly spread, or a few more
-LARGER = 1.5  # least ratio of median to smallest jump: jumps of one size are quantisation
-
-
-def hold_length(signal: Real, valid: Mask | None = None) -> float:
-    """Length of the zero-order hold of a signal, in samples; ``valid`` is False in gaps."""
-    return _hold(signal, valid)[0]
-
-
-def updates(signal: Real) -> tuple[float, Indices]:
-    """Length of a hold, and the samples at which the values were set, the first perhaps below 0."""
-    hold, changed = _hold(signal, None)
-    jumps = np.flatnonzero(changed)
-    if hold <= 1:
-        return hold, jumps
-    first = jumps[0] + 1
-    changes = [first - hold * np.ceil(first / hold), *(jumps + 1), len(signal)]
-    found = [
-        start + hold * np.arange(max(1, round((stop - start) / hold)))
-        for start, stop in pairwise(changes)
-    ]
-    return hold, np.round(np.concatenate(found)).astype(np.int64)
 
 
 def without_hold(run: Run) -> Run:
-    """The run at the rate of its values: one of each n samples, if each value is there n times."""
-    hold, changed = _hold(run.velocity, run.mask)
+    """The run at the rate of its values: one of each n samples, if each value is there n times.
+
+    Velocities that were differentiated are so again, at that rate.
+    """
+    again = {
+        name: source
+        for name, source in (*SOURCES.items(), ("base_velocity", "base_pose"))
+        if derived(run, name) == METHOD and getattr(run, source) is not None
+    }
+    hold, changed = jumps(getattr(run, again.get("velocity", "velocity")), run.mask)
     count = round(hold)
     if count < 2 or abs(hold - count) > 1e-3:
         return run
-    jumps = np.flatnonzero(changed)
-    phases = np.bincount((jumps + 1) % count, minlength=count)
+    places = np.flatnonzero(changed)
+    phases = np.bincount((places + 1) % count, minlength=count)
     first = int(phases.argmax())
-    if phases[first] < ALIGNED * len(jumps) or len(run.time) <= first + count:
+    if phases[first] < ALIGNED * len(places) or len(run.time) <= first + count:
         return run
 
     def every(signal: Any) -> Any:
@@ -523,29 +515,7 @@ def without_hold(run: Run) -> Run:
         return either_way([signal], shape, read, signal.dtype)
 
     fields: dict[str, Any] = {name: every(getattr(run, name)) for name in SAMPLED}
+    for name, source in again.items():
+        slope = joint_velocity if name in SOURCES else base_velocity
+        fields[name] = slope(fields["time"], fields[source], fields["valid"])
     return replace(run, **fields, stages={name: every(each) for name, each in run.stages.items()})
-
-
-def _hold(signal: Real, valid: Mask | None) -> tuple[float, Mask]:
-    """Length of a hold, 1 without, and whether the next sample is another one, outside of gaps."""
-    changed = np.ones(len(signal) - 1, dtype=bool) if valid is None else valid[1:] & valid[:-1]
-    for rows in pieces(signal):
-        part = signal[rows.start : rows.stop + 1]
-        changed[rows.start : rows.stop] &= (part[1:] != part[:-1]).any(axis=1)
-    count = np.count_nonzero(changed)
-    # With more pairs of jumps than that, their median distance is less than 2.
-    if count < FEWEST or 2 * np.count_nonzero(changed[1:] & changed[:-1]) >= count - 1:
-        return 1.0, changed
-    jumps = np.flatnonzero(changed)
-    distances = np.diff(jumps)
-    middle = np.median(distances)
-    regular = np.abs(distances - middle) <= max(1.0, 0.1 * middle)
-    if regular.mean() < REGULAR:
-        return 1.0, changed
-    jumps = jumps[:: max(1, len(jumps) // EXAMINED)]
-    sizes = np.abs(signal[jumps + 1].astype(np.float64) - signal[jumps])
-    sizes = np.where(sizes > 0, sizes, np.nan)
-    sizes = sizes[:, ~np.isnan(sizes).all(axis=0)]
-    if (np.nanmedian(sizes, axis=0) < LARGER * np.nanmin(sizes, axis=0)).all():
-        return 1.0, changed  # each joint jumps by one quantisation step
-    return float(distances[regular].mean()), changed

@@ -21,10 +21,11 @@ from inspector.logs.mapping import UNIFORM, Log, ReadOptions, Track, known_limit
 from inspector.logs.names import BASE_SIGNALS, listed
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
+from noisemodel.hold import hold_length
 from noisemodel.robot import Limits
-from noisemodel.run import METHOD, base_velocity, joint_velocity
+from noisemodel.run import METHOD, base_velocity, derived, joint_velocity
 from noisemodel.runfile import pieces
-from noisemodel.types import Array, Indices, Mask, Real
+from noisemodel.types import Array, Mask, Real
 
 LARGEST_RATE_RATIO = 1.5  # of the specified rate to the stamps' rate, or the inverse
 SAME_RATE = 1.01  # ratio of two rates up to which no band is lost from one to the other
@@ -325,63 +326,6 @@ def _refuse_degrees(path: Path, track: Track, angular: Mask, kinds: Mapping[str,
             raise track.fault(path, f"{held}, too much for radians; {HINT}", sample)
 
 
-# Targets that are held
-
-SLOWER = 1.5  # least ratio of the targets' hold to the measured values'
-
-
-def _without_held_targets(tracks: Sequence[Track], remarks: list[str]) -> list[Track]:
-    """Tracks whose held desired positions are interpolated between the samples that set them.
-
-    A policy sets targets 10 to 100 times a second, and a faster log holds each until the next: its
-    velocity would be a pulse at each target. Positions with a logged desired velocity are left as
-    they are, and so are those of a log that holds its measured values as long.
-    """
-    logged = {joint for t in tracks if t.signal == "velocity_desired" for joint in t.joints}
-    moving = [track for track in tracks if track.signal in ("position", "velocity")]
-    found = []
-    for track in tracks:
-        if track.signal == "position_desired" and not logged & set(track.joints):
-            values = np.asarray(track.values, dtype=np.float64)
-            hold, places = clocks.updates(values)
-            lengths = (clocks.hold_length(track.values) for track in moving)
-            if hold > 1 and hold >= SLOWER * max(lengths, default=1.0):
-                track = _joined(track, values, places)
-                nominal = track.stamps.clock.nominal
-                remarks.append(
-                    f"position_desired: each target is held for {hold:.3g} samples"
-                    f" ({plain(nominal / hold, 4)} Hz); interpolated from target to"
-                    f" target{_lost(nominal, nominal / hold)}"
-                )
-        found.append(track)
-    return found
-
-
-def _joined(track: Track, values: Array, places: Indices) -> Track:
-    """The track interpolated from its first target to its last."""
-    from scipy.interpolate import Akima1DInterpolator
-
-    places = places[places < len(values)]
-    held = values[places.clip(min=0)]
-    held = np.where(track.angles, np.unwrap(held, axis=0), held)
-    # At even distances if all are within a sample of theirs: a policy whose rate does not divide
-    # the log's sets targets between samples.
-    steps = np.diff(places)
-    ticks = np.concatenate(([0.0], np.cumsum(np.round(steps / np.mean(steps)))))
-    slope, first = np.polyfit(ticks, places, 1)
-    even = first + slope * ticks
-    set_at = even if np.abs(even - places).max() < 1 else places.astype(np.float64)
-    set_at[0] = min(set_at[0], 0.0)
-    stamps = track.stamps
-    before = np.minimum(set_at, 0) / stamps.clock.nominal
-    known = np.interp(set_at, np.arange(len(values)), stamps.time) + before
-    time = stamps.time[: int(set_at[-1]) + 1]
-    # Akima's polynomials hardly overshoot jumps, and meet peaks better than monotone ones.
-    joined = Akima1DInterpolator(known, held, axis=0)(time)
-    missing = None if track.missing is None else track.missing[: len(time)]
-    return replace(track, stamps=replace(stamps, time=time), values=joined, missing=missing)
-
-
 # The run
 
 
@@ -396,8 +340,7 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     remarks = [*_remarks(logs, tracks)]
     remarks += [f"{logs[-1].path.name}: {said}"] if said else []
     own = tracks[every.index(main)].stamps
-    kept = _without_held_targets(tracks, remarks)
-    time, valid = clocks.common_time(kept, own)
+    time, valid = clocks.common_time(tracks, own)
     if len(time) < 2 or not valid.any():
         others = [each.stamps for each in tracks if each.stamps is not own]
         raise LogError(logs[-1].path, clocks.no_overlap(others[-1] if others else own, own))
@@ -411,6 +354,7 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     meta |= {} if offset is None else {"offset": {"seconds": offset}}
     covered, slack = float(own.time[-1]), UNIFORM / own.clock.rate
     logs.clear()
+    kept = [*tracks]
     del every, tracks, main  # each signal is freed when it has been resampled
     parts: dict[str, Track] = {}
     while kept:
@@ -530,7 +474,15 @@ def _signals_of(
             continue
         logged = parts[velocity].joints if velocity in parts else ()
         if missing := tuple(joint for joint in joints if joint not in logged):
-            slopes = joint_velocity(time, parts[position].of(missing), valid)
+            values = parts[position].of(missing)
+            if (hold := hold_length(values, valid)) > 1:
+                rate, each = (len(time) - 1) / float(time[-1]), "target" if suffix else "value"
+                remarks.append(
+                    f"{position}: each {each} is held for {hold:.3g} samples"
+                    f" ({plain(rate / hold, 4)} Hz); interpolated from {each} to"
+                    f" {each}{_lost(rate, rate / hold)}"
+                )
+            slopes = joint_velocity(time, values, valid)
             _add(parts, replace(parts[position], signal=velocity, joints=missing, values=slopes))
             of_joints = f" of {', '.join(missing)}" if logged else ""
             differentiated[velocity] = METHOD + of_joints
@@ -638,12 +590,6 @@ RELATED, UNRELATED = 0.9, 0.3
 # Root mean square of the way in a stretch from which a joint is compared, in [rad] or [m].
 WAY = 0.02
 ENOUGH = 5  # fewest stretches
-
-
-def derived(run: Run, signal: str) -> bool:
-    """Whether a run's ``meta`` states that a signal was differentiated at import."""
-    differentiated = run.meta.get("differentiated")
-    return isinstance(differentiated, Mapping) and signal in differentiated
 
 
 def contradictions(run: Run) -> Iterator[str]:
