@@ -76,10 +76,15 @@ class Analysis:
         return velocity_levels(run.velocity, run.mask, run.rate, start=float(run.time[0]))
 
     @cached_property
+    def _values(self) -> nm.Run:
+        """The run at the rate of its values: of held ones, more was made by the hold."""
+        return without_hold(self.run)
+
+    @cached_property
     def localisations(self) -> dict[Event | nm.Block, Localisation]:
         """The localisation of each finding, and of each annotated failure."""
         frame = 0.0 if self.labels is None else float(self.labels.stop[0] - self.labels.start[0])
-        found = localise(self.run, self.spans, frame=frame)
+        found = localise(self._values, self.spans, frame=frame)
         events = zip(self.spans, self.findings, strict=True)
         named: dict[Event | nm.Block, Event] = dict(events)
         return {named.get(failure, failure): each for failure, each in found.items()}
@@ -87,7 +92,7 @@ class Analysis:
     @cached_property
     def orders(self) -> dict[Event, Order]:
         """Findings whose vibration goes with the speed of a joint."""
-        found = ((event, order(self.run, event)) for event in self.findings)
+        found = ((event, order(self._values, event)) for event in self.findings)
         return {event: known for event, known in found if known is not None}
 
     @cached_property
@@ -201,7 +206,7 @@ def analyse(
     try:
         labelled = label_run(run, library, slower=slower)
         labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
-        spans, findings = extents(run, labels, labelled.lasting, labelled.bursts)
+        spans, findings = extents(slower, labels, labelled.lasting, labelled.bursts)
     except (CannotTellError, nc.SignalError, nm.RunError) as error:
         return replace(found, reason=str(error))
     status, reason = _status(found.audit, labels, findings)

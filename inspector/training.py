@@ -291,6 +291,7 @@ def evaluate(
             velocity = nc.signals.stacked(recording.signal, (nc.NOISE,))[:, None]
             time, valid = recording.time, recording.valid
             run = nm.Run(time=time, velocity=velocity, joint_names=("joint0",), valid=valid)
+        run = without_hold(run)
         return extents(run, labels, *(found.events for found in lines(run)))
 
     return nc.assess(

@@ -142,6 +142,14 @@ def test_held_positions_alone_are_labelled_as_those_that_were_not_held(tmp_path)
     assert ours.audit.bandwidth.usable == pytest.approx(theirs.audit.bandwidth.usable)
 
 
+def test_a_finding_of_held_values_is_that_of_the_log_that_was_not_held():
+    plain = run_at(125.0, "oscillations")
+    ours, theirs = (analyse(each, library()) for each in (held(plain, 4), plain))
+    assert theirs.findings
+    assert ours.findings == theirs.findings
+    assert ours.localisations == theirs.localisations
+
+
 def test_a_model_of_one_rate_labels_a_held_log_at_that_rate():
     log = held(run_at(250.0), 4)
     labelled = label_run(log, of_one_rate())

@@ -69,15 +69,13 @@ def test_scale_when_a_run_begins_and_other_desired_joints_do_not_matter():
     later = extent(run_of(run.time + 100.0, run.velocity), START + 100.0, STOP + 100.0)
     assert np.subtract(later, 100.0) == pytest.approx(extent(run, START, STOP), abs=1e-9)
     gripper = {"velocity_desired": run.velocity[:, :1], "desired_joint_names": ("gripper",)}
-    assert extent(run_of(run.time, run.velocity, **gripper), START, STOP) == extent(
-        run, START, STOP
-    )
+    gripping = run_of(run.time, run.velocity, **gripper)
+    assert extent(gripping, START, STOP) == extent(run, START, STOP)
 
 
 def test_a_reversed_run_ends_when_it_began_to_fail():
     run = tone(1000.0, 50.0, on=2.3, off=2.9)
-    turned = run_of(run.time, run.velocity[::-1])
-    found = extent(turned, 5.0 - STOP, 5.0 - START)
+    found = extent(run_of(run.time, run.velocity[::-1]), 5.0 - STOP, 5.0 - START)
     assert found == pytest.approx((5.0 - 2.9, 5.0 - 2.3), abs=0.02)
 
 
@@ -121,8 +119,7 @@ def test_what_fails_from_the_first_sample_to_the_last_lasts_as_long_as_the_run()
     [(0.0, 0.4), (4.6, 5.0), (2.0, 2.4), (2.0, 2.5), (4.7, 5.1), (-0.1, 0.3), (1.0, 1.02)],
 )
 def test_the_extent_is_within_frames_and_run_and_is_not_empty(rate, start, stop):
-    run = tone(rate, 30.0)
-    onset, end = extent(run, start, stop)
+    onset, end = extent(tone(rate, 30.0), start, stop)
     assert max(start, 0.0) <= onset <= start + FRAME
     assert onset < end <= min(stop, 5.0) + 1e-9
 
