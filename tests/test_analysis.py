@@ -261,6 +261,21 @@ def test_a_desired_velocity_made_of_coarse_positions_is_left_out():
     assert without_placeholder(stepping(1e-4))[1] == ""
 
 
+@pytest.mark.parametrize("slope", [np.gradient, lambda held, **_: np.diff(held, prepend=0, axis=0)])
+def test_pulses_of_held_targets_are_no_desired_velocity_but_chatter_and_rests_are(slope):
+    run = moving()
+    target = np.cumsum(run.velocity_desired, axis=0)
+    for every, left_out in ((2, False), (20, True)):
+        held = target[np.arange(len(target)) // every * every]
+        cut, remark = without_placeholder(replace(run, velocity_desired=slope(held, axis=0)))
+        assert (cut.velocity_desired is None) == left_out
+    assert remark == (
+        "The desired velocity is zero between the steps of targets of about 50 Hz: it was left out."
+    )
+    rests = run.velocity_desired * (np.arange(len(target)) // 20 % 2)[:, None]
+    assert without_placeholder(replace(run, velocity_desired=rests))[1] == ""
+
+
 @given(st.text(alphabet="..iIoOu", min_size=1, max_size=30))
 @settings(deadline=None, max_examples=60)
 def test_a_finding_lies_within_its_frames(text):

@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from inspector.logs.motion import contradictions
 from noiseclassifier import LogBands
 from noisemodel import Run
-from noisemodel.hold import hold_length
+from noisemodel.hold import FEWEST, hold_length
 from noisemodel.noise import in_both
 from noisemodel.run import ORDER, WINDOW, derived, stretches
 from noisemodel.runfile import pieces
@@ -416,8 +416,10 @@ def unit_warnings(run: Run) -> Iterator[str]:
 MOVES = 0.1
 MOVING_TIME = 2.0  # stretch of time in which it has to move, in [s]
 MOVING_SHARE = 0.75  # share of that time: a motion reverses now and then, a push is over sooner
-CHANGE = 1e-6  # change of a desired position from which it changes, in [rad] or [m]
+CHANGE = 1e-6  # least change of a desired position, and least desired speed, in SI units
 COUNTED = 1_000_000  # samples that are counted at once
+# Samples of a pulse at most: two of a central difference. Every second sample is chatter.
+PULSE = 2
 # Most quantisation noise of a differentiated velocity, RMS in [rad/s]: faults begin there.
 FAINTEST = 0.05
 
@@ -428,14 +430,14 @@ def placeholder(run: Run) -> str:
     Controllers that take position targets write zeros in its place. They are a placeholder if the
     desired position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters
     of any two seconds. The zeros of a robot that has to stand remain, also when it is pushed.
-    A velocity that was differentiated from desired positions is none if their quantisation steps
-    alone make more than 0.05 rad/s of it.
+    So are pulses, what a difference makes of held targets. A velocity that was differentiated here
+    is none if the quantisation of the desired positions makes more than 0.05 rad/s of it.
     """
     desired, target = run.velocity_desired, run.position_desired
     if desired is None or not desired.size:
         return ""
     if any(np.any(desired[rows]) for rows in pieces(desired)):
-        return _coarse(run)
+        return _pulses(run) or _coarse(run)
     if target is not None:
         parts = (target[rows][run.mask[rows]] for rows in pieces(target))
         found = [(p.min(axis=0, initial=np.inf), p.max(axis=0, initial=-np.inf)) for p in parts]
@@ -456,6 +458,21 @@ def without_placeholder(run: Run) -> tuple[Run, str]:
         return run, ""
     said = f"{clause[0].upper()}{clause[1:]}: it was left out."
     return replace(run, velocity_desired=None), said
+
+
+def _pulses(run: Run) -> str:
+    """Say that a desired velocity is zero between the steps of its targets; empty if not."""
+    desired = run.velocity_desired
+    assert desired is not None
+    moves = [(np.abs(desired[rows]) > CHANGE).any(axis=1) for rows in pieces(desired)]
+    moving = np.concatenate(moves) & run.mask
+    edges = np.flatnonzero(np.diff(moving, prepend=False, append=False)).reshape(-1, 2)
+    if len(edges) < FEWEST or np.median(np.ptp(edges, axis=1)) > PULSE:
+        return ""
+    rate = run.rate / float(np.median(np.diff(edges[:, 0])))
+    if PULSE * rate >= run.rate:
+        return ""
+    return f"the desired velocity is zero between the steps of targets of about {rate:.3g} Hz"
 
 
 def _coarse(run: Run) -> str:
