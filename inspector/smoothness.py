@@ -26,8 +26,9 @@ from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.text import counted, progress
 from inspector.verdict import EXPECTED
 from noisemodel import Run
-from noisemodel.hold import hold_length
-from noisemodel.run import stretches
+from noisemodel.hold import hold_length, updates
+from noisemodel.noise import in_both
+from noisemodel.run import derived, stretches
 from noisemodel.types import Array, Real
 
 FORMAT = "noise-smoothness/2"
@@ -187,8 +188,9 @@ def scored(run: Run, log: str, *, episode: str = "") -> Episode:
     samples = part.stop - part.start
     if samples < run.mask.sum():
         remarks.append("The longest stretch without a gap was scored.")
-    if "velocity" in run.meta.get("differentiated", {}) and run.position is not None:
-        velocity = np.diff(_angles(run.position[part]), axis=0) * rate
+    if derived(run, "velocity") and run.position is not None and hold_length(run.position) <= 1:
+        position = np.asarray(run.position[part], dtype=np.float64)
+        velocity = np.diff(np.unwrap(position, axis=0), axis=0) * rate
         remarks.append("Velocities are first differences of positions.")
     else:
         velocity = np.asarray(run.velocity[part], dtype=np.float64)
@@ -208,7 +210,7 @@ def scored(run: Run, log: str, *, episode: str = "") -> Episode:
     if run.position_desired is None:
         found["action_rate"] = found["action_curvature"] = None, "the log has no desired positions"
     else:
-        action = _actions(_angles(run.position_desired[part]))
+        action = _actions(run, part)
         found["action_rate"] = squared_difference(action), "too few actions"
         found["action_curvature"] = squared_difference(action, order=2), "too few actions"
     scores = {name: found[name][0] for name in SCORES}
@@ -216,18 +218,21 @@ def scored(run: Run, log: str, *, episode: str = "") -> Episode:
     return Episode(log, episode, seconds, rate, scores, missing, tuple(remarks))
 
 
-def _actions(commanded: Array) -> Array:
-    """What was commanded, once for each action, shape (actions, joints)."""
-    held = round(hold_length(commanded))
-    if held < 2:
-        return commanded
-    changes = np.flatnonzero((commanded[1:] != commanded[:-1]).any(axis=1)) + 1
-    return commanded[changes[0] % held :: held]
+def _actions(run: Run, part: slice) -> Array:
+    """What was commanded, once for each action, shape (actions, joints).
 
-
-def _angles(position: Real) -> Array:
-    """Positions without the jumps of angles that wrap, shape (samples, joints)."""
-    return np.unwrap(np.asarray(position, dtype=np.float64), axis=0)
+    Commands of a joint whose measured positions jump by half a turn are angles that wrap.
+    """
+    assert run.position_desired is not None
+    commanded = np.asarray(run.position_desired[part], dtype=np.float64)
+    hold, places = updates(commanded)
+    action = commanded[places.clip(min=0)] if hold > 1 else commanded
+    wraps = np.ones(action.shape[1], dtype=bool)
+    if run.position is not None:
+        measured, desired = in_both(run)
+        steps = np.abs(np.diff(run.position[part], axis=0))[:, measured]
+        wraps[desired] = (steps > np.pi).any(axis=0)
+    return np.where(wraps, np.unwrap(action, axis=0), action)
 
 
 # --- episodes of logs

@@ -25,6 +25,7 @@ from inspector.smoothness import (
     squared_difference,
 )
 from noisemodel import Run
+from noisemodel.run import SAMPLED
 
 FAST_RATE = 200.0
 
@@ -141,13 +142,9 @@ def rollout(chatter=0.0, frequency=18.0, phase=0.0, *, samples=200, **changes):
         "position_desired": action,
         "joint_names": ("shoulder", "elbow"),
     } | changes
-    sampled = {"time", "position", "velocity", "position_desired", "velocity_desired", "valid"}
-    return Run(
-        **{
-            name: value[:samples] if name in sampled and value is not None else value
-            for name, value in fields.items()
-        }
-    )
+    for name in {*SAMPLED} & {name for name, value in fields.items() if value is not None}:
+        fields[name] = fields[name][:samples]
+    return Run(**fields)
 
 
 @settings(deadline=None, max_examples=40)
@@ -162,12 +159,8 @@ def test_chatter_never_ranks_an_episode_smoother(size, frequency, phase):
 @settings(deadline=None, max_examples=15)
 @given(st.integers(1, 40), st.booleans())
 def test_short_and_standing_episodes_have_numbers_or_reasons(samples, still):
-    run = rollout(samples=samples + 1)
-    if still:
-        run = rollout(
-            samples=samples + 1,
-            **{name: np.zeros((200, 2)) for name in ("position", "velocity", "position_desired")},
-        )
+    names = ("position", "velocity", "position_desired") if still else ()
+    run = rollout(samples=samples + 1, **dict.fromkeys(names, np.zeros((200, 2))))
     episode = scored(run, "short")
     assert set(episode.scores) == set(SCORES)
     for name, value in episode.scores.items():
@@ -209,12 +202,14 @@ def test_velocities_that_were_smoothed_are_replaced_by_differences(tmp_path):
     assert loaded.scores["level"] > 3 * smoothed.scores["level"]
 
 
-def test_actions_that_a_log_holds_are_counted_once():
+@pytest.mark.parametrize("hold", [10, 2.5, 10 / 3])
+def test_actions_that_a_log_holds_are_counted_once(hold):
     run = rollout(0.02)
+    places = np.arange(int(200 * hold)) / hold
     faster = Run(
-        time=np.arange(2000) / (10 * RATE),
-        velocity=np.random.default_rng(0).standard_normal((2000, 2)),
-        position_desired=np.repeat(run.position_desired, 10, axis=0),
+        time=places / RATE,
+        velocity=np.random.default_rng(0).standard_normal((len(places), 2)),
+        position_desired=run.position_desired[(places + 1e-9).astype(int)],
         joint_names=run.joint_names,
     )
     held, plain = (scored(each, "").scores for each in (faster, run))
@@ -232,6 +227,14 @@ def test_an_angle_that_wraps_is_no_jump():
     for name in ("action_rate", "action_curvature"):
         first, second = (episode.scores[name] for episode in episodes)
         assert second == pytest.approx(first, abs=1e-12)
+
+
+def test_a_command_beyond_half_a_turn_is_a_jump_if_the_joint_does_not_wrap():
+    grip = np.where(TIME[:, None] // 1 % 2, [80.0, 6.2], 0.0)  # in mm, and nearly a turn
+    smooth = [np.convolve(each, np.ones(9) / 9, "same") for each in grip.T]
+    episode = scored(rollout(position=np.transpose(smooth) / 5, position_desired=grip), "")
+    exact = np.square(np.diff(grip, axis=0)).sum(axis=1).mean()
+    assert episode.scores["action_rate"] == pytest.approx(exact)
 
 
 def test_the_order_is_by_actions_where_all_are_episodes_of_data_sets_with_actions():
@@ -322,11 +325,6 @@ def test_a_lerobot_data_set_is_ranked_by_episode(tmp_path):
     status, out, err = call("smoothness", data, "--units", "radians")
     assert (status, err) == (0, "")
     lines = out.splitlines()
-    assert [line.split()[1:4] for line in lines[4:6]] == [
-        ["set", "episode", "1"],
-        ["set", "episode", "0"],
-    ]
-    assert (
-        lines[-1]
-        == f"The roughest by 2nd diff.: inspector import {data} --episode 0 -o roughest.npz"
-    )
+    assert [line.split()[1:4] for line in lines[4:6]] == [["set", "episode", n] for n in "10"]
+    command = f"inspector import {data} --episode 0 -o roughest.npz"
+    assert lines[-1] == f"The roughest by 2nd diff.: {command}"
