@@ -594,7 +594,9 @@ def test_levels_are_kept_in_half_decibels():
     np.testing.assert_allclose(decoded(encoded(level)), expected)
 
 
-def test_a_motion_is_aligned_with_itself_delayed():
+@pytest.mark.parametrize("largest", [judging.LARGEST, 5000])  # cells: of 5000, the means of 4
+def test_a_motion_is_aligned_with_itself_delayed(monkeypatch, largest):
+    monkeypatch.setattr(judging, "LARGEST", largest)
     motion = np.cumsum(np.random.default_rng(1).normal(size=(200, 3)), axis=0) / 10
     (same,) = judging.align(motion, [motion])
     np.testing.assert_array_equal(same.frame, np.arange(200))

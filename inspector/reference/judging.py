@@ -40,8 +40,9 @@ OUTSIDE = 0.36
 # Frames by which a path advances, by the code in `came`: odd codes come from a frame that was held;
 # the last one waits at an end.
 STEPS = np.array([1, 1, 2, 2, 0])
-# Cells of a matrix of costs; of longer runs every second frame is aligned, and so on.
-LARGEST = 4_000_000
+# Cells of a matrix of costs. Of longer runs every second frame is aligned, and so on; then so many
+# frames at once, near the path of these.
+LARGEST, BLOCK = 4_000_000, 400
 # Added to the standard deviation of each joint's positions, in [rad]: what is no motion.
 STILL = 0.05
 SLOPE = (0.85, 1.18)  # speeds of a repetition within which levels are comparable
@@ -619,17 +620,52 @@ def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:
     if not len(repetitions):
         return []
     scale = np.stack([each.std(axis=0) for each in repetitions]).max(axis=0) + STILL
-    run = run / scale
-    held = [np.pad(each / scale, ((PAD, PAD), (0, 0)), mode="edge") for each in repetitions]
-    thin = int(np.ceil(np.sqrt(len(run) * max(map(len, held)) / LARGEST)))
-    paths = _paths(run[::thin], [each[::thin] for each in held], -(-PAD // thin))
-    at, found = np.arange(len(run)) / thin, []
-    for thinned, other, repetition in zip(paths, held, repetitions, strict=True):
-        path = np.round(np.interp(at, np.arange(len(thinned)), thinned * thin)).astype(int)
+    run, longest = run / scale, max(map(len, repetitions)) + 2 * PAD
+    thin = int(np.ceil(np.sqrt(len(run) * longest / LARGEST)))
+    pad = -(-PAD // thin) * thin  # thinned, both have their first frames
+    held = [np.pad(each / scale, ((pad, pad), (0, 0)), mode="edge") for each in repetitions]
+    most = [np.pad(np.full(len(e), np.inf), pad, constant_values=OUTSIDE) for e in repetitions]
+    slow, *others = (_means(each, thin) for each in (run, *held))
+    paths = _paths(slow, others, [each[::thin] for each in most], [pad // thin] * len(held))
+    if thin > 1:
+        at, nodes = np.arange(len(run)), np.arange(0, len(run), thin)
+        rough = [np.interp(at, nodes, path * thin).astype(np.int64) for path in paths]
+        paths = _refined(run, held, most, rough, 3 * thin)
+    found = []
+    for path, other, repetition in zip(paths, held, repetitions, strict=True):
         residual = np.abs(run - other[path]).max(axis=1)
-        inside = (path >= PAD) & (path < PAD + len(repetition))
+        inside = (path >= pad) & (path < pad + len(repetition))
         residual[inside & ~_comparable(path)] = np.inf
-        found.append(Aligned(np.clip(path - PAD, 0, len(repetition) - 1), residual))
+        found.append(Aligned(np.clip(path - pad, 0, len(repetition) - 1), residual))
+    return found
+
+
+def _means(positions: Array, size: int) -> Array:
+    """Means of so many frames at a time: every second one alone would alias."""
+    firsts = np.arange(0, len(positions), size)
+    sizes = np.diff(np.append(firsts, len(positions)))
+    return np.asarray(np.add.reduceat(positions, firsts, axis=0) / sizes[:, None])
+
+
+def _refined(
+    run: Array,
+    held: Sequence[Array],
+    most: Sequence[Array],
+    rough: Sequence[NDArray[np.int64]],
+    reach: int,
+) -> list[NDArray[np.int64]]:
+    """Paths of all frames of a run within some frames of rough ones, block by block."""
+    found = [np.empty_like(path) for path in rough]
+    for first in range(0, len(run), BLOCK):
+        rows = slice(max(0, first - reach), first + BLOCK + reach)
+        near = [slice(max(0, p[rows][0] - reach), p[rows][-1] + reach + 1) for p in rough]
+        parts = [each[own] for each, own in zip(held, near, strict=True)]
+        costs = [each[own] for each, own in zip(most, near, strict=True)]
+        begin = [int(path[rows][0]) - own.start for path, own in zip(rough, near, strict=True)]
+        paths = _paths(run[rows], parts, costs, begin)
+        for whole, path, own in zip(found, paths, near, strict=True):
+            block = path[first - rows.start :][:BLOCK]
+            whole[first : first + BLOCK] = own.start + block
     return found
 
 
@@ -643,19 +679,19 @@ def _comparable(path: NDArray[np.int64]) -> NDArray[np.bool_]:
     return np.asarray((slope >= SLOPE[0] - slack) & (slope <= SLOPE[1] + slack))
 
 
-def _paths(run: Array, held: Sequence[Array], pad: int) -> list[NDArray[np.int64]]:
-    """Frame of each repetition for each frame of a run; so many are before and after it."""
+def _paths(
+    run: Array, held: Sequence[Array], most: Sequence[Array], begin: Sequence[int]
+) -> list[NDArray[np.int64]]:
+    """Frame of each repetition for each frame of a run, by largest costs and likely first ones."""
     count, width, rows = len(held), max(map(len, held)), len(run)
     distance = np.full((rows, count, width), np.inf, dtype=np.float32)
     for place, other in enumerate(held):
         square = (run**2).mean(axis=1)[:, None] + (other**2).mean(axis=1)
         square -= 2 * run @ other.T / run.shape[1]
-        for outside in (slice(pad), slice(-pad, None)):
-            square[:, outside] = np.minimum(square[:, outside], OUTSIDE)
-        distance[:, place, : len(other)] = np.maximum(square, 0.0)
+        distance[:, place, : len(other)] = np.clip(square, 0.0, most[place])
     edges = np.array([[0, len(other) - 1] for other in held]) + width * np.arange(count)[:, None]
     # moved: the path came from another frame; stayed: from the same one, which it may only once.
-    moved = distance[0] + STEP_COST * np.abs(np.arange(width) - pad)
+    moved = distance[0] + STEP_COST * np.abs(np.arange(width) - np.array(begin)[:, None])
     stayed = np.full((count, width), np.inf)
     came = np.zeros((rows, count, width), dtype=np.uint8)
     # Two columns before the first frame, so that the frames before one are parts of these.
