@@ -315,6 +315,15 @@ def test_another_motion_is_judged_by_other_motions_and_says_so(reference, sweep)
     assert not found.exceedances
 
 
+@pytest.mark.parametrize("drift", [1e-9, -1e-4, 1e-3])
+def test_a_clock_that_drifts_hides_no_tone_in_the_highest_octave(reference, simulate, drift):
+    run = simulate.run("pick", 5)
+    loud = replace(run, velocity=run.velocity + np.sin(2 * np.pi * 350 * run.time)[:, None])
+    exact, found = (reference.compare(replace(loud, time=run.time * k)) for k in (1, 1 + drift))
+    assert found.remarks == exact.remarks == ()
+    assert found.worst == pytest.approx(exact.worst, abs=0.1)
+
+
 def test_joints_rates_and_robots_that_do_not_fit_are_told(reference, simulate):
     run = simulate.run("pick", 5)
     names = (*run.joint_names[:3], "finger")

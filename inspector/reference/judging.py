@@ -72,6 +72,7 @@ GAP = 1.0
 SAME_MOTION, SAME_NAME = 0.8, 0.2
 # Time and share of its scenario by which a run may be longer or shorter without a word.
 LONGER, SHARE_LONGER = 0.5, 0.1
+CUT = 0.02  # relative difference of upper edges up to which two octaves are one: within 0.3 dB
 WHOLE = 0.9  # share of a run's band that is compared, from which on nothing is said
 ALIKE = 0.9  # share of the best one's from which another scenario is of the same motion, too
 Real32 = NDArray[np.float32]
@@ -157,6 +158,13 @@ class Exceedance(NamedTuple):
     evidence: Evidence
 
 
+def _place(octave: tuple[float, float], run: Levels) -> int:
+    """Place of an octave in a run whose rate may be a little different; -1 without."""
+    low, high = octave
+    fits = (o[0] == low and abs(o[1] / high - 1) <= CUT for o in run.octaves)
+    return next((place for place, fit in enumerate(fits) if fit), -1)
+
+
 @dataclass(frozen=True)
 class Cells:
     """Joints and octaves that are compared."""
@@ -171,7 +179,7 @@ class Cells:
         """Those of a run that all others have, or any."""
         return cls(
             tuple(j for j in run.joints if by(j in each.joints for each in others)),
-            tuple(o for o in run.octaves if by(o in each.octaves for each in others)),
+            tuple(o for o in run.octaves if by(_place(o, each) >= 0 for each in others)),
         )
 
     def of(self, run: Levels) -> Real32:
@@ -179,7 +187,7 @@ class Cells:
         if (self.joints, self.octaves) == (run.joints, run.octaves):
             return run.level
         joints = [run.joints.index(each) if each in run.joints else -1 for each in self.joints]
-        octaves = [run.octaves.index(o) if o in run.octaves else -1 for o in self.octaves]
+        octaves = [_place(octave, run) for octave in self.octaves]
         # What it lacks is taken from one more joint or octave, at the end.
         padded = np.pad(run.level, ((0, 0), (0, 1), (0, 0), (0, 1)), constant_values=np.nan)
         return np.asarray(padded[:, joints][..., octaves])
