@@ -21,6 +21,7 @@ from inspector.reference.levels import decoded, encoded, levels, octaves
 from inspector.reference.store import Reference
 
 ROOT = Path(__file__).parents[1]
+DESIRED = ("position_desired", "velocity_desired")
 # Runs that are made after each change.
 CHANGED = {
     "harmless": ("pick-1", "place-1", "wave-1"),
@@ -261,19 +262,22 @@ def test_a_reference_counts_in_the_process_that_writes_it(tmp_path, simulate):
 
 def test_what_no_reference_covers_is_decided_by_the_general_model(own, simulate):
     run = simulate.run("pick", 9)
-    tone = 0.3 * np.sin(600 * np.pi * run.time) * np.exp(-(((run.time - 3) / 0.3) ** 2))
-    loud = replace(run, velocity=run.velocity + np.eye(len(run.joint_names))[-1] * tone[:, None])
-    loud.save(own / "now.npz")
-    for name, change in (
-        ("fewer", without_last_joint),
-        ("slower", lambda one: nm.decimated(one, 250.0)),
+    burst = 0.5 * np.exp(-(((run.time[:, None] - 3) / 0.3) ** 2))
+    tone, shake = (burst * np.sin(2 * np.pi * hz * run.time[:, None]) for hz in (300, 40))
+    replace(run, velocity=run.velocity + [0, 0, 0, 1] * tone).save(own / "now.npz")
+    replace(run, velocity_desired=run.velocity_desired + shake).save(own / "target.npz")
+    for name, now, change in (
+        ("fewer", "now", without_last_joint),
+        ("slower", "now", lambda one: nm.decimated(one, 250.0)),
+        ("untracked", "target", lambda one: replace(one, **dict.fromkeys(DESIRED))),
     ):
         (own / name).mkdir()
         for number in (1, 2, 3):
             change(simulate.run("pick", number)).save(own / name / f"pick-{number}.npz")
-        status, runs, _ = classified(own / "now.npz", "--reference", own / name)
-        (event,) = runs["now"]["events"]
+        status, runs, _ = classified(own / f"{now}.npz", "--reference", own / name)
+        (event,) = runs[now]["events"]
         assert (status, event["evidence"]["kind"], event["fails"]) == (1, "general", True)
+    assert "no reference for tracking errors of shoulder" in runs["target"]["reference"]["words"]
     assert classified(own / "now.npz", "--reference", own / "runs")[0] == 1
 
 
@@ -329,12 +333,12 @@ def test_joints_rates_and_robots_that_do_not_fit_are_told(reference, simulate):
     names = (*run.joint_names[:3], "finger")
     more = replace(run, joint_names=names, desired_joint_names=names)
     assert "no reference for joints finger" in reference.compare(more).remarks
-    signals = ("time", "velocity", "position", "velocity_desired", "position_desired")
+    signals = ("time", "velocity", "position", *DESIRED)
     half = replace(run, valid=None, **{name: getattr(run, name)[::2] for name in signals})
     found = reference.compare(half)
     assert any(each.startswith("compared up to 128 Hz") for each in found.remarks)
     assert not found.exceedances
-    blind = replace(run, velocity_desired=None, position_desired=None)
+    blind = replace(run, **dict.fromkeys(DESIRED))
     assert blind.position is not None
     assert reference.compare(blind).run.guided_by == "measured positions"
     assert not reference.compare(blind).exceedances

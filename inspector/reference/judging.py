@@ -296,15 +296,20 @@ class Comparison:
         inside = (self.time >= event.start) & (self.time <= event.stop)
         if not inside.any() and len(inside):
             inside[np.abs(self.time - (event.start + event.stop) / 2).argmin()] = True
-        known, over = event.localisation, self.over[inside]
+        known, cells = event.localisation, Cells(self.joints, self.octaves)
         if known is None and (self.joints, self.octaves) != (self.run.joints, self.run.octaves):
             return False
-        if known is not None and known.joints:
-            over = over[:, [joint == known.joints[0][0] for joint in self.joints]]
-        if known is not None and known.band:
-            over = over[..., [high > known.band[0] for _, high in self.octaves]]
-        whole = np.isfinite(self.score[inside]) & np.isfinite(over).any(axis=(1, 2, 3))
-        return bool(inside.any() and whole.all())
+        joint = known.joints[0][0] if known is not None and known.joints else None
+        low = known.band[0] if known is not None and known.band else 0.0
+        joints = [joint in (None, each) for each in self.joints]
+        octaves = [high > low for _, high in self.octaves]
+        own, over = (
+            np.any(np.isfinite(every[inside][:, joints][..., octaves]), axis=3)
+            for every in (cells.of(self.run), self.over)
+        )
+        # The reference has to have tracking errors if the run has.
+        whole = np.any(over, axis=(1, 2)) & np.all(over[:, :, 1] >= own[:, :, 1], axis=1)
+        return bool(inside.any() and (whole & np.isfinite(self.score[inside])).all())
 
     def __str__(self) -> str:
         number, names = counted(self.repetitions, "repetition"), " and ".join(self.scenarios)
@@ -409,8 +414,12 @@ def _common(
         return Cells((), ()), [f"no reference: it is of {there}, and the run of {own}"]
     every = _repetitions(known)
     cells, remarks = Cells.shared(run, every, any), []
-    if lacking := [joint for joint in run.joints if joint not in cells.joints]:
-        remarks.append(f"no reference for joints {', '.join(lacking[:5])}")
+    lacking = [joint for joint in run.joints if joint not in cells.joints]
+    known_errors = {joint for each in every for joint in each.tracked}
+    untracked = [j for j in cells.joints if j in run.tracked and j not in known_errors]
+    for what, joints in (("joints", lacking), ("tracking errors of", untracked)):
+        if joints:
+            remarks.append(f"no reference for {what} {', '.join(joints[:5])}")
     top = cells.octaves[-1][1] if cells.octaves else 0.0
     if top < WHOLE * HIGHEST * run.rate:
         rates = sorted({each.rate for each in every})

@@ -6,6 +6,7 @@ Each joint has two signals: its velocity, and its tracking error where a velocit
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,12 @@ class Levels:
     def time(self) -> Array:
         """Middle of each frame, shape (frames,), in [s]."""
         return np.asarray(self.start + (np.arange(len(self.guide)) + BINS / 2) * HOP)
+
+    @cached_property
+    def tracked(self) -> tuple[str, ...]:
+        """Joints with tracking errors."""
+        errors = self.level[:, :, 1]
+        return tuple(j for at, j in enumerate(self.joints) if np.isfinite(errors[:, at]).any())
 
     @property
     def speed(self) -> Array:
