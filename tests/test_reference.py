@@ -309,6 +309,7 @@ def test_a_run_played_slower_and_begun_later_is_aligned(reference, simulate):
     found = reference.compare(slow)
     assert found.share(judging.Kind.REPETITIONS) > 0.9
     assert not found.exceedances
+    assert found.quieter < 2  # the rest before it is no improvement
 
 
 def test_another_motion_is_judged_by_other_motions_and_says_so(reference, sweep):

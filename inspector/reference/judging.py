@@ -569,13 +569,13 @@ def _over_others(
 
 
 def _quieter(run: Levels, aligned: "Paths", cells: Cells) -> float:
-    """By how much the run is quieter than each repetition in its loudest joint, in [dB]."""
+    """By how much the loudest levels of the run are below those of each repetition, in [dB]."""
     floor, margins = _floor([each for each, _ in aligned], cells), []
-    own = _raised(_spread(cells.of(run)), floor)
+    own = cells.of(run)
     for repetition, path in aligned:
-        over = _raised(cells.of(repetition)[path.frame], floor) - own
-        over[~path.same] = np.nan
-        margins.append(_top(scores_of(over)))
+        both = cells.of(repetition)[path.frame[path.same]], own[path.same]
+        tops = [_raised(np.fmax.reduce(of, axis=0, initial=np.nan), floor) for of in both]
+        margins.append(_top(scores_of((tops[0] - tops[1])[None])))
     return max(0.0, min((each for each in margins if np.isfinite(each)), default=0.0))
 
 
