@@ -535,7 +535,7 @@ def _over_others(
     """
     mine = cells.of(run)[rows]
     found = np.full_like(mine, np.nan)
-    shared = [j for j in cells.joints if all(j in each.joints for each in references)]
+    shared = [j for j in cells.joints if all(j in each.guided for each in (run, *references))]
     frames = sum(len(each.guide) for each in references)
     if not shared or not frames:
         return found
@@ -612,13 +612,13 @@ Paths: TypeAlias = list[tuple[Levels, Aligned]]
 
 
 def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> Paths:
-    """Where the run lies in each of the others, by the joints that all have; nothing without one.
+    """Where the run lies in each of the others, by joints whose motion all have; or nowhere.
 
     What is shorter than a frame lies nowhere. Positions count from zero if some are integrated.
     """
     others = [each for each in others if len(each.guide)]
     runs = (run, *others)
-    shared = [j for j in joints if all(j in each.joints for each in runs)]
+    shared = [j for j in joints if all(j in each.guided for each in runs)]
     if not shared or not len(run.guide):
         return []
     places = [[each.joints.index(j) for j in shared] for each in runs]

@@ -91,6 +91,11 @@ class Levels:
         return tuple(j for at, j in enumerate(self.joints) if np.isfinite(errors[:, at]).any())
 
     @property
+    def guided(self) -> tuple[str, ...]:
+        """Joints of which the guide is known: desired signals may be of some joints alone."""
+        return (self.guided_by.startswith("desired") and self.tracked) or self.joints
+
+    @property
     def speed(self) -> Array:
         """Slow velocities, shape (frames, joints), in [rad/s] or [m/s]."""
         if len(self.guide) < 2:
