@@ -68,7 +68,7 @@ RATE = 0.01  # share of good runs that the extrapolated margin lets exceed it
 # Exceedances this close together are one finding, in [s]: after an impact the motion differs.
 GAP = 1.0
 # Share of a run that has to lie on a scenario's motion to be of it, and the same if it has its
-# name: a fault may end the motion early.
+# name and the motion of no other: a fault may end the motion early.
 SAME_MOTION, SAME_NAME = 0.8, 0.2
 # Time and share of its scenario by which a run may be longer or shorter without a word.
 LONGER, SHARE_LONGER = 0.5, 0.1
@@ -433,22 +433,30 @@ def _common(
 def _matching(
     run: Levels, known: Sequence[Scenario], joints: Sequence[str]
 ) -> tuple[list[Scenario], "Paths", list[str]]:
-    """Scenarios of the run's motion, of several the one with its name; all their repetitions."""
+    """Scenarios of the run's motion, of several the one with its name; repetitions; a remark."""
     usable = [each for each in known if len(each.repetitions[-1].guide)]
+    own: tuple[list[Scenario], Paths] = [], []
     for name in (run.apart, run.name):
         named = [each for each in usable if each.name == name]
         aligned = _aligned(run, _repetitions(named), joints)
+        share = aligned[-1][1].share if aligned else 0.0
         # A run that lies on the motion of its name needs no other scenario.
-        if aligned and aligned[-1][1].share >= SAME_NAME:
+        if share >= SAME_MOTION:
             return named, aligned, []
+        if share >= SAME_NAME and not own[0]:
+            own = named, aligned
     # Nothing is aligned where no joint is shared.
-    shares = [own.share for _, own in _aligned(run, [e.repetitions[-1] for e in usable], joints)]
+    shares = [path.share for _, path in _aligned(run, [e.repetitions[-1] for e in usable], joints)]
     least = max(SAME_MOTION, ALIKE * max(shares, default=0.0))
-    found = [each for each, own in zip(usable, shares, strict=False) if own >= least]
-    names = ", ".join(each.name for each in found)
-    told = [f"its motion is that of {names}, and its name is of none: all count"]
-    aligned = _aligned(run, _repetitions(found), joints)
-    return found if aligned else [], aligned, told if len(found) > 1 else []
+    found = [each for each, share in zip(usable, shares, strict=False) if share >= least]
+    if not found:
+        return *own, []
+    told, names = [], ", ".join(each.name for each in found)
+    if run.name in [each.name for each in usable]:
+        told = [f"its motion is that of {names}, not that of {run.name}"]
+    elif len(found) > 1:
+        told = [f"its motion is that of {names}, and its name is of none: all count"]
+    return found, _aligned(run, _repetitions(found), joints), told
 
 
 def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
