@@ -178,6 +178,17 @@ def test_a_run_that_is_cut_or_frozen_fails_and_says_so(own, simulate):
     assert "missing: motion from 0." in out
 
 
+def test_a_run_too_slow_for_any_octave_makes_its_motion_and_cannot_be_judged(own, simulate):
+    path = own / "runs" / "pick-9.npz"
+    nm.decimated(simulate.run("pick", 9), 25.0).save(path)
+    told = "no octave is compared: the run has 25 Hz, the reference 1000 Hz"
+    status, out, _ = call("classify", path)
+    assert (status, told in out, "another motion" in out) == (4, True, False), out
+    status, out, _ = call("diff", own / "runs" / "pick-1.npz", path)
+    assert (status, told in out, "another motion" in out) == (4, True, False)
+    assert "pick: 1 repetition replace the accepted" in call("accept", path, "--reason", "x")[1]
+
+
 def test_a_run_longer_than_its_scenario_is_compared_with_it_as_far_as_it_goes(
     own, reference, simulate
 ):
@@ -341,6 +352,9 @@ def test_joints_rates_and_robots_that_do_not_fit_are_told(reference, simulate):
     found = reference.compare(half)
     assert any(each.startswith("compared up to 128 Hz") for each in found.remarks)
     assert not found.exceedances
+    slow = levels(nm.decimated(run, 200.0))  # from 64 to 90 Hz is no octave
+    known = Reference(Path("good"), store.of_runs([slow]))
+    assert known.compare(slow).remarks == ("compared up to 64 Hz",)
     own = {name: getattr(run, name)[:, :2] for name in DESIRED}
     part = replace(run, desired_joint_names=run.joint_names[:2], **own)
     assert reference.compare(part).share(judging.Kind.REPETITIONS) > 0.95

@@ -280,7 +280,9 @@ def _outcome(
                 kind = Outcome.CUT if what == END else Outcome.FROZEN
                 return kind, f"{verdict.path.name} lacks the {what}: {why}"
     if not scores:
-        return Outcome.INCONCLUSIVE, "the runs after make another motion"
+        same = any(each.scenarios for each in back)
+        told = "have no octave of those before" if same else "make another motion"
+        return Outcome.INCONCLUSIVE, f"the runs after {told}"
     told = f"{median(scores):+.1f} dB over the runs before, margin {margin:.1f} dB"
     if median(scores) > margin or (changes and changes[0].low > margin):
         return Outcome.WORSE, told

@@ -206,7 +206,7 @@ class Comparison:
     joints: tuple[str, ...]
     octaves: Octaves  # [Hz]
     scenarios: tuple[str, ...]  # whose motion it is
-    repetitions: int  # that these have
+    repetitions: int  # of these that are compared
     kind: NDArray[np.object_]  # evidence of each frame, a `Kind`, shape (frames,)
     # Exceedance of each cell, shape (frames, joints, 2, octaves), in [dB]; NaN without reference.
     over: Real32
@@ -330,13 +330,13 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     frames, over = len(run.guide), np.full_like(cells.of(run), np.nan)
     kind = np.full(frames, Kind.GENERAL, dtype=object)
     margins: dict[Kind, Margin] = {}
-    matched, aligned, told = _matching(run, known, cells.joints) if over.size else ([], [], [])
+    matched, aligned, told = _matching(run, known, cells.joints)
     remarks += told
     quieter, band = 0.0, np.full((frames, 2), np.nan)
     if aligned:
         quieter, band = _quieter(run, aligned, cells), _band(aligned, cells)
         over, covered = _over_repetitions(run, aligned, cells)
-        kind[covered] = Kind.REPETITIONS
+        kind[covered & bool(over.size)] = Kind.REPETITIONS
         margins[Kind.REPETITIONS] = margin_of([db for each in known for db in each.scores_db])
         longest = max(each.duration for each, _ in aligned)
         if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
@@ -357,7 +357,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
         cells.joints,
         cells.octaves,
         tuple(each.name for each in matched),
-        len(aligned),
+        len(aligned) if over.size else 0,
         kind,
         over,
         scores_of(over),
@@ -422,11 +422,11 @@ def _common(
             remarks.append(f"no reference for {what} {', '.join(joints[:5])}")
     top = cells.octaves[-1][1] if cells.octaves else 0.0
     if top < WHOLE * HIGHEST * run.rate:
-        rates = sorted({each.rate for each in every})
+        told = f"compared up to {top:.0f} Hz" if top else "no octave is compared"
+        rates = sorted({each.rate for each in every if abs(each.rate / run.rate - 1) > CUT})
         shown = ", ".join(f"{rate:g}" for rate in rates[:3])
-        remarks.append(
-            f"compared up to {top:.0f} Hz: the run has {run.rate:g} Hz, the reference {shown} Hz"
-        )
+        differ = f": the run has {run.rate:g} Hz, the reference {shown} Hz" if rates else ""
+        remarks.append(told + differ)
     return cells, remarks
 
 

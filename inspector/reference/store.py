@@ -326,7 +326,7 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
     if not fresh:
         return old, "unchanged, these runs are accepted already"
     over, margin = [compare(each, (old,)) for each in fresh], margin_of(old.scores_db).db
-    same = all(not each.exceedances and each.scenarios and each.quieter <= margin for each in over)
+    same = all(not e.exceedances and e.repetitions and e.quieter <= margin for e in over)
     repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
     # What people wrote stays; what an earlier `accept` heard does not.
     by_hand = (e for e in old.wanted if e.required or e.reason or e.loudest_db is None)
