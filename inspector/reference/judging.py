@@ -42,7 +42,7 @@ OUTSIDE = 0.36
 STEPS = np.array([1, 1, 2, 2, 0])
 # Cells of a matrix of costs. Of longer runs every second frame is aligned, and so on; then so many
 # frames at once, near the path of these.
-LARGEST, BLOCK = 4_000_000, 400
+LARGEST, BLOCK = 4_000_000, 200
 # Added to the standard deviation of each joint's positions, in [rad]: what is no motion.
 STILL = 0.05
 SLOPE = (0.85, 1.18)  # speeds of a repetition within which levels are comparable
@@ -330,7 +330,7 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     frames, over = len(run.guide), np.full_like(cells.of(run), np.nan)
     kind = np.full(frames, Kind.GENERAL, dtype=object)
     margins: dict[Kind, Margin] = {}
-    matched, aligned, told = _matching(run, known, cells.joints)
+    matched, aligned, told = _matching(run, known)
     remarks += told
     quieter, band = 0.0, np.full((frames, 2), np.nan)
     if aligned:
@@ -374,7 +374,7 @@ def leave_one_out(repetitions: Sequence[Levels]) -> tuple[float, ...]:
     for run in repetitions:
         others = [e for e in repetitions if e is not run and set(run.joints) & set(e.joints)]
         cells = Cells.shared(run, others)
-        aligned = _aligned(run, others, cells.joints)
+        aligned = _aligned(run, others)
         if aligned:
             found.append(_top(scores_of(_over_repetitions(run, aligned, cells)[0])))
     return tuple(score for score in found if np.isfinite(score))
@@ -430,15 +430,13 @@ def _common(
     return cells, remarks
 
 
-def _matching(
-    run: Levels, known: Sequence[Scenario], joints: Sequence[str]
-) -> tuple[list[Scenario], "Paths", list[str]]:
+def _matching(run: Levels, known: Sequence[Scenario]) -> tuple[list[Scenario], "Paths", list[str]]:
     """Scenarios of the run's motion, of several the one with its name; repetitions; a remark."""
     usable = [each for each in known if len(each.repetitions[-1].guide)]
     own: tuple[list[Scenario], Paths] = [], []
     for name in (run.apart, run.name):
         named = [each for each in usable if each.name == name]
-        aligned = _aligned(run, _repetitions(named), joints)
+        aligned = _aligned(run, _repetitions(named))
         share = aligned[-1][1].share if aligned else 0.0
         # A run that lies on the motion of its name needs no other scenario.
         if share >= SAME_MOTION:
@@ -446,7 +444,7 @@ def _matching(
         if share >= SAME_NAME and not own[0]:
             own = named, aligned
     # Nothing is aligned where no joint is shared.
-    shares = [path.share for _, path in _aligned(run, [e.repetitions[-1] for e in usable], joints)]
+    shares = [path.share for _, path in _aligned(run, [each.repetitions[-1] for each in usable])]
     least = max(SAME_MOTION, ALIKE * max(shares, default=0.0))
     found = [each for each, share in zip(usable, shares, strict=False) if share >= least]
     if not found:
@@ -456,7 +454,7 @@ def _matching(
         told = [f"its motion is that of {names}, not that of {run.name}"]
     elif len(found) > 1:
         told = [f"its motion is that of {names}, and its name is of none: all count"]
-    return found, _aligned(run, _repetitions(found), joints), told
+    return found, _aligned(run, _repetitions(found)), told
 
 
 def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
@@ -465,7 +463,7 @@ def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
 
 def share_of_motion(run: Levels, other: Levels) -> float:
     """Share of a run that lies on the motion of another."""
-    aligned = _aligned(run, [other], run.joints)
+    aligned = _aligned(run, [other])
     return aligned[0][1].share if aligned else 0.0
 
 
@@ -617,16 +615,17 @@ class Aligned:
 
 
 Paths: TypeAlias = list[tuple[Levels, Aligned]]
+Held: TypeAlias = tuple[Array, Array]  # slow positions, and the largest cost of each frame
 
 
-def _aligned(run: Levels, others: Sequence[Levels], joints: Sequence[str]) -> Paths:
+def _aligned(run: Levels, others: Sequence[Levels]) -> Paths:
     """Where the run lies in each of the others, by joints whose motion all have; or nowhere.
 
     What is shorter than a frame lies nowhere. Positions count from zero if some are integrated.
     """
     others = [each for each in others if len(each.guide)]
     runs = (run, *others)
-    shared = [j for j in joints if all(j in each.guided for each in runs)]
+    shared = [j for j in run.guided if all(j in each.guided for each in others)]
     if not shared or not len(run.guide):
         return []
     places = [[each.joints.index(j) for j in shared] for each in runs]
@@ -648,16 +647,21 @@ def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:
     run, longest = run / scale, max(map(len, repetitions)) + 2 * PAD
     thin = int(np.ceil(np.sqrt(len(run) * longest / LARGEST)))
     pad = -(-PAD // thin) * thin  # thinned, both have their first frames
-    held = [np.pad(each / scale, ((pad, pad), (0, 0)), mode="edge") for each in repetitions]
-    most = [np.pad(np.full(len(e), np.inf), pad, constant_values=OUTSIDE) for e in repetitions]
-    slow, *others = (_means(each, thin) for each in (run, *held))
-    paths = _paths(slow, others, [each[::thin] for each in most], [pad // thin] * len(held))
+    held = [
+        (
+            np.pad(each / scale, ((pad, pad), (0, 0)), mode="edge"),
+            np.pad(np.full(len(each), np.inf), pad, constant_values=OUTSIDE),
+        )
+        for each in repetitions
+    ]
+    thinned = [(_means(other, thin), most[::thin]) for other, most in held]
+    paths = _paths(_means(run, thin), thinned, [pad // thin] * len(held))
     if thin > 1:
         at, nodes = np.arange(len(run)), np.arange(0, len(run), thin)
         rough = [np.interp(at, nodes, path * thin).astype(np.int64) for path in paths]
-        paths = _refined(run, held, most, rough, 3 * thin)
+        paths = _refined(run, held, np.stack(rough), 3 * thin)
     found = []
-    for path, other, repetition in zip(paths, held, repetitions, strict=True):
+    for path, (other, _), repetition in zip(paths, held, repetitions, strict=True):
         residual = np.abs(run - other[path]).max(axis=1)
         inside = (path >= pad) & (path < pad + len(repetition))
         residual[inside & ~_comparable(path)] = np.inf
@@ -673,24 +677,20 @@ def _means(positions: Array, size: int) -> Array:
 
 
 def _refined(
-    run: Array,
-    held: Sequence[Array],
-    most: Sequence[Array],
-    rough: Sequence[NDArray[np.int64]],
-    reach: int,
-) -> list[NDArray[np.int64]]:
+    run: Array, held: Sequence[Held], rough: NDArray[np.int64], reach: int
+) -> NDArray[np.int64]:
     """Paths of all frames of a run within some frames of rough ones, block by block."""
-    found = [np.empty_like(path) for path in rough]
+    found = np.empty_like(rough)
     for first in range(0, len(run), BLOCK):
         rows = slice(max(0, first - reach), first + BLOCK + reach)
-        near = [slice(max(0, p[rows][0] - reach), p[rows][-1] + reach + 1) for p in rough]
-        parts = [each[own] for each, own in zip(held, near, strict=True)]
-        costs = [each[own] for each, own in zip(most, near, strict=True)]
-        begin = [int(path[rows][0]) - own.start for path, own in zip(rough, near, strict=True)]
-        paths = _paths(run[rows], parts, costs, begin)
-        for whole, path, own in zip(found, paths, near, strict=True):
-            block = path[first - rows.start :][:BLOCK]
-            whole[first : first + BLOCK] = own.start + block
+        begin, end = rough[:, rows][:, [0, -1]].T
+        low = np.maximum(begin - reach, 0)
+        near = [
+            (other[start:stop], most[start:stop])
+            for (other, most), start, stop in zip(held, low, end + reach + 1, strict=True)
+        ]
+        path = low[:, None] + _paths(run[rows], near, begin - low)
+        found[:, first : first + BLOCK] = path[:, first - rows.start :][:, :BLOCK]
     return found
 
 
@@ -705,16 +705,17 @@ def _comparable(path: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _paths(
-    run: Array, held: Sequence[Array], most: Sequence[Array], begin: Sequence[int]
-) -> list[NDArray[np.int64]]:
-    """Frame of each repetition for each frame of a run, by largest costs and likely first ones."""
-    count, width, rows = len(held), max(map(len, held)), len(run)
+    run: Array, held: Sequence[Held], begin: Sequence[int] | NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Frame of each repetition for each frame of a run, by the likely first ones."""
+    lengths, rows = [len(other) for other, _ in held], len(run)
+    count, width = len(held), max(lengths)
     distance = np.full((rows, count, width), np.inf, dtype=np.float32)
-    for place, other in enumerate(held):
+    for place, (other, most) in enumerate(held):
         square = (run**2).mean(axis=1)[:, None] + (other**2).mean(axis=1)
         square -= 2 * run @ other.T / run.shape[1]
-        distance[:, place, : len(other)] = np.clip(square, 0.0, most[place])
-    edges = np.array([[0, len(other) - 1] for other in held]) + width * np.arange(count)[:, None]
+        distance[:, place, : len(other)] = np.clip(square, 0.0, most)
+    edges = np.array([[0, length - 1] for length in lengths]) + width * np.arange(count)[:, None]
     # moved: the path came from another frame; stayed: from the same one, which it may only once.
     moved = distance[0] + STEP_COST * np.abs(np.arange(width) - np.array(begin)[:, None])
     stayed = np.full((count, width), np.inf)
@@ -743,4 +744,4 @@ def _paths(
             step = np.where(stay, 0, STEPS[code])
             stay = np.where(stay, False, code % 2 == 1)
             at = at - step
-    return list(path.T)
+    return path.T
