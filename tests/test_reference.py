@@ -22,6 +22,7 @@ from inspector.reference.store import Reference
 
 ROOT = Path(__file__).parents[1]
 DESIRED = ("position_desired", "velocity_desired")
+SIGNALS = ("position", "velocity", *DESIRED)
 # Runs that are made after each change.
 CHANGED = {
     "harmless": ("pick-1", "place-1", "wave-1"),
@@ -193,10 +194,7 @@ def test_a_run_longer_than_its_scenario_is_compared_with_it_as_far_as_it_goes(
     own, reference, simulate
 ):
     parts = simulate.run("pick", 9), simulate.run("wave", 9)
-    long = {
-        name: np.concatenate([getattr(each, name) for each in parts])
-        for name in ("position", "velocity", "position_desired", "velocity_desired")
-    }
+    long = {name: np.concatenate([getattr(each, name) for each in parts]) for name in SIGNALS}
     time = np.arange(len(long["velocity"])) / simulate.RATE
     run = replace(parts[0], time=time, valid=None, **long)
     found = reference.compare(replace(run, meta={"scenario": "pick"}))
@@ -280,7 +278,7 @@ def test_what_no_reference_covers_is_decided_by_the_general_model(own, simulate)
     replace(run, velocity=run.velocity + [0, 0, 0, 1] * tone).save(own / "now.npz")
     replace(run, velocity_desired=run.velocity_desired + shake).save(own / "target.npz")
     for name, now, change in (
-        ("fewer", "now", without_last_joint),
+        ("fewer", "now", lambda one: of_joints(one, [0, 1, 2])),
         ("slower", "now", lambda one: nm.decimated(one, 250.0)),
         ("untracked", "target", lambda one: replace(one, **dict.fromkeys(DESIRED))),
     ):
@@ -294,10 +292,9 @@ def test_what_no_reference_covers_is_decided_by_the_general_model(own, simulate)
     assert classified(own / "now.npz", "--reference", own / "runs")[0] == 1
 
 
-def without_last_joint(run):
-    kept = {name: getattr(run, name)[:, :-1] for name in ("position", "velocity")}
-    kept |= {f"{name}_desired": getattr(run, f"{name}_desired")[:, :-1] for name in kept}
-    names = run.joint_names[:-1]
+def of_joints(run, places):
+    names = tuple(run.joint_names[place] for place in places)
+    kept = {name: getattr(run, name)[:, places] for name in SIGNALS}
     return replace(run, joint_names=names, desired_joint_names=names, **kept)
 
 
@@ -306,20 +303,14 @@ def test_a_run_played_slower_and_begun_later_is_aligned(reference, simulate):
     source = np.arange(0, len(run.time) - 1, 0.97)
     at = np.concatenate((np.zeros(int(0.5 * simulate.RATE)), source))
 
-    def played(signal, scale=1.0):
-        whole = [np.interp(at, np.arange(len(signal)), column) for column in signal.T]
-        return scale * np.stack(whole, axis=1)
-
-    slow = replace(
-        run,
-        time=np.arange(len(at)) / simulate.RATE,
-        valid=None,
-        position=played(run.position),
-        position_desired=played(run.position_desired),
-        velocity=played(run.velocity, 0.97),
-        velocity_desired=played(run.velocity_desired, 0.97),
-    )
-    found = reference.compare(slow)
+    old = np.arange(len(run.time))
+    slow = {
+        name: np.stack([np.interp(at, old, each) for each in getattr(run, name).T], axis=1)
+        for name in SIGNALS
+    }
+    slow |= {name: 0.97 * slow[name] for name in SIGNALS if name.startswith("velocity")}
+    time = np.arange(len(at)) / simulate.RATE
+    found = reference.compare(replace(run, time=time, valid=None, **slow))
     assert found.share(judging.Kind.REPETITIONS) > 0.9
     assert not found.exceedances
     assert found.quieter < 2  # the rest before it is no improvement
@@ -347,9 +338,8 @@ def test_joints_rates_and_robots_that_do_not_fit_are_told(reference, simulate):
     names = (*run.joint_names[:3], "finger")
     more = replace(run, joint_names=names, desired_joint_names=names)
     assert "no reference for joints finger" in reference.compare(more).remarks
-    signals = ("time", "velocity", "position", *DESIRED)
-    half = replace(run, valid=None, **{name: getattr(run, name)[::2] for name in signals})
-    found = reference.compare(half)
+    half = {name: getattr(run, name)[::2] for name in ("time", *SIGNALS)}
+    found = reference.compare(replace(run, valid=None, **half))
     assert any(each.startswith("compared up to 128 Hz") for each in found.remarks)
     assert not found.exceedances
     slow = levels(nm.decimated(run, 200.0))  # from 64 to 90 Hz is no octave
@@ -590,16 +580,8 @@ def test_levels_of_a_tone_are_its_root_mean_square_in_its_octave(simulate):
 
 
 def test_repetitions_of_which_no_joint_is_in_all_are_no_reference_for_each_other(simulate):
-    runs = []
-    for number, columns in enumerate([[0, 1], [1, 2], [0, 2]], 1):
-        run = simulate.run("pick", number)
-        named = tuple(run.joint_names[column] for column in columns)
-        signals = {
-            name: getattr(run, name)[:, columns]
-            for name in ("velocity", "velocity_desired", "position_desired")
-        }
-        part = replace(run, joint_names=named, desired_joint_names=named, position=None, **signals)
-        runs.append(levels(part, name="pick"))
+    pairs = enumerate([[0, 1], [1, 2], [0, 2]], 1)
+    runs = [levels(of_joints(simulate.run("pick", k), pair), name="pick") for k, pair in pairs]
     reference = Reference(Path("good"), store.of_runs(runs))
     assert [len(each.repetitions) for each in reference.scenarios] == [3]
     compared = reference.compare(runs[0])

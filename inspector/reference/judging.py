@@ -447,14 +447,15 @@ def _matching(run: Levels, known: Sequence[Scenario]) -> tuple[list[Scenario], "
     shares = [path.share for _, path in _aligned(run, [each.repetitions[-1] for each in usable])]
     least = max(SAME_MOTION, ALIKE * max(shares, default=0.0))
     found = [each for each, share in zip(usable, shares, strict=False) if share >= least]
-    if not found:
+    aligned = _aligned(run, _repetitions(found))
+    if not aligned:
         return *own, []
     told, names = [], ", ".join(each.name for each in found)
     if run.name in [each.name for each in usable]:
         told = [f"its motion is that of {names}, not that of {run.name}"]
     elif len(found) > 1:
         told = [f"its motion is that of {names}, and its name is of none: all count"]
-    return found, _aligned(run, _repetitions(found)), told
+    return found, aligned, told
 
 
 def _repetitions(scenarios: Sequence[Scenario]) -> list[Levels]:
