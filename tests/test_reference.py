@@ -9,6 +9,7 @@ import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -82,7 +83,7 @@ def accepted(folder):
 # --- classify
 
 
-def test_a_harmless_change_has_no_finding_and_an_improvement_is_told(project):
+def test_a_harmless_change_passes_an_improvement_is_told_and_a_missing_scenario_fails(project):
     status, runs, _ = classified(project / "harmless")
     assert (status, len(runs)) == (0, 3)
     assert all(run["reference"]["scenarios"] == [name[:-2]] for name, run in runs.items())
@@ -90,6 +91,8 @@ def test_a_harmless_change_has_no_finding_and_an_improvement_is_told(project):
     for name in CHANGED["improvement"]:
         status, runs, _ = classified(project / "improvement" / f"{name}.npz")
         assert (status, runs[name]["reference"]["quieter_db"] > 4) == (0, True)
+    status, out, _ = call("classify", project / "improvement")
+    assert (status, bool(re.search(r"place +MISSING +no log; it had 3\n", out))) == (1, True)
 
 
 def test_a_chatter_is_found_where_it_is_and_nowhere_else(project):
@@ -98,9 +101,8 @@ def test_a_chatter_is_found_where_it_is_and_nowhere_else(project):
     for name, run in runs.items():
         assert bool(run["events"]) == name.startswith("pick"), name
         for event in run["events"]:
-            assert event["evidence"]["kind"] == "repetitions"
-            assert event["evidence"]["joint"] == "elbow"
-            assert event["evidence"]["band_hz"] == [32.0, 64.0]
+            where = {"kind": "repetitions", "joint": "elbow", "band_hz": [32.0, 64.0]}
+            assert event["evidence"].items() >= where.items()
             assert 10 < event["evidence"]["over_db"] < 25
 
 
@@ -144,12 +146,6 @@ def test_pictures_and_pages_beside_a_reference_show_what_it_finds(project, tmp_p
         assert re.search(r"[Rr]eference: \S*reference, 100% by 3 repetitions of pick", words)
 
 
-def test_a_missing_scenario_fails_by_name(project):
-    status, out, _ = call("classify", project / "improvement")
-    assert status == 1
-    assert re.search(r"place +MISSING +no log; it had 3\n", out)
-
-
 def test_a_folder_of_good_runs_is_a_reference_as_it_is(own, project):
     shutil.rmtree(own / "reference")
     chatter = shutil.copytree(project / "chatter", own / "now")
@@ -171,9 +167,8 @@ def test_a_run_that_is_cut_or_frozen_fails_and_says_so(own, simulate):
     assert [line for line in out.splitlines() if line.startswith("note:")] == [
         "note:    a signal of 150 samples is too short: a frame takes 400"
     ]
-    still = np.repeat(run.position[:1], len(run.time), axis=0)
-    frozen = replace(run, position=still, velocity=0 * run.velocity)
-    frozen.save(own / "runs" / "pick-5.npz")
+    run.position[:], run.velocity[:] = run.position[0], 0
+    run.save(own / "runs" / "pick-5.npz")
     status, out, _ = call("classify", own / "runs" / "pick-5.npz")
     assert status == 1
     assert "missing: motion from 0." in out
@@ -183,10 +178,9 @@ def test_a_run_too_slow_for_any_octave_makes_its_motion_and_cannot_be_judged(own
     path = own / "runs" / "pick-9.npz"
     nm.decimated(simulate.run("pick", 9), 25.0).save(path)
     told = "no octave is compared: the run has 25 Hz, the reference 1000 Hz"
-    status, out, _ = call("classify", path)
-    assert (status, told in out, "another motion" in out) == (4, True, False), out
-    status, out, _ = call("diff", own / "runs" / "pick-1.npz", path)
-    assert (status, told in out, "another motion" in out) == (4, True, False)
+    for command in (("classify", path), ("diff", own / "runs" / "pick-1.npz", path)):
+        status, out, _ = call(*command)
+        assert (status, told in out, "another motion" in out) == (4, True, False), out
     assert "pick: 1 repetition replace the accepted" in call("accept", path, "--reason", "x")[1]
 
 
@@ -366,9 +360,8 @@ def test_a_change_is_accepted_after_review_for_what_was_run_alone(own, project):
     assert "2 other scenarios stay as they were" in out
     assert accepted(own)["wave.npz"] == before
     assert call("classify", chatter)[0] == 0
-    text = (own / "reference" / "reference.toml").read_text()
-    assert 'reason = "new gripper"' in text
-    assert 'reason = "first release"' in text
+    reasons = [each.reason for each in Reference.load(own / "reference").scenarios]
+    assert reasons == ["new gripper", "first release", "first release"]
 
 
 def test_runs_like_the_accepted_ones_join_them_and_the_newest_ten_stay(own, simulate):
@@ -385,25 +378,21 @@ def test_runs_like_the_accepted_ones_join_them_and_the_newest_ten_stay(own, simu
 
 def test_what_cannot_be_accepted_leaves_the_store_as_it_was(own, monkeypatch):
     before = accepted(own)
+    monkeypatch.setenv("CI", "true")
+    status, _, err = call("accept", own / "runs", "--reason", "x")
+    assert (status, "CI=true: a person accepts runs" in err) == (2, True)
+    as_ci = ("--reason", "x", "--in-ci")
     with monkeypatch.context() as patch:
-        patch.setenv("CI", "true")
-        status, _, err = call("accept", own / "runs", "--reason", "x")
-        assert (status, "CI=true: a person accepts runs" in err) == (2, True)
-    with monkeypatch.context() as patch:
-
-        def refuse(*_, **__):
-            raise PermissionError(13, "Permission denied")
-
+        refuse = Mock(side_effect=PermissionError(13, "Permission denied"))
         patch.setattr("noisemodel.files.os.open", refuse)
-        status, _, err = call("accept", own / "runs" / "wave-1.npz", "--reason", "x")
+        status, _, err = call("accept", own / "runs" / "wave-1.npz", *as_ci)
         assert (status, "cannot be written (Permission denied)" in err) == (5, True)
     (own / "runs" / "pick-4.csv").write_text("nothing\n")
-    status, _, err = call("accept", own / "runs", "--reason", "x")
+    status, _, err = call("accept", own / "runs", *as_ci)
     assert (status, len(err.splitlines())) == (3, 1)
     assert "pick-4.csv: " in err
     assert accepted(own) == before
-    monkeypatch.setenv("CI", "true")
-    assert call("accept", own / "runs" / "pick-1.npz", "--reason", "x", "--in-ci")[0] == 0
+    assert call("accept", own / "runs" / "pick-1.npz", *as_ci)[0] == 0
 
 
 def test_a_renamed_scenario_is_found_by_its_motion_until_people_rename_it_in_the_store(own):
@@ -518,16 +507,12 @@ def test_a_store_that_is_wrong_is_one_line(own, old, new, told):
     assert len(err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("kind", ["pipe", "folder", "loop", "dangling"])
-def test_what_is_no_store_but_named_like_one_is_an_error(own, kind):
+@pytest.mark.parametrize("target", [None, "", "reference.toml", "nothing"])
+def test_what_is_no_store_but_named_like_one_is_an_error(own, target):
     toml = own / "reference" / "reference.toml"
     toml.unlink()
-    if kind == "pipe":
-        os.mkfifo(toml)
-    elif kind == "folder":
-        toml.mkdir()
-    else:
-        toml.symlink_to(toml if kind == "loop" else own / "nothing")
+    make = {None: os.mkfifo, "": os.mkdir}  # the others are links, to themselves or to nothing
+    make.get(target, lambda path: path.symlink_to(target))(toml)
     status, _, err = call("classify", own / "runs")
     assert status == 3
     assert "reference.toml: " in err
@@ -690,11 +675,9 @@ def test_a_chatter_in_all_scenarios_is_worse_in_all_in_any_order(project, tmp_pa
     before.mkdir()
     for name, letter in {"pick": "b", "place": "a"}.items():
         for number in (1, 2, 3):
-            shutil.copy(
-                project / "runs" / f"{name}-{number}.npz", before / f"{letter}-{number}.npz"
-            )
-            run = simulate.run(name, number + 3, "chatter-all")
-            run.save(after / f"{letter}-{number}.npz")
+            new = f"{letter}-{number}.npz"
+            shutil.copy(project / "runs" / f"{name}-{number}.npz", before / new)
+            simulate.run(name, number + 3, "chatter-all").save(after / new)
     _, _, rows = compared(before, after)
     assert {row["verdict"] for row in rows.values()} == {"worse"}
     pair = (some(tmp_path / f"{side.name} alone", side, "a-*") for side in (before, after))
