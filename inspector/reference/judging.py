@@ -699,10 +699,9 @@ def _comparable(path: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether run and repetition are about equally fast around each frame."""
     frames = np.arange(len(path))
     low, high = np.maximum(frames - REACH, 0), np.minimum(frames + REACH, len(path) - 1)
-    slope = (path[high] - path[low]) / np.maximum(high - low, 1)
+    time, advance = high - low, path[high] - path[low]
     # One frame more or less is rounding.
-    slack = 1.0 / np.maximum(high - low, 1)
-    return np.asarray((slope >= SLOPE[0] - slack) & (slope <= SLOPE[1] + slack))
+    return np.asarray((advance >= SLOPE[0] * time - 1) & (advance <= SLOPE[1] * time + 1))
 
 
 def _paths(
