@@ -197,10 +197,8 @@ def test_a_profile_that_does_not_exist_at_a_rate_is_one_line(tmp_path):
     status, _, err = inspector(*arguments, "noisytest-rbf", "--rate", 1000)
     assert (status, "exists at 10000 Hz only" in err) == (2, True)
     status, _, err = inspector(*arguments, "best")
-    assert (status, "no profile 'best' of one rate; there are logbands, noisytest-rbf" in err) == (
-        2,
-        True,
-    )
+    told = "no profile 'best' of one rate; there are logbands, noisytest-rbf"
+    assert (status, told in err) == (2, True)
     status, _, err = inspector("train", run, "-o", tmp_path / "m.npz")
     assert (status, "left out: 1 run without annotated blocks" in err) == (3, True)
 
@@ -219,16 +217,8 @@ def imported_by(*arguments):
 
 
 def test_help_imports_nothing_heavy():
-    modules = imported_by("--help")
-    assert not modules & {
-        "numpy",
-        "rerun",
-        "sklearn",
-        "pinocchio",
-        "scipy",
-        "noiseclassifier",
-        "noisemodel",
-    }
+    heavy = {"numpy", "rerun", "sklearn", "pinocchio", "scipy", "noiseclassifier", "noisemodel"}
+    assert not imported_by("--help") & heavy
 
 
 def test_classifying_imports_no_library_that_takes_long():

@@ -159,15 +159,9 @@ def test_no_two_tests_have_files_of_one_name(one, other, which, second):
     assert all(re.fullmatch(r"\w[\w.~-]*", name) and len(name) < 200 for name in names)
 
 
-@pytest.mark.parametrize(
-    ("test", "name"),
-    [
-        ("test_arm.py::TestArm::test_one", "test_arm-TestArm-test_one"),
-        ("tests/test_arm.py::test_one[fast-left]", "tests.test_arm-test_one-fast-left"),
-    ],
-)
-def test_files_of_plain_tests_are_named_by_their_node_ids(test, name):
-    assert name_of(test) == name
+def test_files_of_plain_tests_are_named_by_their_node_ids():
+    assert name_of("test_arm.py::TestArm::test_one") == "test_arm-TestArm-test_one"
+    assert name_of("tests/test_arm.py::test_one[fast-left]") == "tests.test_arm-test_one-fast-left"
 
 
 def test_a_run_that_cannot_be_classified_is_not_quiet(project):

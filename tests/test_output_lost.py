@@ -6,10 +6,11 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
-from commandline import call
+from commandline import call, ran
 
 from inspector.library import demo_run
 
@@ -24,24 +25,12 @@ def command(*arguments):
     return [sys.executable, "-m", "inspector", *map(str, arguments)]
 
 
-def run(*arguments, limit=None, **settings):
+def run(*arguments, limit):
     """Run the command line, with files no larger than `limit` in [byte]."""
-
-    def limited():
-        if limit is not None:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-
-    return subprocess.run(
-        command(*arguments),
-        cwd=ROOT,
-        # Bytecode would be cut off, too.
-        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
-        check=False,
-        text=True,
-        stderr=subprocess.PIPE,
-        preexec_fn=limited,
-        **settings,
-    )
+    # Bytecode would be cut off, too.
+    env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
+    limited = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (limit, limit))
+    return ran(*command(*arguments), cwd=ROOT, env=env, preexec_fn=limited)
 
 
 @pytest.mark.parametrize("arguments", COMMANDS, ids=lambda each: each[0])
@@ -90,8 +79,7 @@ def test_run_files_that_cannot_be_written_are_lost_output_and_not_bad_logs(tmp_p
 
 
 def children(pid):
-    found = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True, check=False)
-    return [int(each) for each in found.stdout.split()]
+    return [int(each) for each in ran("pgrep", "-P", pid).stdout.split()]
 
 
 def alive(pid):
@@ -165,8 +153,7 @@ def test_a_home_that_cannot_be_written_is_one_line(monkeypatch):
 
 def test_a_backend_of_matplotlib_that_does_not_exist_does_not_matter(tmp_path):
     env = os.environ | {"MPLBACKEND": "x", "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'models'}"}
-    command = [sys.executable, "-m", "inspector", "view", demo_run(), "-o", tmp_path / "a.html"]
-    done = subprocess.run(command, env=env, check=False, capture_output=True, text=True)
+    done = ran(*command("view", demo_run(), "-o", tmp_path / "a.html"), env=env)
     assert (done.returncode, done.stderr) == (0, "")
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import browser
 import numpy as np
 import pytest
+from commandline import ran
 
 from inspector.analysis import analyse_file
 from inspector.recording import viewer
@@ -104,14 +105,10 @@ def test_a_viewer_collects_usage_data_only_if_it_is_forced_to(
     assert bool(list(tmp_path.glob("**/rerun/analytics"))) == collects
 
 
-def printed(*command):
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
-
-
 def listening_on(pid):
     """Local addresses that the children of a process listen on."""
-    children = printed("pgrep", "-P", str(pid)).split()
-    sockets = [line.split() for line in printed("ss", "-ltnpH").splitlines()]
+    children = ran("pgrep", "-P", pid).stdout.split()
+    sockets = [line.split() for line in ran("ss", "-ltnpH").stdout.splitlines()]
     return [s[3] for s in sockets if any(f"pid={child}," in s[-1] for child in children)]
 
 

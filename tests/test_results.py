@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commandline import call
+from wholeverdict import WHOLE
 
 from inspector.errors import InspectorError, Status
 from inspector.library import demo_run
 from inspector.localisation import Localisation
-from inspector.localisation.order import Order
 from inspector.report import html
 from inspector.report.formats import FORMATS, as_json
-from inspector.verdict import Beside, Evidence, Finding, Missing, Verdict, read_results
+from inspector.verdict import Beside, Finding, Missing, Verdict, read_results
 
 
 @pytest.fixture
@@ -118,27 +118,9 @@ def test_what_is_no_result_is_one_line(tmp_path, content, problem):
     assert (status, out, err.count("\n")) == (3, "", 1)
     assert err.startswith(f"inspector: {tmp_path}/a.json: ")
     assert problem in err
-
-
-WHOLE = Verdict(
-    Path("pick-1.npz"),
-    Status.FINDINGS,
-    "general",
-    (
-        Finding(
-            "impact", 1.0, 1.5, 0.9, False,
-            Localisation("measured", "desired", 0.01, (("a", 0.7), ("b", 0.3)), band=(9.0, 30.0)),
-            Order("a", 3.0),
-            Evidence("repetitions", 24.0, 1.1, "a", "velocity", (16.0, 32.0), -20.0),
-        ),
-    ),
-    missing=(Missing("impact", 1.1, 1.3, "the pick"),),
-    beside=Beside(
-        "reference", ("pick",), 3, {"repetitions": 1.0}, {"repetitions": 4.0}, 9.0, {"a": 9.0},
-        failures=(("end of the run", "1.0 of 2.0 s"),), words="100% by 3 repetitions of pick",
-    ),
-    picture=Path("pick.png"),
-)  # fmt: skip
+    (tmp_path / "a.json").unlink()
+    no_results = f"inspector: {tmp_path}: no result of `classify --write json=FILE`\n"
+    assert call("history", tmp_path) == (3, "", no_results)
 
 
 def test_whatever_stands_in_a_result_is_shown_or_refused_in_one_line(tmp_path):
@@ -250,9 +232,3 @@ def test_results_without_a_number_all_count(tmp_path):
         results(tmp_path / f"{name}.json", Verdict(Path("a.npz"), Status.OK))
     found = html.read_history(tmp_path)
     assert (found.notes, set(found.commits)) == ((), names)
-
-
-def test_a_folder_without_results_is_one_line(tmp_path):
-    status, _, err = call("history", tmp_path)
-    assert (status, err.count("\n")) == (3, 1)
-    assert "no result of `classify --write json=FILE`" in err
