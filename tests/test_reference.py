@@ -199,6 +199,20 @@ def test_a_run_longer_than_its_scenario_is_compared_with_it_as_far_as_it_goes(
     assert call("classify", own / "runs" / "pick-9.npz")[0] == 0
 
 
+def test_a_run_that_no_model_tells_is_ok_only_if_nearly_all_of_it_is_compared(own, simulate):
+    (own / "slow").mkdir()
+    for number in range(4):
+        run = nm.decimated(simulate.run("pick", number), 50.0)
+        run.save(own / "slow" / f"pick-{number}.npz")
+    shake = 5.0 + 3.0 * np.sin(40 * np.pi * np.arange(1500) / 50)
+    velocity, known = np.vstack((run.velocity, shake[:, None] * [0, 0, 1, 0])), run.joint_names
+    for count, status in ((300, 0), (1800, 4)):
+        now = nm.Run(time=np.arange(count) / 50, joint_names=known, velocity=velocity[:count])
+        now.save(own / "now.npz", overwrite=True)
+        found, out, _ = call("classify", own / "now.npz", "--reference", own / "slow")
+        assert (found, "cannot tell: logged at 50 Hz" in out) == (status, status == 4), out
+
+
 def test_two_scenarios_with_one_motion_are_told_apart_by_name_or_both_count(own, simulate):
     for number in (1, 2):
         simulate.run("pick", 10 + number, "chatter").save(own / "runs" / f"grab-{number}.npz")

@@ -48,6 +48,8 @@ LOUDER = "louder"  # class of a finding that only the reference shows
 # A run is frozen where it moves at less than a tenth of its references' speed, for half a second,
 # while these make three tenths of their usual speed.
 STOPPED, MOVES, STILL_FOR = 0.1, 0.3, 0.5
+# Share of a run that may be left to a general model that cannot tell, if the run is to be ok.
+LEFT = 0.05
 
 
 @dataclass(frozen=True)
@@ -202,7 +204,7 @@ def beside(
         failures=tuple(_failures(comparison, reference)),
         words="; ".join(filter(None, [*words, *comparison.remarks])),
     )
-    covered = known.shares[Kind.GENERAL] < 1.0
+    covered = known.shares[Kind.GENERAL] <= LEFT
     own = comparison.scenarios[0] if len(comparison.scenarios) == 1 else comparison.run.name
     status = verdict.status
     if any(not each.evidence.excused for each in events):
