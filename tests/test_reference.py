@@ -423,15 +423,24 @@ def test_a_renamed_scenario_is_found_by_its_motion_until_people_rename_it_in_the
     assert not (own / "reference" / "wave.npz").exists()
 
 
-def test_findings_in_what_is_accepted_are_warned_of_and_wanted_from_then_on(own, project):
-    impact = shutil.copytree(project / "impact", own / "now")
-    _, _, err = call("accept", impact, "--only", "place", "--reason", "it has to hit")
-    assert "place-1.npz: impact from 2.50 s to " in err
+@pytest.mark.parametrize("start", [0.0, 100.0])
+def test_findings_in_what_is_accepted_are_warned_of_and_wanted_from_then_on(own, simulate, start):
+    for number, change in enumerate(("", "impact", "impact")):
+        run = simulate.run("place", number, change)
+        path = own / ("now" if number else "later") / f"place-{number}.npz"
+        path.parent.mkdir(exist_ok=True)
+        replace(run, time=run.time + start).save(path)
+    _, _, err = call("accept", own / "now", "--only", "place", "--reason", "it has to hit")
+    assert f"place-1.npz: impact from {start + 2.5:.2f} s to " in err
     assert "is that wanted?" in err
     place = Reference.load(own / "reference").named("place")
     assert [each.label for each in place.wanted] == ["impact"]
     assert place.wanted[0].joints == ("upperarm",)
-    assert call("classify", impact / "place-1.npz")[0] == 0
+    assert place.wanted[0].start == pytest.approx(2.5 - store.TOLERANCE, abs=0.1)
+    toml, label = own / "reference" / "reference.toml", 'class = "impact"\n'
+    toml.write_text(toml.read_text().replace(label, f"{label}required = true\n"))
+    assert call("classify", own / "now" / "place-1.npz")[0] == 0
+    assert f"missing: impact from {start + 2.3:.1f}" in call("classify", own / "later")[1]
 
 
 # --- the store

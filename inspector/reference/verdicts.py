@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cache, partial
-from math import floor
+from math import floor, isfinite
 from pathlib import Path
 
 import numpy as np
@@ -325,13 +325,13 @@ def judge(
         if gate is not None and ruling in FAILING and (filtered := gate.reason(event)):
             ruling, reason = Ruling.FILTERED, filtered
         events.append(replace(event, ruling=ruling, reason=reason))
+    spans = [_span(event, verdict.begin) for event in verdict.events]
     for scenario in scenarios:
-        spans = [_span(event, verdict.begin, scenario) for event in verdict.events]
-        missing += [
-            Missing(each.label or "a finding", each.start, each.stop, each.reason)
-            for each in scenario.wanted
-            if each.required and not any(each.covers(*span) for span in spans)
-        ]
+        for each in scenario.wanted:
+            if each.required and not any(each.covers(*span) for span in spans):
+                when = (round(verdict.begin + at, 6) for at in (each.start, each.stop))
+                start, stop = (at if isfinite(at) else None for at in when)
+                missing.append(Missing(each.label or "a finding", start, stop, each.reason))
     judged = replace(
         verdict,
         events=tuple(events),
@@ -346,10 +346,9 @@ def judge(
     return judged
 
 
-def _span(event: Event, begin: float, scenario: Scenario) -> tuple[str, float, float]:
-    """Class, onset and end of a finding, as if the run began when the scenario does."""
-    late = begin - scenario.repetitions[-1].start
-    return event.label, event.start - late, event.stop - late
+def _span(event: Event, begin: float) -> tuple[str, float, float]:
+    """Class of a finding, and its onset and end from the start of the run."""
+    return event.label, event.start - begin, event.stop - begin
 
 
 def _ruled(
@@ -358,9 +357,8 @@ def _ruled(
     """What becomes of a finding by what the first scenario that is about it waives or wants."""
     if event.evidence.excused:
         return Ruling.AS_REFERENCE, event.evidence.excused
-    joint, level = event.evidence.joint, event.evidence.level_db
+    joint, level, span = event.evidence.joint, event.evidence.level_db, _span(event, begin)
     for scenario in scenarios:
-        span = _span(event, begin, scenario)
         for each in reversed(scenario.waive):
             if each.covers(*span) and each.until is not None:
                 if today <= each.until:
