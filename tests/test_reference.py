@@ -95,8 +95,8 @@ def test_a_harmless_change_passes_an_improvement_is_told_and_a_missing_scenario_
     assert (status, bool(re.search(r"place +MISSING +no log; it had 3\n", out))) == (1, True)
 
 
-def test_a_chatter_is_found_where_it_is_and_nowhere_else(project):
-    status, runs, _ = classified(project / "chatter")
+def test_a_chatter_is_found_where_it_is_and_nowhere_else_whatever_score_a_model_gives(project):
+    status, runs, _ = classified(project / "chatter", "--min-score", "1")
     assert status == 1
     for name, run in runs.items():
         assert bool(run["events"]) == name.startswith("pick"), name

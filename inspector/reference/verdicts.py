@@ -154,11 +154,12 @@ class Gate:
     min_score: float | None = None  # some models have negative ones
     min_duration: float = 0.0  # [s]
 
-    def reason(self, event: Event) -> str:
+    def reason(self, event: Finding) -> str:
         """Say why a finding does not fail a run; empty if it does."""
         if self.classes and event.label not in self.classes:
             return f"not of {', '.join(self.classes)} (--fail-on-class)"
-        if self.min_score is not None and event.score < self.min_score:
+        over = event.evidence.over_db is not None  # known by its level, whatever the model's score
+        if not over and self.min_score is not None and event.score < self.min_score:
             score = floor(event.score * 1e4) / 1e4  # one that is less than 1 is not told as 1
             return f"score {score:g} below {self.min_score:g} (--min-score)"
         duration = event.stop - event.start
