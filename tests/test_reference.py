@@ -271,6 +271,24 @@ def test_a_base_without_joints_and_a_run_of_less_than_a_frame_are_not_accepted(o
     assert call("accept", own / "b.npz", "--reason", "x")[::2] == (3, short)
 
 
+def test_two_robots_have_a_scenario_each_of_one_name_whichever_is_accepted_first(own, simulate):
+    for robot, number in np.ndindex(2, 5):
+        path = own / ("now" if number > 2 else "good") / f"{robot}" / f"pick-{number}.npz"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        renamed(simulate.run("pick", number), f"{robot}.").save(path)
+    both = [own / "good" / "0", own / "good" / "1"]
+    for runs in (both, both[1:], both[:1]):
+        assert call("accept", *runs, "--reason", "x", "-o", own / "both")[0] == 0
+        known = Reference.load(own / "both").scenarios
+        assert {each.name: len(each.repetitions) for each in known} == {"pick": 3, "pick-0": 3}
+    assert classified(own / "now", "--reference", own / "both")[0] == 0
+
+
+def renamed(run, prefix):
+    names = tuple(f"{prefix}{name}" for name in run.joint_names)
+    return replace(run, joint_names=names, desired_joint_names=names)
+
+
 def test_a_reference_counts_in_the_process_that_writes_it(tmp_path, simulate):
     path, written = tmp_path / "pick-1.npz", tmp_path / "reference"
     simulate.run("pick", 1).save(path)

@@ -255,7 +255,7 @@ def accept(
         raise InspectorError(f"{first}: no such file or folder")
     beside = (first if first.is_file() else first.absolute()).parent / store.FOLDER
     folder = output or store.find(first) or beside
-    levels = store.by_motion(store.measured(runs, ctx.obj), store.names_in(folder))
+    levels = store.by_motion(store.measured(runs, ctx.obj), store.kept_in(folder))
     if only:
         levels = [each for each in levels if any(fnmatchcase(each.name, one) for one in only)]
     if not levels:

@@ -11,7 +11,7 @@ import os
 import re
 import zipfile
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import date
@@ -206,19 +206,26 @@ def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Leve
     return found
 
 
-def by_motion(runs: Sequence[Levels], known: Collection[str] = ()) -> list[Levels]:
+def by_motion(runs: Sequence[Levels], known: Iterable[Scenario] = ()) -> list[Levels]:
     """Runs with the names of their scenarios, of which some are known.
 
-    Two motions of one name are two scenarios: the second one has the name of its file.
+    Two motions of one name are two scenarios: the second one has the name of its first file.
     """
-    last: dict[str, Levels] = {}
-    found = []
+    newest = {each.name: each.repetitions[-1] for each in known}
+    motions: dict[str, dict[str, Levels]] = defaultdict(dict)  # of each name, by scenario
+    for name, last in newest.items():
+        match = REPETITION.fullmatch(name)
+        motions[name][name] = motions[match["name"] if match else name][name] = last
+    found: list[Levels] = []
     for run in runs:
-        other = run.apart in known or (
-            run.name in last and share_of_motion(run, last[run.name]) < 0.5
-        )
-        found.append(replace(run, name=run.apart) if other else run)
-        last[found[-1].name] = run
+        own = motions[run.name]
+        names = (run.apart, run.name, *own)
+        same = (each for each in names if each in own and share_of_motion(run, own[each]) >= 0.5)
+        other = run.apart in newest or own.get(run.name) is not newest.get(run.name)
+        # The first run of a name that makes another motion replaces what is known by the name.
+        name = next(same, run.apart if other else run.name)
+        own[name] = run
+        found.append(replace(run, name=name))
     return found
 
 
@@ -244,12 +251,12 @@ def calibrated(scenario: Scenario) -> Scenario:
 # --- accepting
 
 
-def names_in(folder: Path) -> tuple[str, ...]:
-    """Names of the scenarios of a store; none if there is none."""
+def kept_in(folder: Path) -> tuple[Scenario, ...]:
+    """The scenarios of a store; none if there is none."""
     if not os.path.lexists(folder / NAME):
         return ()
     with _alone_in(folder):
-        return tuple(each.name for each in Reference.load(folder).scenarios)
+        return Reference.load(folder).scenarios
 
 
 def accept_into(
@@ -278,7 +285,7 @@ def accept_into(
     with _alone_in(folder):
         there = os.path.lexists(folder / NAME)
         kept = {each.name: each for each in (Reference.load(folder).scenarios if there else ())}
-        named = by_motion(runs, kept)
+        named = by_motion(runs, kept.values())
         wanted = wanted_in(named, events)
         found = of_runs([replace(each, run=_within(each.run, home)) for each in named])
         changes = []
