@@ -119,6 +119,22 @@ def test_runs_are_compared_with_accepted_ones(project, tmp_path, processes):
     assert project(loud)[0] == 0
 
 
+SEEDS = """
+@pytest.mark.parametrize("seed", [1, 0, 2])
+def test_turn(noise, seed):
+    noise.check(run(seed, 0.05 if seed == 1 else 0.0), name="turn")
+"""
+
+
+def test_runs_of_one_name_that_several_tests_accept_are_its_repetitions(project, monkeypatch):
+    assert project(SEEDS, "--noise-accept", "first release")[0] == project(SEEDS)[0] == 0
+    said = "ERROR: --noise-accept: say why the runs are accepted\n\n"
+    assert project(SEEDS, "--noise-accept", " ") == (4, said)
+    monkeypatch.setenv("CI", "true")
+    said = "ERROR: CI=true: a person accepts runs, after review (CI= overrides)\n\n"
+    assert project(SEEDS, "--noise-accept", "more") == (4, said)
+
+
 STRANGE = """
 from dataclasses import replace
 

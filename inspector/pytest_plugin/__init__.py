@@ -3,6 +3,7 @@
 Every run of pytest imports this module: it imports nothing that takes long.
 """
 
+import os
 from typing import TYPE_CHECKING
 
 import pytest
@@ -25,6 +26,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="append",
         help="classify by this model only: a file, or the name of a shipped one; repeatable",
     )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse to accept runs without a reason, or where no person does."""
+    reason = config.getoption("--noise-accept")
+    if reason is not None and not reason.strip():
+        raise pytest.UsageError("--noise-accept: say why the runs are accepted")
+    if reason and os.environ.get("CI", "").lower() in ("true", "1"):
+        raise pytest.UsageError("CI=true: a person accepts runs, after review (CI= overrides)")
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from inspector.errors import Status
 from inspector.library import Library, load_library
 from inspector.reference import store
 from inspector.reference.judging import Comparison, Expected
-from inspector.reference.levels import levels
+from inspector.reference.levels import Levels, levels
 from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, classes_found, judge
 from inspector.report.formats import told
@@ -32,6 +32,7 @@ from noisemodel import Run
 # A class of findings; or a class, and from when to when, in [s].
 Allowed: TypeAlias = str | tuple[str, float, float]
 Given: TypeAlias = Run | str | Path
+Events: TypeAlias = tuple[Finding, ...]
 ARTEFACTS = "noise-artefacts"  # folder below rootdir with recordings and pictures of failures
 LONGEST = 120  # most characters of a file name that a test's name may take
 # Node ids that a file name tells apart: what are folders, classes, test and parameters is seen.
@@ -39,6 +40,8 @@ PLAIN = re.compile(
     r"(\w+/)*\w+\.py(::[A-Z]\w*)*::[a-z_]\w*(\[[A-Za-z_]\w*(-[A-Za-z_]\w*)*\])?", re.ASCII
 )
 LIBRARY = pytest.StashKey[Library]()  # the models, read once per process
+# Runs that were accepted in this process, and their findings, by store and scenario.
+ACCEPTED = pytest.StashKey[dict[tuple[Path, str], tuple[list[Levels], dict[str, Events]]]]()
 
 
 class Noise:
@@ -120,12 +123,13 @@ class Noise:
     def _accept(
         self, runs: Sequence[tuple[Run, Given]], scenario: str, reason: str, accepted: Path
     ) -> None:
-        """Accept runs as repetitions of a scenario; another test process may do so, too."""
-        found, events = [], {}
-        for place, (run, source) in enumerate(runs, 1):
+        """Accept runs as repetitions of a scenario, with those that other tests accepted before."""
+        session = self._config.stash.setdefault(ACCEPTED, {})
+        found, events = session.setdefault((accepted.resolve(), scenario), ([], {}))
+        for place, (run, source) in enumerate(runs, len(found) + 1):
             file = str(source) if source is not run else f"{self._node.nodeid} {place}"
             analysis, verdict, _ = self._judged(run, scenario)
-            digest = store.digest(run)
+            digest = hashlib.sha256(run.velocity.tobytes()).hexdigest()
             found.append(levels(analysis.run, name=scenario, file=file, sha256=digest))
             events[file] = verdict.events
         store.accept_into(accepted, found, events=events, reason=reason, by=store.who())
