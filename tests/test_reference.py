@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -406,6 +407,18 @@ def test_runs_like_the_accepted_ones_join_them_and_the_newest_ten_stay(own, simu
     (pick, *_) = Reference.load(own / "reference").scenarios
     assert [Path(each.run).stem for each in pick.repetitions][-1] == "pick-12"
     assert len(pick.repetitions) == 10
+
+
+def test_a_file_that_is_read_in_another_way_takes_the_place_of_what_it_was(tmp_path, simulate):
+    run = simulate.run("pick", 1)
+    for read in (run, replace(run, velocity=2 * run.velocity), renamed(run, "left-")):
+        now = levels(read, name="level-1", file="pick-1.csv", sha256="of the file")
+        accept = partial(store.accept_into, tmp_path / "reference", [now], reason="x", by="")
+        assert "unchanged" not in accept(events={})[1][0][1]
+        assert accept(events={})[1] == [("level-1", "unchanged, these runs are accepted already")]
+        (kept,) = Reference.load(tmp_path / "reference").scenarios[0].repetitions
+        assert kept.joints == now.joints
+        np.testing.assert_allclose(kept.level, now.level, atol=0.5)
 
 
 def test_what_cannot_be_accepted_leaves_the_store_as_it_was(own, monkeypatch):

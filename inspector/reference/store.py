@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import date
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,7 @@ from inspector.reference.levels import (
     HOP,
     LEAST_DB,
     SIGNALS,
+    STEP_DB,
     Levels,
     decoded,
     encoded,
@@ -328,13 +329,14 @@ def _within(run: str, home: Path) -> str:
 
 def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Scenario, str]:
     """An accepted scenario with new runs, which join its repetitions or replace them, in words."""
-    known = {each.sha256 for each in old.repetitions if each.sha256}
-    fresh = [each for each in new.repetitions if each.sha256 not in known]
+    fresh = [run for run in new.repetitions if not any(_same(run, e) for e in old.repetitions)]
+    again = {each.sha256 for each in fresh if each.sha256}  # files that are read in another way
+    kept = [each for each in old.repetitions if each.sha256 not in again]
     if not fresh:
         return old, "unchanged, these runs are accepted already"
     over, margin = [compare(each, (old,)) for each in fresh], margin_of(old.scores_db).db
     same = all(not e.exceedances and e.repetitions and e.quieter <= margin for e in over)
-    repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
+    repetitions = (*kept, *fresh)[-NEWEST:] if same else new.repetitions
     # What people wrote stays; what an earlier `accept` heard does not.
     by_hand = (e for e in old.wanted if e.required or e.reason or e.loudest_db is None)
     own = {**facts, "wanted": old.wanted if same else (*by_hand, *facts["wanted"])}
@@ -345,6 +347,14 @@ def _updated(old: Scenario, new: Scenario, facts: Mapping[str, Any]) -> tuple[Sc
     if not any(set(each.joints) & set(old.repetitions[-1].joints) for each in fresh):
         told = ", of a robot with other joints"
     return changed, f"{words}{told}, {len(repetitions)} kept"
+
+
+def _same(run: Levels, accepted: Levels) -> bool:
+    """Whether runs are one: with the same joints, motion and levels, but for rounding."""
+    one, two = ((e.robot, e.joints, e.guided_by, e.level.shape) for e in (run, accepted))
+    close = partial(np.allclose, rtol=0.0, equal_nan=True)
+    alike = one == two and close(decoded(encoded(run.level)), accepted.level, atol=STEP_DB)
+    return bool(alike and close(run.guide, accepted.guide, atol=1e-3))
 
 
 def wanted_in(
@@ -368,11 +378,6 @@ def wanted_in(
             loudest = round(max(top for *_, top in own), 1)
             found[name].append(Expected(label, round(start, 2), round(stop, 2), joints, loudest))
     return found
-
-
-def digest(run: Run) -> str:
-    """SHA-256 of a run that is no file: of its velocities."""
-    return hashlib.sha256(np.asarray(run.velocity).tobytes()).hexdigest()
 
 
 def who() -> str:
