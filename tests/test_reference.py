@@ -242,21 +242,25 @@ def test_two_motions_of_one_name_are_two_scenarios_from_then_on(own, simulate):
     assert len(Reference.load(own / "reference").named("pick").repetitions) == 3
 
 
-def test_a_reference_of_another_robot_is_told_and_the_general_model_decides(own, simulate):
-    names = tuple(f"joint{number}" for number in range(4))
-    run = replace(simulate.run("pick", 9), joint_names=names, desired_joint_names=names)
-    run.save(own / "pick-1.npz")
-    status, out, _ = call("classify", own / "pick-1.npz", "--reference", own / "reference")
-    assert status == 0
-    there, here = "shoulder, upperarm, elbow", "joint0, joint1, joint2"
+@pytest.mark.parametrize(("name", "fails"), [("other", 0), ("pick", 1)])
+def test_a_reference_of_another_robot_is_told_and_fails_runs_of_its_scenarios(
+    own, simulate, name, fails
+):
+    path = own / f"{name}-1.npz"
+    renamed(simulate.run("pick", 9), "joint-").save(path)
+    status, out, _ = call("classify", path, "--reference", own / "reference")
+    lacks = "robot of pick (required: the run has its name, and other joints or another robot)"
+    assert (status, f"missing: {lacks}" in out) == (fails, bool(fails))
+    there, here = "shoulder, upperarm, elbow", "joint-shoulder, joint-upperarm, joint-elbow"
     told = f"no reference: it is of a robot with joints {there}, and the run of a robot with joints"
     assert f"{told} {here}" in out
-    pair = own / "runs" / "pick-1.npz", own / "pick-1.npz"
+    pair = own / "runs" / "pick-1.npz", path
     status, out, err = call("diff", *pair, "--report", own / "page")
     assert (status, err, f"{told} {here}" in out) == (4, "", True)
     assert not (own / "page" / "worst.png").exists()
-    out = call("accept", own / "pick-1.npz", "--reason", "x", "-o", own / "reference")[1]
-    assert "pick: 1 repetition replace the accepted, of a robot with other joints" in out
+    out = call("accept", path, "--reason", "x", "-o", own / "reference")[1]
+    replaced = "pick: 1 repetition replace the accepted, of a robot with other joints"
+    assert (replaced if fails else "other: new") in out
 
 
 def test_a_base_without_joints_and_a_run_of_less_than_a_frame_are_not_accepted(own):
@@ -534,7 +538,6 @@ def test_a_store_of_a_later_version_is_one_line_for_every_command(own, command, 
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("reference/1", "reference/2", "of format 'noise-reference/2'"),
         ("robot", "robto", "no 'robto'; there are name"),
         ('levels = "pick', 'levels = "../pick', "name of an .npz"),
         ("rate_hz = 1000.0", "rate_hz = -1", "expected a rate"),

@@ -280,6 +280,8 @@ def _failures(comparison: Comparison, reference: Reference) -> Iterable[tuple[st
     known = [reference.named(name) for name in comparison.scenarios] or [own]
     scenarios = [each for each in known if each is not None and robot_fits(run, each)]
     if not scenarios:
+        if own is not None:
+            yield f"robot of {own.name}", "the run has its name, and other joints or another robot"
         return
     shortest = min(each.duration[0] for each in scenarios)
     names = " and ".join(each.name for each in scenarios)
