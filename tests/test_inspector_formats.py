@@ -129,15 +129,20 @@ def test_repetitions_are_one_row_and_failures_come_first():
     assert junit(pick).count("<testcase ") == 4
 
 
-def test_findings_of_repetitions_are_apart_by_class_time_and_ruling():
-    far, other = replace(BLOW, start=1.3), replace(BLOW, label="velocityjump")
-    one, two = repetitions("a", 2, BLOW), [far, other]
-    for event in two:
+def test_findings_of_repetitions_are_apart_by_class_joint_octave_time_and_ruling():
+    known = [
+        Evidence("repetitions", 9.0, 1.1, "a", "velocity", (8 * k, 16 * k)) for k in (1.0, 2.0)
+    ]
+    blow, high = (replace(BLOW, evidence=each) for each in known)
+    elsewhere = replace(blow, evidence=replace(known[0], joint="b"))
+    one = repetitions("a", 2, blow)
+    assert text(one).count("2 of 2 runs") == 1
+    for event in (replace(blow, start=1.3), replace(blow, label="louder"), high, elsewhere):
         pair = [one[0], replace(one[1], events=(event,))]
         assert text(pair).count("1 of 2 runs") == 2
-    ruled = replace(one[1], events=(replace(BLOW, ruling=Ruling.EXPIRED, reason="never"),))
+    ruled = replace(one[1], events=(replace(blow, ruling=Ruling.EXPIRED, reason="never"),))
     assert text([one[0], ruled]).count("1 of 2 runs") == 2
-    twice = replace(one[0], events=(BLOW, replace(BLOW, start=1.1)))
+    twice = replace(one[0], events=(blow, replace(blow, start=1.1)))
     assert text([twice, one[1]]).count("impact") == 2
 
 

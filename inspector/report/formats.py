@@ -346,26 +346,22 @@ def folded(
     """Findings by run: of those that are one the loudest, and how many of so many runs have it."""
     if runs == 1:  # findings of one run are never one
         return [(event, beside, "") for _, event, beside in found]
-    groups: list[list[tuple[Path, Finding, Beside | None]]] = []
+    groups: list[tuple[object, list[tuple[Path, Finding, Beside | None]]]] = []
     for each in found:
         run, event, _ = each
-        for group in groups:
-            path, other, _ = group[0]
-            joint = event.evidence.joint
-            same = event.label == other.label or joint == other.evidence.joint is not None
-            near = abs(event.start - other.start) <= TOGETHER
-            if same and near and run != path and event.became == other.became:
+        kind = event.label, event.evidence.joint, event.evidence.band_hz, event.became
+        for of, group in groups:
+            near = abs(event.start - group[0][1].start) <= TOGETHER
+            if of == kind and near and run != group[0][0]:
                 group.append(each)
                 break
         else:
-            groups.append([each])
+            groups.append((kind, [each]))
     result = []
-    for group in groups:
-        (label, _), *_ = Counter(event.label for _, event, _ in group).most_common(1)
-        named = [each[1:] for each in group if each[1].label == label]
-        worst = max(named, key=lambda each: (each[0].evidence.over_db or 0.0, each[0].score))
+    for _, group in groups:
+        worst = max(group, key=lambda each: (each[1].evidence.over_db or 0.0, each[1].score))
         number = len({run for run, *_ in group})
-        result.append((*worst, f"{number} of {counted(runs, 'run')}"))
+        result.append((*worst[1:], f"{number} of {counted(runs, 'run')}"))
     return result
 
 
