@@ -175,6 +175,8 @@ class _Command(_Taking, TyperCommand):
             paths = value if isinstance(value, list) else [value]
             if name == "robot" and isinstance(value, str):
                 paths = [Path(value)]
+            if name == "runs":  # of folders, commands name the logs: outputs may lie beside these
+                paths = [each for each in paths if each and not each.is_dir()]
             files[name in OUTPUTS] += [each for each in paths if isinstance(each, Path)]
         if self.added:
             ctx.obj = self.reading.callback(**{x.name: ctx.params.pop(x.name) for x in self.added})

@@ -91,7 +91,7 @@ def test_a_run_whose_picture_is_gone_is_done_again(tmp_path):
 
 @pytest.mark.slow
 def test_only_what_changed_is_done_again(runs, tmp_path):
-    state = tmp_path / "state.jsonl"
+    state = runs / "state.jsonl"  # beside the logs
     first = call("classify", runs, "--format", "json", "--resume", state)[1]
     again = call("classify", runs, "--format", "json", "--resume", state)[1]
     assert again == first
