@@ -125,6 +125,8 @@ def _coerce(checked: Callable[[], Any], value: Any, *, param: Any, ctx: Any) -> 
     many = param.multiple or param.nargs == -1
     if value is None or value is param.default:
         return () if value is None and many else value
+    if many and isinstance(value, str):  # of a file of settings
+        value = [value]
     paths = many and param.type_descriptor.annotation == list[Path]
     if paths and all(isinstance(each, str) and os.access(each, os.R_OK) for each in value):
         return list(map(Path, value))

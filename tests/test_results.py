@@ -36,7 +36,7 @@ def test_settings_hold_for_commands_and_the_command_line_wins(project):
     (project / "inspector.toml").write_text(
         'map = ["velocity.elbow=elbow"]\nrate = 90.0\n'
         '[audit]\nformat = "json"\n'
-        '[classify]\nruns = ["log.csv"]\nmin-duration = 0.5\n'
+        '[classify]\nruns = "log.csv"\nmin-duration = 0.5\nfail-on-class = "impact"\n'
     )
     _, out, err = call("audit", "../log.csv")
     assert json.loads(out), err
