@@ -124,8 +124,9 @@ class Noise:
         self, runs: Sequence[tuple[Run, Given]], scenario: str, reason: str, accepted: Path
     ) -> None:
         """Accept runs as repetitions of a scenario, with those that other tests accepted before."""
-        session = self._config.stash.setdefault(ACCEPTED, {})
-        found, events = session.setdefault((accepted.resolve(), scenario), ([], {}))
+        session, key = self._config.stash.setdefault(ACCEPTED, {}), (accepted.resolve(), scenario)
+        earlier, events = session.get(key, ([], {}))
+        found = [*earlier]
         for place, (run, source) in enumerate(runs, len(found) + 1):
             file = str(source) if source is not run else f"{self._node.nodeid} {place}"
             analysis, verdict, _ = self._judged(run, scenario)
@@ -133,6 +134,7 @@ class Noise:
             found.append(levels(analysis.run, name=scenario, file=file, sha256=digest))
             events[file] = verdict.events
         store.accept_into(accepted, found, events=events, reason=reason, by=store.who())
+        session[key] = found, events  # what cannot be accepted stands in no other test's way
 
     def _allowed(self, allow: str | Iterable[Allowed]) -> tuple[Allowed, ...]:
         """What may be there, of classes that there are."""

@@ -256,8 +256,8 @@ def kept_in(folder: Path) -> tuple[Scenario, ...]:
     """The scenarios of a store; none if there is none."""
     if not os.path.lexists(folder / NAME):
         return ()
-    with _alone_in(folder):
-        return Reference.load(folder).scenarios
+    with _alone_in(folder) as scenarios:
+        return scenarios
 
 
 def accept_into(
@@ -283,9 +283,8 @@ def accept_into(
         if not len(each.guide):
             problem = f"{each.duration:.3g} s is too short, a reference needs {BINS * HOP:g} s"
             raise InspectorError(f"{each.run}: {problem}")
-    with _alone_in(folder):
-        there = os.path.lexists(folder / NAME)
-        kept = {each.name: each for each in (Reference.load(folder).scenarios if there else ())}
+    with _alone_in(folder) as scenarios:
+        kept = {each.name: each for each in scenarios}
         named = by_motion(runs, kept.values())
         wanted = wanted_in(named, events)
         found = of_runs([replace(each, run=_within(each.run, home)) for each in named])
@@ -306,8 +305,8 @@ def accept_into(
 
 
 @contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """Make a folder, and accept into it while nobody else does."""
+def _alone_in(folder: Path) -> Iterator[tuple[Scenario, ...]]:
+    """Make a folder, and accept into it while nobody else does; the scenarios that it has."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         held = os.open(folder, os.O_RDONLY)
@@ -316,7 +315,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
     try:
         with suppress(OSError):  # a file system without locks
             fcntl.flock(held, fcntl.LOCK_EX)
-        yield
+        yield Reference.load(folder).scenarios if os.path.lexists(folder / NAME) else ()
     finally:
         os.close(held)
 
