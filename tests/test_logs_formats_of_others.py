@@ -433,7 +433,8 @@ def test_the_desired_log_of_one_in_degrees_is_in_degrees(tmp_path):
     "column",
     ["actual_TCP_speed_0", "base_velocity", "x_velocity", "ee_pos_0", "q_current_0", "ddq1",
      "joint_acc_1", "field.position_covariance0", "speed_scaling", "joint1_target",
-     "left_1_target_joint_vel", "position"],
+     "left_1_target_joint_vel", "position", "imu.velocity", "tcp.velocity", "base.velocity",
+     "object.position", "motor_cmd[0].q", "motorCmd[0].q", "axis0.controller.input_pos"],
 )  # fmt: skip
 def test_what_is_no_joints_motion_is_not_read(tmp_path, column):
     path = tmp_path / "log.csv"

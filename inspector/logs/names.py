@@ -62,7 +62,7 @@ QUANTITIES = {
 }
 DESIRED = (
     r"desired|des|reference|ref|targets?|commanded|commands?|cmd|cmptd|set_?points?|sp|goal"
-    r"|demand(?:ed)?|planned|soll|set|nominal|traj(?:ectory)?|tgt|requested|expected"
+    r"|demand(?:ed)?|planned|soll|set|nominal|traj(?:ectory)?|tgt|requested|expected|actions?"
 )
 MEASURED = r"actual|act|feedback|fbk|measured|meas|msr|present|ist"
 JOINT_WORD = r"joints?|dof|motor|axis|actuator"
@@ -74,7 +74,8 @@ WITHIN = rf"(?:(?P<within>{DESIRED}|{MEASURED}){GAP})?"
 AFTER = rf"(?:{GAP}?(?P<after>{DESIRED}|{MEASURED}|(?<=_)d)(?![a-z]))?"
 LAST = rf"(?:{GAP}?(?P<last>{DESIRED}|{MEASURED}|(?<=_)d))?"
 WORD = rf"(?:(?:{JOINT_WORD}){GAP}?)?"
-RECORD = r"(?:.*?/)??(?:(?:field|state|robot_?state|joint_?states?|msg|data|robot)[._])?"
+RECORDS = r"field|(?:observation\.)?state|robot_?state|joint_?states?|msg|data|robot"
+RECORD = rf"(?:.*?/)??(?:(?:{RECORDS})[._])?"
 NUMBER = r"(?:\[(?P<index>\d+)\]|\((?P<round>\d+)\)|(?P<number>\d+))"
 LIMB = r"(?P<joint>(?:left|right|l|r|arm|leg|hand)\d*(?:_(?:left|right|arm|leg|hand)\d*)?)"
 WHOSE = rf"(?:(?:output|shaft|rotor|encoder|angular|motor|joint){GAP})?"
@@ -106,12 +107,12 @@ PATTERNS = (
 NOT_JOINTS = (
     rf"(?:.*{GAP})?(?:tcp|eef?|end_?effector|cartesian|cart|linear|angular|lin|ang|com|imu|odom|gps"
     rf"|gravity|friction|external|ext|contact|inertia|bias|residual|disturbance|limits?)"
-    rf"(?:{GAP}.*)?|base|root|body|tool|object|robot|x|y|z|roll|pitch|yaw|wind"
-    rf"|(?:.*{GAP})?(?:max|min|mean)"
+    rf"(?:{GAP}.*)?|base|root|body|tool|object|wind|(?:.*{GAP})?(?:max|min|mean)"
 )
+AXES = r"x|y|z|roll|pitch|yaw"  # of a pose, but joints in ``x.velocity``
 # Names of what a controller computes: ``/state/error/positions[0]``, ``PositionError1``.
 NOT_MOTION = (
-    r"(?:.*[/._ ])?(?:errors?|err)(?:[/._ \[(].*)?|(?:.*/)?output/.*"
+    r"(?:.*[/._ ])?(?:errors?|err)(?:[/._ \[(].*)?|(?:.*/)?output/.*|(?:.*\.)?controller\.input_.*"
     r"|.*(?-i:(?<=[a-z0-9])E(?:rr|rror)s?)[_\[(]?\d*[\])]?"
 )
 # ``joint1``, ``J1``, ``axis 1``: names that number the joints.
@@ -254,32 +255,32 @@ def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
         return naming.bare[column]
     name, unit = without_unit(column)
     match = _match(name if unit in UNITS else column.strip())
-    if match is None:
-        return (UNITS[unit][0], name) if unit in UNITS and _fits(GENERIC, name) else None
+    if match is None:  # ``J1 [deg]``, ``J1_cmd [deg]``
+        form = rf"(?P<joint>{GENERIC})(?:{GAP}(?P<after>{DESIRED}))?"
+        alone = _fits(form, name) if unit in UNITS else None
+        what = f"{UNITS[unit][0]}{'_desired' * bool(alone['after'])}" if alone else ""
+        return (what, alone["joint"]) if alone and what in JOINT_SIGNALS else None
     found = match.groupdict()
     joint: str | int = found.get("joint") or ""
     number = found.get("index") or found.get("round") or found.get("number")
     if number is not None:
         joint = f"{joint}_{number}" if joint else int(number)
-    # A word for desired motion within a joint's name: no set point is read as a measured signal.
-    if match.re.pattern != FIRST and any(map(_is_desired, re.split(GAP, str(joint)))):
-        return None
     signal = _signal(match, naming, name)
     if not signal or joint == "" or not signal.startswith(UNITS.get(unit, (signal, 1.0))[0]):
         return None
     return signal, joint
 
 
-def array_signal(name: str) -> str | None:
+def array_signal(name: str, naming: Naming | None = None) -> str | None:
     """Signal of an array by its name, without the folders in it; None for an unknown name."""
     whole = without_unit(name)[0]
-    bare = whole.rpartition("/")[2].lower()
-    if bare in SIGNALS:
-        return bare
+    place, _, bare = whole.rpartition("/")
+    if bare.lower() in BASE_SIGNALS:
+        return bare.lower()
     if len(name) > LONGEST or _fits(NOT_MOTION, whole):
         return None
-    match = _fits(WHOLE, bare)
-    return _signal(match, Naming(), name) if match else None
+    match = None if _fits(NOT_JOINTS, place.rpartition("/")[2]) else _fits(WHOLE, bare)
+    return _signal(match, naming or Naming(), name) if match else None
 
 
 def number_of(joint: str | int) -> int | None:
@@ -317,12 +318,15 @@ def _match(name: str) -> re.Match[str] | None:
     """Match of the first pattern that fits a name, unless it tells of no joint's motion."""
     if not any(hint in name.lower() for hint in HINTS) or _fits(NOT_MOTION, name):
         return None
-    found = next(filter(None, (_fits(each, name) for each in PATTERNS)), None)
-    if found is None or found.re.pattern == FIRST:
-        return found
-    joint = found.groupdict().get("joint")
-    side = rf"(?:(?:{DESIRED}|{MEASURED}){GAP}?)+"
-    return None if joint and (_fits(NOT_JOINTS, joint) or _fits(side, joint)) else found
+    for found in filter(None, (_fits(each, name) for each in PATTERNS)):
+        joint = found.groupdict().get("joint") or ""
+        none = f"{NOT_JOINTS}|{RECORDS}" + f"|{AXES}" * (found.re.pattern != FIRST)
+        words = re.split(r"[^A-Za-z]+|(?<=[a-z0-9])(?=[A-Z])", joint)  # of ``motorCmd[0]``
+        # No set point is read as a measured signal; `target.velocity` fits another pattern, too.
+        sided = any(map(_is_desired, words)) or _fits(MEASURED, words[-1])
+        if not sided and not (joint and _fits(none, joint)):
+            return found
+    return None
 
 
 def _signal(match: re.Match[str], naming: Naming, name: str) -> str | None:
