@@ -156,7 +156,7 @@ class CsvReader:
                 continue
             kind, joint = meaning
             if not isinstance(joint, str):
-                number = joint - naming.first
+                number = joint - min(naming.first, 1)
                 if names and number >= len(names):
                     problem = f"column {column!r} is joint {number + 1}"
                     raise LiveError(f"{problem}, and --names has {len(names)}")

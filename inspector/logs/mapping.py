@@ -602,9 +602,9 @@ def _by_name(
     for each in fields:
         signal, joint = columns.get(each) or (each.signal or array_signal(each.name), "")
         number = number_of(joint)
-        if number is not None and joint not in joints and 0 <= number - naming.first < len(joints):
-            joint = joints[number - naming.first]
-        elif isinstance(joint, int):
+        if number is not None and joints and joint not in joints:
+            joint = _joint_of(log.path, each.name, number, naming.first, joints) or joint
+        if isinstance(joint, int):
             joint = numbered.get(joint, f"joint_{joint}")
         unnamed = not joint and _is_column(each) and signal in JOINT_SIGNALS and not naming.alone
         if signal and signal != COMMAND and not unnamed:
@@ -612,6 +612,19 @@ def _by_name(
 
 
 def _columns(
+def _joint_of(
+    path: Path, column: str, number: int, first: int, joints: Sequence[str]
+) -> str | None:
+    """Joint of a robot that a number stands for: in order from 0 or 1 on, else by its own name."""
+    if first < 2:
+        return joints[number - first] if 0 <= number - first < len(joints) else None
+    for joint in joints[number - 1 : number + 1]:
+        if re.search(rf"(?<!\d){number}$", joint):
+            return joint
+    problem = f"the columns' numbers begin with {first}, so {column!r} may be any joint"
+    raise LogError(path, f"{problem}; name it: --map SIGNAL.JOINT={column}, of {listed(joints)}")
+
+
     log: Log, first: _Choice, width: int, options: ReadOptions, joints: Sequence[str]
 ) -> Iterator[_Choice]:
     """Columns of a field: of one joint, of the base with its convention, or one for each joint."""

@@ -143,7 +143,7 @@ SIDES = ("before", "within", "after", "last")  # parts of a name that tell wheth
 class Naming(NamedTuple):
     """How the columns of one log are named, where single names leave it open."""
 
-    first: int = 0  # number of the first joint
+    first: int = 0  # lowest number of a joint
     qd_is_desired: bool = False  # whether `qd` is the desired position, since `dq` is the velocity
     bare: Mapping[str, Meaning] = {}  # of columns that name a joint alone
     remark: str = ""  # what was decided about these, a sentence; empty if nothing
@@ -160,6 +160,7 @@ class Naming(NamedTuple):
             number
             for column, (_, joint) in known.items()
             if (number := number_of(joint)) is not None
+            and joint not in joints
             and not without_unit(column)[0].endswith("]")
         }
         matches = filter(None, (_match(without_unit(column)[0]) for column in columns))
@@ -167,7 +168,7 @@ class Naming(NamedTuple):
         moves = any(signal.startswith(("position", "velocity")) for signal, _ in known.values())
         is_pose = {"x", "y"} <= {column.lower() for column in columns}  # beside x, y, an angle
         return cls(
-            first=int(min(numbers, default=0) == 1),
+            first=min(numbers, default=0),
             qd_is_desired={"dq", "qd"} <= words,
             bare=bare,
             remark=remark,
