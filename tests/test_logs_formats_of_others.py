@@ -119,7 +119,10 @@ ROSTOPIC = (
     + each_of(*(f"field.{each}#" for each in (P, V, E)))
 )
 FRANKA = "time, success_rate, " + each_of(
-    *(f"state.{each}[#]" for each in ("q", "q_d", "dq", "dq_d", "tau_J")), "cmd.q_d[#]", mark=", "
+    *(f"state.{each}[#]" for each in ("q", "q_d", "dq", "dq_d", "tau_J")),
+    "cmd.q_d[#]",
+    "state.theta[#]",
+    mark=", ",
 )
 RTDE = each_of("target_q_#", "target_qd_#", "target_moment_#", "actual_q_#", "actual_qd_#")
 UNREAD = "{} not read: {}"
@@ -168,10 +171,11 @@ FORMATS = (
     Format(
         "libfranka, logToCSV",
         "time, success_rate, state.q[0], state.dq[0], state.dq_d[0], cmd.q_d[0]",
-        table(FRANKA, (P, PD, V, VD, E, E), stamp=ticks(1e3, 42), cells=("1.0",)),
+        table(FRANKA, (P, PD, V, VD, E, E, E), stamp=ticks(1e3, 42), cells=("1.0",)),
         (P, V, PD, VD, E), FROM_0,
         ("stamps are in milliseconds",
-         UNREAD.format("3 columns", "success_rate, cmd.q_d[0], cmd.q_d[1]"),
+         UNREAD.format("5 columns", "success_rate, cmd.q_d[0], cmd.q_d[1], state.theta[0],"
+                       " state.theta[1]"),
          "time starts at 0; the first stamp, 42 s, is in meta"),
     ),
     Format(

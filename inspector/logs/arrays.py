@@ -46,7 +46,7 @@ from inspector.logs.names import (
     array_signal,
     column_signal,
     listed,
-    says_twice,
+    rank_of,
 )
 from noisemodel import Run, RunError, runfile
 from noisemodel.run import check_time
@@ -145,7 +145,7 @@ def log_of(
             signal=what if what in (*SIGNALS, COMMAND) and name not in columns else "",
             source=path.name,
             # The second of two sides is a command beside the desired motion: ``cmd.q_d[0]``.
-            rank=0 if STATES.fullmatch(name) or name not in every else 1 + says_twice(name),
+            rank=0 if STATES.fullmatch(name) or name not in every else 1 + rank_of(name),
         )
         for name, what in roles.items()
         if len(arrays[name]) == samples and name != time

@@ -292,10 +292,15 @@ def number_of(joint: str | int) -> int | None:
     return int(match["number"]) if match else None
 
 
-def says_twice(column: str) -> bool:
-    """Whether a name says twice that it is desired: ``cmd.q_d[0]``, beside what is followed."""
+def rank_of(column: str) -> int:
+    """How far a column is behind others of its signal.
+
+    So are a motor's side (``theta``, beside ``q``), and a name that says twice that it is desired:
+    ``cmd.q_d[0]``, beside what is followed.
+    """
     match = _match(without_unit(column)[0])
-    return match is not None and sum(map(bool, _sides(match))) > 1
+    twice = match is not None and sum(map(bool, _sides(match))) > 1
+    return twice + bool(re.search("theta|joint_motor_", column.lower()))
 
 
 def time_column(names: Sequence[str]) -> str:
