@@ -96,7 +96,11 @@ def test_isaacs_arrays_are_recognised_and_its_root_is_mapped(tmp_path):
 
 @pytest.mark.parametrize(
     "names",
-    [("q", "dq", "q_d", "dq_d"), ("positions", "velocities", "desired_positions", "target_qd")],
+    [
+        ("q", "dq", "q_d", "dq_d"),
+        ("q", "dq", "qd", "dq_d"),
+        ("positions", "velocities", "desired_positions", "target_qd"),
+    ],
 )
 def test_arrays_are_known_by_symbols_and_words(tmp_path, names):
     signals = [numbers(seed=seed) for seed in range(4)]

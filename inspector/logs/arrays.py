@@ -128,6 +128,9 @@ def log_of(
     columns = {n for n, what in named.items() if what or array_signal(n)}  # that say what they hold
     arrays = _gathered(arrays, {entry.source for entry in options.entries})
     roles = _roles(arrays, mapped, named)
+    last = {name: name.rpartition("/")[2].lower() for name in roles}
+    if {"dq", "qd"} <= {*last.values()}:  # as of columns
+        roles |= {name: "position_desired" for name in roles if last[name] == "qd"}
     motion = [name for name, what in roles.items() if what in MOTION or name in mapped]
     if not motion:
         raise _nothing(path, every, not_read)

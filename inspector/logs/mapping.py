@@ -600,7 +600,7 @@ def _by_name(
     named = [joint for _, joint in columns.values() if isinstance(joint, str)]
     numbered = {number_of(joint): joint for joint in reversed(named)}
     for each in fields:
-        signal, joint = columns.get(each) or (each.signal or array_signal(each.name), "")
+        signal, joint = columns.get(each) or (each.signal or array_signal(each.name, naming), "")
         number = number_of(joint)
         if number is not None and joints and joint not in joints:
             joint = _joint_of(log.path, each.name, number, naming.first, joints) or joint
