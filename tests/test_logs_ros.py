@@ -77,6 +77,14 @@ def test_the_order_of_the_joints_may_change_from_message_to_message(tmp_path):
     assert np.array_equal(run.velocity[:, order], VELOCITY)
 
 
+def test_messages_that_lack_velocities_are_a_gap(tmp_path):
+    bare = joint_states(TALK, TIMES[:3], position=POSITION, effort=EFFORT)
+    imported = read_log(bag(tmp_path, {"/joint_states": bare + states()[3:]}))
+    assert np.array_equal(np.flatnonzero(~imported.run.mask), [0, 1, 2])
+    assert np.array_equal(imported.run.velocity[3:], VELOCITY[3:])
+    assert "3 samples without a number" in imported.remarks[0]
+
+
 def test_an_arm_and_a_gripper_may_share_a_topic(tmp_path):
     arm = states()
     gripper = joint_states(

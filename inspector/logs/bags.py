@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cache
 from io import BytesIO
+from math import nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO, TypeAlias, TypeVar
@@ -126,10 +127,10 @@ def _row(kind: str, message: Any) -> tuple[tuple[str, ...], Mapping[str, Any]]:
 
 @dataclass
 class Group:
-    """Messages about one set of joints, as rows of float64 numbers."""
+    """Messages about one set of joints, as rows of float64 numbers, nan where one lacks them."""
 
     joints: tuple[str, ...]  # in the order of the first message; none of a base
-    arrays: dict[str, "array[float]"]  # row after row
+    arrays: dict[str, "array[float]"] = field(default_factory=dict)  # row after row
     logged: "array[int]" = field(default_factory=lambda: array("q"))  # in the headers, in [ns]
     received: "array[int]" = field(default_factory=lambda: array("q"))  # by the recorder
 
@@ -146,7 +147,7 @@ class Topic:
     ros1: bool = False  # whether messages are serialised in the format of ROS 1
     count: int = 0  # of its messages
     versions: Sequence[str] = STATES  # definitions of a controller's state that may be its own
-    groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = field(default_factory=dict)
+    groups: dict[frozenset[str], Group] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"{self.name} ({self.type})"
@@ -161,16 +162,20 @@ class Topic:
             for name, numbers in found.items()
             if self.type == ODOMETRY or len(numbers) == len(joints) > 0
         }
-        key = frozenset(joints), tuple(rows)
-        if key not in self.groups:
-            self.groups[key] = Group(joints, {name: array("d") for name in rows})
-        group, stamp = self.groups[key], message.header.stamp
+        if not rows:
+            return
+        group = self.groups.setdefault(frozenset(joints), Group(joints))
+        lacking = array("d", [nan]) * len(joints)
+        for name in rows:
+            group.arrays.setdefault(name, lacking * len(group.received))
+        stamp = message.header.stamp
         group.logged.append(int(stamp.sec) * 10**9 + int(stamp.nanosec))
         group.received.append(received)
-        for name, row in rows.items():
-            if joints != group.joints:
+        for name, numbers in group.arrays.items():
+            row = rows.get(name)
+            if row is not None and joints != group.joints:
                 row = row[[joints.index(joint) for joint in group.joints]]
-            group.arrays[name].frombytes(row.tobytes())
+            numbers.frombytes((lacking if row is None else row).tobytes())
 
     def _decoded(self, path: Path, data: bytes) -> Any:
         """A message, by the version of its type that fits, which all others then have."""
