@@ -64,8 +64,10 @@ def test_degrees_exceed_the_limits_of_a_robot():
 def test_a_position_below_its_lower_limit_is_shown_with_its_sign():
     run = panda()
     run.position[:, 5] -= 3.0
-    (warning,) = limit_warnings(run)
+    run.velocity[:, :2] = 50.0
+    warning, velocity = limit_warnings(run)
     assert warning.startswith("panda_joint6 reaches -1.5 rad, far beyond the -0.0175 to 3.75 rad")
+    assert "2.17 rad/s of panda (1 more joint too)" in velocity
 
 
 def test_a_fault_that_exceeds_limits_for_a_moment_is_not_another_robot():

@@ -565,7 +565,7 @@ class LimitWatch:
             allowed = f"{limits.lower:.3g} to {limits.upper:.3g}"
             if name == "velocity":
                 allowed, unit = f"{limits.velocity:.3g}", f"{unit}/s"
-            others = f" ({len(beyond) - 1} more joints too)" if len(beyond) > 1 else ""
+            others = f" ({counted(len(beyond) - 1, 'more joint')} too)" if len(beyond) > 1 else ""
             yield (
                 f"{self._joints[worst]} reaches {self._farthest[name][worst]:.3g} {unit}, far"
                 f" beyond the {allowed} {unit} of {self._robot}{others}: another robot or unit?"
