@@ -35,6 +35,15 @@ def test_velocities_in_another_unit_than_positions_give_a_warning(
     assert message in warnings(by_velocity * velocity, by_position * position)[0]
 
 
+@pytest.mark.parametrize("factor", [180 / np.pi, np.pi / 180, 30 / np.pi])
+def test_desired_velocities_in_another_unit_than_measured_ones_give_a_warning(factor):
+    _, _, velocity = motion(1000.0)
+    run = run_of(velocity + noise(velocity.shape, 0.01), 1000.0, velocity_desired=factor * velocity)
+    (message,) = unit_warnings(run)
+    assert message.startswith("desired velocities go ")
+    assert message.endswith(" times as far as measured ones: another unit?")
+
+
 def test_degrees_throughout_are_found_by_how_far_they_reach():
     _, position, velocity = motion(30.0)
     (message, *_) = warnings(np.rad2deg(velocity), np.rad2deg(position), 30.0)

@@ -412,26 +412,43 @@ def test_numbered_columns_are_the_robots_joints_in_order(tmp_path, columns, join
     assert found == tuple(f"panda_joint{number}" for number in joints)
 
 
-@pytest.mark.parametrize(("signal", "what"), [(P, "positions"), (V, "velocities")])
-def test_degrees_of_positions_or_of_velocities_alone_are_converted(tmp_path, signal, what):
-    logs = {}
-    for scale in ({}, {signal: DEG}):
-        path = tmp_path / "log.csv"
-        path.write_text(table(f"time,{QDQ}", (P, V), scale=scale))
-        logs[len(scale)] = read_log(path)
-    assert f"log.csv: {what} {FOUND}" in logs[1].remarks
-    for name in ("position", "velocity"):
-        plain, found = (getattr(each.run, name) for each in logs.values())
-        np.testing.assert_allclose(found, plain, atol=1e-6)
+def test_numbers_that_may_be_any_joint_are_refused(tmp_path):
+    (tmp_path / "log.csv").write_text(table("time,q2,q3", (P,)))
+    message = "begin with 2, so 'q2' may be any joint; name it: --map SIGNAL.JOINT=q2, of shoulder_"
+    with pytest.raises(LogError, match=message):
+        read_log(tmp_path / "log.csv", robot="ur5")
 
 
-def test_the_desired_log_of_one_in_degrees_is_in_degrees(tmp_path):
-    degrees = dict.fromkeys((P, V), DEG)
-    measured, desired = tmp_path / "measured.csv", tmp_path / "desired.csv"
-    measured.write_text(table(f"time,{QDQ}", (P, V), scale=degrees))
-    desired.write_text(table(f"time,{names('dq#')}", (V,), scale=degrees))
-    run = read_log(measured, desired=desired).run
-    assert np.allclose(run.velocity_desired, MOTION[V], rtol=0, atol=1e-9)
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("desired", [("", 1), ("", DEG), ("[rad/s]", 1), ("[deg/s]", DEG)])
+@pytest.mark.parametrize(
+    ("measured", "found"),
+    [
+        (("", 1, "", 1), ""),
+        (("", DEG, "", DEG), "positions and velocities"),
+        (("", DEG, "", 1), "positions"),
+        (("", 1, "", DEG), "velocities"),
+        (("[deg]", DEG, "", DEG), "velocities"),
+        (("[deg]", DEG, "[deg/s]", DEG), ""),
+    ],
+)
+def test_each_signal_is_read_in_the_unit_that_is_its_own(tmp_path, measured, found, desired, apart):
+    """Names tell units, then how positions fit velocities, and desired motion measured one."""
+    q, by_q, dq, by_dq = measured
+    header, wanted = f"time,{names(f'q#{q}')},{names(f'dq#{dq}')}", names(f"dq_d#{desired[0]}")
+    scale = {P: by_q, V: by_dq, VD: desired[1]}
+    path, other = tmp_path / "log.csv", tmp_path / "desired.csv"
+    path.write_text(
+        table(header + f",{wanted}" * (not apart), (P, V, VD)[: 3 - apart], scale=scale)
+    )
+    other.write_text(table(f"time,{wanted.replace('_d', '')}", (VD,), scale=scale))
+    imported = read_log(path, desired=other if apart else None)
+    for signal in (P, V, VD):
+        assert np.allclose(getattr(imported.run, signal), MOTION[signal], rtol=0, atol=1e-6)
+    said = " ".join(imported.remarks)
+    assert (f"log.csv: {found} {FOUND}" in said, FOUND in said) == (bool(found), bool(found))
+    if desired == ("", DEG) and "velocities" not in found:
+        assert "in degrees, as it goes as far as the measured motion" in said
 
 
 @pytest.mark.parametrize(

@@ -160,6 +160,7 @@ def log_of(
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
         suggested=tuple(_of_mujoco(arrays, roles)),
         time=time,
+        in_radians=any(what in (QPOS, QVEL) or STATES.fullmatch(n) for n, what in roles.items()),
     )
 
 

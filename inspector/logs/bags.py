@@ -315,6 +315,7 @@ def _read(path: Path, options: ReadOptions) -> Log:
         ),
         remarks=tuple(bag.lost),
         meta={"topics": sorted({each.source for each in fields})},
+        in_radians=True,  # REP 103
     )
 
 

@@ -226,6 +226,7 @@ class Log:
     tracks: tuple[Track, ...] = ()  # its signals, in SI units, with increasing stamps
     names: tuple[str, ...] = ()  # of columns and arrays, which a mapping may refer to
     in_degrees: tuple[str, ...] = ()  # "position" and "velocity" if found to be in degrees
+    in_radians: bool = False  # whether its format defines that angles are
 
 
 class LogReader(NamedTuple):
@@ -611,7 +612,6 @@ def _by_name(
             yield _Choice(each, 0, signal, joint, each.name)
 
 
-def _columns(
 def _joint_of(
     path: Path, column: str, number: int, first: int, joints: Sequence[str]
 ) -> str | None:
@@ -625,6 +625,7 @@ def _joint_of(
     raise LogError(path, f"{problem}; name it: --map SIGNAL.JOINT={column}, of {listed(joints)}")
 
 
+def _columns(
     log: Log, first: _Choice, width: int, options: ReadOptions, joints: Sequence[str]
 ) -> Iterator[_Choice]:
     """Columns of a field: of one joint, of the base with its convention, or one for each joint."""

@@ -18,7 +18,7 @@ import numpy as np
 from inspector.errors import LogError
 from inspector.logs import clocks
 from inspector.logs.mapping import UNIFORM, Log, ReadOptions, Track, known_limits, tracks_of
-from inspector.logs.names import BASE_SIGNALS, listed
+from inspector.logs.names import BASE_SIGNALS, listed, tells_unit
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
 from noisemodel.hold import hold_length
@@ -41,8 +41,11 @@ class Imported:
     name: str = ""  #: of the log and of the episode
 
 
-def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
-    """A log's signals in SI units, finite, with increasing stamps, in place of its fields."""
+def prepared(log: Log, options: ReadOptions, robot: Robot | None, beside: Log | None = None) -> Log:
+    """A log's signals in SI units, finite, with increasing stamps, in place of its fields.
+
+    The measured log ``beside`` one of desired motion tells its unit, where its columns do not.
+    """
     path = log.path
     if log.units and not options.units:
         raise LogError(path, log.units)
@@ -56,7 +59,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
     if once := [label for track in timed if len(track.values) < 2 for label in track.labels]:
         remarks.append(f"logged once only, left out: {listed(once)}")
     tracks = [t for each in tracks if (t := _finite(path, each, remarks)) is not None]
-    tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks)
+    tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks, beside)
     tracks, order = clocks.ordered(path, tracks)
     tracks = _without_frozen(tracks, remarks)
     return replace(
@@ -213,19 +216,26 @@ MATCHES = {1.0: ("position", "velocity"), np.pi / 180: ("position",), 180 / np.p
 CLOSE = 0.1  # largest relative deviation from such a ratio
 STRETCHES = 50  # of a log, whose ways are compared
 TURNING = ("revolute", "continuous")
+GOES = 0.1  # least way of a joint whose desired motion is compared with it, in [rad]
+AS_FAR = 1.5  # largest ratio of the ways of desired and measured motion in one unit
 
 HINT = (
-    "if it is in degrees, say --units degrees; if the joint is prismatic or continuous, name the"
-    " robot (--robot)"
+    "if it is in degrees, say --units degrees; if the joint is prismatic or a wheel, say --units"
+    " radians, or name the robot (--robot)"
 )
 
 
 def _in_si(
-    log: Log, tracks: Sequence[Track], units: str, robot: Robot | None, remarks: list[str]
+    log: Log,
+    tracks: Sequence[Track],
+    units: str,
+    robot: Robot | None,
+    remarks: list[str],
+    beside: Log | None,
 ) -> tuple[list[Track], tuple[str, ...]]:
     """Tracks in radians that know which columns are angles, and what was found to be in degrees."""
     kinds = {joint.name: joint.kind for joint in robot.joints} if robot else {}
-    in_degrees = () if units else _in_degrees(tracks, kinds)
+    in_degrees = () if units else _in_degrees(tracks, kinds, guess=not log.in_radians)
     if in_degrees:
         plural = {"position": "positions", "velocity": "velocities"}
         remarks.append(
@@ -233,7 +243,8 @@ def _in_si(
             " radians (if they are not, --units radians)"
         )
     found: list[Track] = []
-    for track in tracks:
+    measured = {each.signal: each for each in beside.tracks} if beside else {}
+    for track in sorted(tracks, key=lambda each: each.is_desired):
         # A gripper is logged by LeRobot as a share of its way.
         gripper = [bool(log.units and re.search("gripper|finger", joint)) for joint in track.joints]
         if units == "degrees" and any(gripper):
@@ -244,13 +255,46 @@ def _in_si(
                 continue
             track = _columns(track, ~np.array(gripper))
         angular, is_position = _angular(track, kinds), track.quantity == "position"
-        if angular.any() and (units == "degrees" or track.quantity in in_degrees):
-            values = np.where(angular, np.deg2rad(track.values), track.values)
+        labels = track.labels[: len(track.joints)]
+        told = np.array([not units and tells_unit(label) for label in labels], dtype=bool)
+        open_, degrees = angular & ~told, units == "degrees" or track.quantity in in_degrees
+        other = measured.get(track.quantity, measured.get("position", measured.get("velocity")))
+        if other and not units and (beside or track.is_desired) and open_.any():
+            if unit := _unit_by_way(_columns(track, open_), other):
+                if degrees != (unit == "degrees"):
+                    name = track.signal.replace("_", " ")
+                    remarks.append(f"{name}: in {unit}, as it goes as far as the measured motion")
+                degrees = unit == "degrees"
+            elif beside:
+                degrees = degrees or track.quantity in beside.in_degrees
+        if degrees and open_.any():
+            values = np.where(open_, np.deg2rad(track.values), track.values)
             track = replace(track, values=values)
         if not units:
             _refuse_degrees(log.path, track, angular, kinds)
+        if not beside:
+            measured.setdefault(track.signal, track)
         found.append(replace(track, angles=(angular & is_position).tolist()))
     return found, in_degrees
+
+
+def _unit_by_way(desired: Track, measured: Track) -> str:
+    """Unit in which desired angles go as far as measured ones, in radians; empty if not known."""
+    shared = [joint for joint in desired.joints if joint in measured.joints]
+    ways = list[Array]()
+    for track in (desired, measured):
+        path = track.of(shared).astype(np.float64)
+        if track.quantity == "velocity":
+            path = np.cumsum(path[1:] * np.diff(track.stamps.time)[:, None], axis=0)
+        ways.append(np.ptp(path, axis=0))
+    times, units = _times_as_far(*ways), {"radians": 1.0, "degrees": 180 / np.pi}
+    return next((u for u, size in units.items() if 1 / AS_FAR < times / size < AS_FAR), "")
+
+
+def _times_as_far(wanted: Array, way: Array) -> float:
+    """Median of the ways of desired motion by those of measured one; 0 if no joint moves."""
+    moves = (way > GOES) & (wanted > 0)
+    return float(np.median(wanted[moves] / way[moves])) if moves.any() else 0.0
 
 
 def _angular(track: Track, kinds: Mapping[str, str]) -> Mask:
@@ -260,24 +304,29 @@ def _angular(track: Track, kinds: Mapping[str, str]) -> Mask:
     return np.array(turning, dtype=bool)
 
 
-def _in_degrees(tracks: Sequence[Track], kinds: Mapping[str, str]) -> tuple[str, ...]:
-    """What is in degrees, as positions and velocities tell.
+def _in_degrees(
+    tracks: Sequence[Track], kinds: Mapping[str, str], *, guess: bool
+) -> tuple[str, ...]:
+    """What is in degrees, as positions and velocities tell whose names do not.
 
-    Positions are if half of the joints that move reach beyond a turn, to and fro; velocities if
-    they match them. Without velocities, positions have to reach beyond ``NORMALISED``.
+    By a ``guess``, positions are if half of the joints that move reach beyond a turn, to and fro.
+    Velocities are if they match them. Without velocities, positions have to reach beyond
+    ``NORMALISED``.
     """
     by_signal = {track.signal: track for track in reversed(tracks)}
     suffix = "" if "position" in by_signal else "_desired"
     position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
     if position is None:
         return ()
-    reach = _reach_to_and_fro(position, kinds)
+    both = filter(None, (position, velocity))
+    told = {each.quantity for each in both if all(map(tells_unit, each.labels))}
+    reach = _reach_to_and_fro(position, kinds) if guess and "position" not in told else 0.0
     if velocity is None:
         return ("position", "velocity") if reach > NORMALISED else ()
     ratio = _ratio(position, velocity)
     for known, quantities in MATCHES.items():
         if abs(ratio / known - 1) <= CLOSE and (reach or "position" not in quantities):
-            return quantities
+            return tuple(each for each in quantities if each not in told)
     return ()
 
 
@@ -593,7 +642,8 @@ ENOUGH = 5  # fewest stretches
 
 
 def contradictions(run: Run) -> Iterator[str]:
-    """Clauses on velocities that are not the slopes of their positions."""
+    """Clauses on velocities that are not the slopes of their positions, or in another unit."""
+    yield from _of_desired(run)
     if run.position is None or derived(run, "velocity"):
         return
     way, summed = _ways(run, run.position)
@@ -625,6 +675,23 @@ def contradictions(run: Run) -> Iterator[str]:
             f"velocities of {_joints(run, wrong)} are {size} times the slopes of their positions:"
             " another unit, or another rate?"
         )
+
+
+def _of_desired(run: Run) -> Iterator[str]:
+    """A clause on desired velocities that are measured ones in another unit."""
+    if run.velocity_desired is None:
+        return
+    shared = [joint for joint in run.desired_joint_names if joint in run.joint_names]
+    ways, steps = list[Array](), run.mask / run.rate
+    for names, values in (
+        (run.desired_joint_names, run.velocity_desired),
+        (run.joint_names, run.velocity),
+    ):
+        columns = (values[:, names.index(joint)] for joint in shared)
+        ways.append(np.array([np.ptp(np.cumsum(each * steps)) for each in columns]))
+    times = _times_as_far(*ways)
+    if any(abs(times / known - 1) <= CLOSE for known in FACTORS):
+        yield f"desired velocities go {times:.3g} times as far as measured ones: another unit?"
 
 
 def _joints(run: Run, chosen: Mask) -> str:

@@ -249,6 +249,11 @@ def factor_of(column: str) -> float:
     return UNITS.get(without_unit(column)[1], ("", 1.0))[1]
 
 
+def tells_unit(label: str) -> bool:
+    """Whether the name of a column, or of one of an array (``q_deg[0]``), ends with its unit."""
+    return without_unit(re.sub(r"\[\d+\]$", "", label))[1] in UNITS
+
+
 def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
     """Signal and joint of a column, by its name; None for another, and where its unit disagrees."""
     naming = naming or Naming()

@@ -181,13 +181,11 @@ def readers_of(path: Path, reading: Reading) -> dict[str, Callable[[], Imported]
             run = opened.run()
             run = replace(run, robot=options.robot or run.robot)
             return Imported(run, ("a run file, unchanged",), name)
-        logs, how = [prepared(opened.read(episode), options, robot)], options
+        logs = [prepared(opened.read(episode), options, robot)]
         if other:
             same = episode if episode in other.episodes else other.episodes[0]
-            if len(logs[0].in_degrees) == 2:  # of one robot, in one unit
-                how = replace(options, units="degrees")
-            logs.append(prepared(other.read(same), how, robot))
-        return run_of(logs, how, name)
+            logs.append(prepared(other.read(same), options, robot, logs[0]))
+        return run_of(logs, options, name)
 
     return {each: partial(read, each) for each in reading.episodes or opened.episodes}
 
