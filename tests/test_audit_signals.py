@@ -19,29 +19,21 @@ def test_radians_give_no_warning(rate, level):
 
 
 @pytest.mark.parametrize(
-    ("by_position", "by_velocity", "message"),
+    ("by_position", "by_velocity", "by_desired", "message"),
     [
-        (1, 180 / np.pi, "degrees per second beside positions in radians"),
-        (180 / np.pi, 1, "positions look like degrees beside velocities in radians"),
-        (1, 30 / np.pi, "turns per minute beside positions in radians"),
-        (180 / np.pi, 30 / np.pi, "are 0.167 times the slopes of their positions: another unit"),
+        (1, 180 / np.pi, 180 / np.pi, "degrees per second beside positions in radians"),
+        (180 / np.pi, 1, 1, "positions look like degrees beside velocities in radians"),
+        (1, 30 / np.pi, 30 / np.pi, "turns per minute beside positions in radians"),
+        (180 / np.pi, 30 / np.pi, 30 / np.pi, "are 0.167 times the slopes of their positions: an"),
+        (1, 1, 180 / np.pi, "desired velocities go 57.3 times as far as measured ones: another un"),
+        (1, 1, np.pi / 180, "desired velocities go 0.0174 times as far as measured ones: another"),
     ],
 )
-def test_velocities_in_another_unit_than_positions_give_a_warning(
-    by_position, by_velocity, message
-):
+def test_velocities_in_another_unit_give_a_warning(by_position, by_velocity, by_desired, message):
     _, position, velocity = motion(1000.0)
+    given = {"position": by_position * position, "velocity_desired": by_desired * velocity}
     velocity = velocity + noise(velocity.shape, 0.01)
-    assert message in warnings(by_velocity * velocity, by_position * position)[0]
-
-
-@pytest.mark.parametrize("factor", [180 / np.pi, np.pi / 180, 30 / np.pi])
-def test_desired_velocities_in_another_unit_than_measured_ones_give_a_warning(factor):
-    _, _, velocity = motion(1000.0)
-    run = run_of(velocity + noise(velocity.shape, 0.01), 1000.0, velocity_desired=factor * velocity)
-    (message,) = unit_warnings(run)
-    assert message.startswith("desired velocities go ")
-    assert message.endswith(" times as far as measured ones: another unit?")
+    assert message in next(unit_warnings(run_of(by_velocity * velocity, 1000.0, **given)))
 
 
 def test_degrees_throughout_are_found_by_how_far_they_reach():

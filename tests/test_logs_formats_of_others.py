@@ -118,11 +118,8 @@ ROSTOPIC = (
     "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.name0,field.name1,"
     + each_of(*(f"field.{each}#" for each in (P, V, E)))
 )
-FRANKA = "time, success_rate, " + each_of(
-    *(f"state.{each}[#]" for each in ("q", "q_d", "dq", "dq_d", "tau_J")),
-    "cmd.q_d[#]",
-    "state.theta[#]",
-    mark=", ",
+FRANKA = "time, success_rate, state.theta[0], state.theta[1], " + each_of(
+    *(f"state.{each}[#]" for each in ("q", "q_d", "dq", "dq_d", "tau_J")), "cmd.q_d[#]", mark=", "
 )
 RTDE = each_of("target_q_#", "target_qd_#", "target_moment_#", "actual_q_#", "actual_qd_#")
 UNREAD = "{} not read: {}"
@@ -171,11 +168,11 @@ FORMATS = (
     Format(
         "libfranka, logToCSV",
         "time, success_rate, state.q[0], state.dq[0], state.dq_d[0], cmd.q_d[0]",
-        table(FRANKA, (P, PD, V, VD, E, E, E), stamp=ticks(1e3, 42), cells=("1.0",)),
+        table(FRANKA, (E, P, PD, V, VD, E, E), stamp=ticks(1e3, 42), cells=("1.0",)),
         (P, V, PD, VD, E), FROM_0,
         ("stamps are in milliseconds",
-         UNREAD.format("5 columns", "success_rate, cmd.q_d[0], cmd.q_d[1], state.theta[0],"
-                       " state.theta[1]"),
+         UNREAD.format("5 columns", "success_rate, state.theta[0], state.theta[1], cmd.q_d[0],"
+                       " cmd.q_d[1]"),
          "time starts at 0; the first stamp, 42 s, is in meta"),
     ),
     Format(
@@ -295,8 +292,8 @@ FORMATS = (
            stamped(f"{QDQ},{names('q_d#')}", P, V, PD), (P, V, PD),
            said=(f"velocity_desired: {METHOD}",)),
     Format(
-        "one joint", "time,position,velocity,target_velocity,temperature",
-        "time,position,velocity,target_velocity,temperature\n"
+        "one joint", "time,position,velocity,target.velocity,temperature",
+        "time,position,velocity,target.velocity,temperature\n"
         + "".join(f"{time!r},{p!r},{v!r},{d!r},40\n" for time, p, v, d in zip(
             TIME.tolist(), *(MOTION[each][:, 0].tolist() for each in (P, V, VD)), strict=True)),
         (P, V, VD), ("joint_0",), (UNREAD.format("1 column", "temperature"),),
@@ -379,13 +376,11 @@ def test_a_set_point_is_never_a_measured_signal(word):
     [
         (lambda time: round(100 * time), "'time' counts samples; give the log's rate.* --rate HZ"),
         (ticks(1e4, 0), "100 is milliseconds or microseconds; .* --rate 10 or --rate 10000$"),
-        (
-            lambda time: EPOCH + round(100 * time),
-            "step of 1 is seconds or milliseconds; .* --rate 1 or --rate 1000$",
-        ),
+        (lambda time: EPOCH + round(100 * time),
+         "step of 1 is seconds or milliseconds; .* --rate 1 or --rate 1000$"),
         (ticks(1e3, EPOCH * 10**5), "median step of 10 is none that is known; .* --rate 100$"),
     ],
-)
+)  # fmt: skip
 def test_stamps_whose_unit_is_open_are_refused_with_the_option_to_type(tmp_path, stamp, message):
     path = tmp_path / "log.csv"
     path.write_text(table("time,q1,q2", (P,), stamp=stamp))
@@ -395,16 +390,10 @@ def test_stamps_whose_unit_is_open_are_refused_with_the_option_to_type(tmp_path,
 
 @pytest.mark.parametrize(
     ("columns", "joints"),
-    [
-        ("q0,q1", (1, 2)),
-        ("q1,q2", (1, 2)),
-        ("joint1_pos,joint2_pos", (1, 2)),
-        ("J1 [rad],J2 [rad]", (1, 2)),
-        ("q5,q6", (5, 6)),
-        ("joint4_pos,joint7_pos", (4, 7)),
-        ("position[1],position[2]", (2, 3)),
-    ],
-)
+    [("q0,q1", (1, 2)), ("q1,q2", (1, 2)), ("joint1_pos,joint2_pos", (1, 2)), ("q5,q6", (5, 6)),
+     ("J1 [rad],J2 [rad]", (1, 2)), ("joint4_pos,joint7_pos", (4, 7)),
+     ("position[1],position[2]", (2, 3))],
+)  # fmt: skip
 def test_numbered_columns_are_the_robots_joints_in_order(tmp_path, columns, joints):
     path = tmp_path / "log.csv"
     path.write_text(table(f"time,{columns}", (P,)))
@@ -412,42 +401,26 @@ def test_numbered_columns_are_the_robots_joints_in_order(tmp_path, columns, join
     assert found == tuple(f"panda_joint{number}" for number in joints)
 
 
-def test_numbers_that_may_be_any_joint_are_refused(tmp_path):
-    (tmp_path / "log.csv").write_text(table("time,q2,q3", (P,)))
-    message = "begin with 2, so 'q2' may be any joint; name it: --map SIGNAL.JOINT=q2, of shoulder_"
-    with pytest.raises(LogError, match=message):
-        read_log(tmp_path / "log.csv", robot="ur5")
-
-
 @pytest.mark.parametrize("apart", [False, True])
-@pytest.mark.parametrize("desired", [("", 1), ("", DEG), ("[rad/s]", 1), ("[deg/s]", DEG)])
+@pytest.mark.parametrize("desired", ["dq_d#", "dq_d#*", "dq_d#[rad/s]", "dq_d#[deg/s]*"])
 @pytest.mark.parametrize(
     ("measured", "found"),
-    [
-        (("", 1, "", 1), ""),
-        (("", DEG, "", DEG), "positions and velocities"),
-        (("", DEG, "", 1), "positions"),
-        (("", 1, "", DEG), "velocities"),
-        (("[deg]", DEG, "", DEG), "velocities"),
-        (("[deg]", DEG, "[deg/s]", DEG), ""),
-    ],
-)
-def test_each_signal_is_read_in_the_unit_that_is_its_own(tmp_path, measured, found, desired, apart):
-    """Names tell units, then how positions fit velocities, and desired motion measured one."""
-    q, by_q, dq, by_dq = measured
-    header, wanted = f"time,{names(f'q#{q}')},{names(f'dq#{dq}')}", names(f"dq_d#{desired[0]}")
-    scale = {P: by_q, V: by_dq, VD: desired[1]}
+    [("q#,dq#", ""), ("q#*,dq#", "positions"), ("q#*,dq#*", "positions and velocities"),
+     ("q#,dq#*", "velocities"), ("q#[deg]*,dq#*", "velocities"), ("q#[deg]*,dq#[deg/s]*", "")],
+)  # fmt: skip
+def test_each_signal_is_read_in_the_unit_of_its_own(tmp_path, measured, found, desired, apart):
+    columns = [*measured.split(","), desired]  # those with a star are in degrees
+    scale = {s: DEG if "*" in c else 1.0 for s, c in zip((P, V, VD), columns, strict=True)}
+    header = [names(each.rstrip("*")) for each in columns]
     path, other = tmp_path / "log.csv", tmp_path / "desired.csv"
-    path.write_text(
-        table(header + f",{wanted}" * (not apart), (P, V, VD)[: 3 - apart], scale=scale)
-    )
-    other.write_text(table(f"time,{wanted.replace('_d', '')}", (VD,), scale=scale))
+    path.write_text(stamped(",".join(header[: 3 - apart]), *(P, V, VD)[: 3 - apart], scale=scale))
+    other.write_text(stamped(header[2].replace("_d", ""), VD, scale=scale))
     imported = read_log(path, desired=other if apart else None)
     for signal in (P, V, VD):
         assert np.allclose(getattr(imported.run, signal), MOTION[signal], rtol=0, atol=1e-6)
     said = " ".join(imported.remarks)
     assert (f"log.csv: {found} {FOUND}" in said, FOUND in said) == (bool(found), bool(found))
-    if desired == ("", DEG) and "velocities" not in found:
+    if desired == "dq_d#*" and "velocities" not in found:
         assert "in degrees, as it goes as far as the measured motion" in said
 
 

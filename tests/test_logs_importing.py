@@ -39,6 +39,9 @@ def test_joints_are_checked_against_the_robot(tmp_path):
         read_log(log(tmp_path), robot="panda")
     with pytest.raises(UnknownRobotError, match="no robot 'pandda'"):
         read_log(path, robot="pandda")
+    path = write(tmp_path / "log.csv", {"time": TIME, "q2": TIME, "q3": TIME})
+    with pytest.raises(LogError, match="with 2, so 'q2' may be any joint; name it: --map SIGNAL"):
+        read_log(path, robot="ur5")
 
 
 def test_desired_motion_is_synchronised_to_the_measured_clock(tmp_path):

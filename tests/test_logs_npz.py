@@ -96,12 +96,9 @@ def test_isaacs_arrays_are_recognised_and_its_root_is_mapped(tmp_path):
 
 @pytest.mark.parametrize(
     "names",
-    [
-        ("q", "dq", "q_d", "dq_d"),
-        ("q", "dq", "qd", "dq_d"),
-        ("positions", "velocities", "desired_positions", "target_qd"),
-    ],
-)
+    [("q", "dq", "q_d", "dq_d"), ("q", "dq", "qd", "dq_d"),
+     ("positions", "velocities", "desired_positions", "target_qd")],
+)  # fmt: skip
 def test_arrays_are_known_by_symbols_and_words(tmp_path, names):
     signals = [numbers(seed=seed) for seed in range(4)]
     run = read_log(save(tmp_path, t=TIME, **dict(zip(names, signals, strict=True)))).run
@@ -128,27 +125,17 @@ FITS = {"dof_vel": VELOCITY, "t": TIME}
         ({"dof_vel": VELOCITY}, [], r"there are no stamps; give the log's rate"),
         ({"speed": VELOCITY, "t": TIME}, [], "holds no known joint positions or velocit.* speed"),
         ({"velocty": VELOCITY, "t": TIME}, [], "such as --map velocity=velocty;"),
-        (
-            {"dof_vel": VELOCITY.T, "t": TIME},
-            [],
-            r"'dof_vel' has shape \(3, 400\); expected 400 samples, as stamps, along its first",
-        ),
+        ({"dof_vel": VELOCITY.T, "t": TIME}, [],
+         r"'dof_vel' has shape \(3, 400\); expected 400 samples, as stamps, along its first"),
         (FITS, ["position=dof_pos"], "no column 'dof_pos' to map; it"),
         (FITS, ["velocity=dof_vel[2:9]"], r"'dof_vel' has 3 columns"),
-        (
-            FITS,
-            ["velocity.elbow=dof_vel"],
-            r"'dof_vel' has 3 columns, velocity.elbow is one; name it as dof_vel\[0\]",
-        ),
+        (FITS, ["velocity.elbow=dof_vel"],
+         r"'dof_vel' has 3 columns, velocity.elbow is one; name it as dof_vel\[0\]"),
         (FITS, ["base_pose=dof_vel"], "3 columns, a base_pose has 7"),
-        (
-            FITS | {"t": np.where(TIME == 1, np.nan, TIME)},
-            [],
-            r"column 't' holds nan \(sample 101\)",
-        ),
+        (FITS | {"t": np.where(TIME == 1, np.nan, TIME)}, [], r"'t' holds nan \(sample 101\)"),
         (FITS | {"dof_vel": np.array([{}], dtype=object)}, [], "not an archive of plain arrays"),
     ],
-)
+)  # fmt: skip
 def test_arrays_that_do_not_fit_are_errors_of_one_line(tmp_path, arrays, mapping, message):
     path = save(tmp_path, **arrays)
     with pytest.raises(LogError, match=message) as caught:

@@ -13,35 +13,25 @@ from inspector.logs.mapping import parse_mapping
 @pytest.mark.parametrize(
     ("column", "signal", "joint"),
     [
-        ("left.elbow.velocity", "velocity", "left.elbow"),
-        ("elbow/velocity", "velocity", "elbow"),
-        ("/joint_states/velocity[0]", "velocity", "joint_0"),
-        ("/joint_states/position.3", "position", "joint_3"),
+        ("left.elbow.velocity", "velocity", "left.elbow"), ("elbow/velocity", "velocity", "elbow"),
+        ("/joint_states/velocity[0]", "velocity", "joint_0"), ("x.velocity", "velocity", "x"),
         ("/controller/state/actual/velocities[2]", "velocity", "joint_2"),
+        ("/joint_states/position.3", "position", "joint_3"),
+        ("observation.state.j0.pos", "position", "j0"), ("action.j0.pos", "position_desired", "j0"),
         ("wrist.position_desired", "position_desired", "wrist"),
         ("/state/desired/velocities[0]", "velocity_desired", "joint_0"),
         ("/state/reference/positions[0]", "position_desired", "joint_0"),
         ("joint1_cmd.position", "position_desired", "joint1"),
         ("joints[0].target.position", "position_desired", "joints[0]"),
-        ("action.j0.pos", "position_desired", "j0"),
-        ("observation.state.j0.pos", "position", "j0"),
         ("J1_cmd [rad]", "position_desired", "J1"),
-        ("x.velocity", "velocity", "x"),
     ],
-)
+)  # fmt: skip
 def test_a_column_is_recognised_by_its_name(tmp_path, column, signal, joint):
     ones = np.ones(len(TIME))
     more = {"q7": ones} if signal.endswith("_desired") else {}
     run = read_log(write(tmp_path / "log.csv", {"time": TIME, column: ones, **more})).run
     assert (run.desired_joint_names if more else run.joint_names) == (joint,)
     assert np.array_equal(getattr(run, signal)[:, 0], ones)
-
-
-@pytest.mark.parametrize("name", ["target.velocity", "setpoint.velocity", "command/velocity"])
-def test_a_set_point_of_the_only_joint_is_not_measured(tmp_path, name):
-    run = read_log(write(tmp_path / "log.csv", {"time": TIME, "velocity": -TIME, name: TIME})).run
-    assert np.array_equal(run.velocity[:, 0], -TIME)
-    assert np.array_equal(run.velocity_desired[:, 0], TIME)
 
 
 def test_errors_and_outputs_of_a_controller_are_no_motion(tmp_path):

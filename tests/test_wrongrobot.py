@@ -38,19 +38,19 @@ def test_a_joint_without_a_limit_has_none(tmp_path):
     assert joint_limits(tmp_path / "arm.urdf") == {"j": Limits()}
 
 
-def test_joints_that_the_run_lacks_are_assumed_stationary():
+def test_joints_that_the_run_lacks_are_assumed_stationary_and_others_are_refused():
     assert check_joints(PANDA, "panda") == ("panda_finger_joint1", "panda_finger_joint2")
     assert check_joints(("anything",), "my robot") == ()
     assert check_joints(("anything",), None) == ()
-
-
-def test_a_joint_that_the_robot_lacks_is_refused():
     with pytest.raises(WrongRobotError, match="no joint 'hip' in robot 'panda'; .*--robot NAME"):
         check_joints(("hip",), "panda")
 
 
-def test_a_robot_with_its_own_motion_is_not_suspected():
-    assert list(limit_warnings(panda())) == []
+def test_a_robot_with_its_own_motion_is_not_suspected_nor_for_a_fault_of_a_moment():
+    run = panda()
+    assert list(limit_warnings(run)) == []
+    run.velocity[1000:1200] = 50.0
+    assert list(limit_warnings(run)) == []
     assert list(limit_warnings(nm.Run.load("assets/runs/demo.npz"))) == []
 
 
@@ -68,12 +68,6 @@ def test_a_position_below_its_lower_limit_is_shown_with_its_sign():
     warning, velocity = limit_warnings(run)
     assert warning.startswith("panda_joint6 reaches -1.5 rad, far beyond the -0.0175 to 3.75 rad")
     assert "2.17 rad/s of panda (1 more joint too)" in velocity
-
-
-def test_a_fault_that_exceeds_limits_for_a_moment_is_not_another_robot():
-    run = panda()
-    run.velocity[1000:1200] = 50.0
-    assert list(limit_warnings(run)) == []
 
 
 COMMANDS = [*TAKING_RUNS, ["accept", "--reason", "good"]]
