@@ -325,15 +325,15 @@ def test_a_log_of_others_is_imported_untouched_and_says_what_was_assumed(tmp_pat
 
 def test_a_listing_tells_what_each_column_is_taken_for(tmp_path):
     path = tmp_path / "log.csv"
-    path.write_text("Time [ms];q1;elbow_vel [deg/s];qd;velocity;temperature;\n0;1;2;3;4;5;\n")
+    path.write_text("Time [ms];q1;elbow_vel [deg/s];qd;ctrl_0;temperature;\n0;1;2;3;4;5;\n")
     _, out, _ = call("import", path, "--list")
     assert [line.strip() for line in out.splitlines()[1:]] == [
         "1 rows",
         "Time [ms]  stamps",
         "q1  position of joint 1",
         "elbow_vel [deg/s]  velocity of elbow",
-        "qd  velocity of the only joint",
-        "velocity  velocity of the only joint",
+        "qd  not known",
+        "ctrl_0  a column of an array",
         "temperature  not known",
     ]
 

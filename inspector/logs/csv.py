@@ -80,8 +80,9 @@ def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
         if known := column_signal(name, naming):
             joint = f"joint {known[1]}" if isinstance(known[1], int) else known[1]
             return f"{known[0]} of {joint}"
-        signal = array_signal(name)
-        return f"{signal} of the only joint" if signal in JOINT_SIGNALS else "not known"
+        if naming.alone and (signal := array_signal(name, naming)) in JOINT_SIGNALS:
+            return f"{signal} of the only joint"
+        return "a column of an array" if may_hold(name, naming) else "not known"
 
     return (f"{rows} rows", *(f"{name}  {held(name)}" for name in layout.header if name))
 
