@@ -682,13 +682,10 @@ def _of_desired(run: Run) -> Iterator[str]:
     if run.velocity_desired is None:
         return
     shared = [joint for joint in run.desired_joint_names if joint in run.joint_names]
-    ways, steps = list[Array](), run.mask / run.rate
-    for names, values in (
-        (run.desired_joint_names, run.velocity_desired),
-        (run.joint_names, run.velocity),
-    ):
-        columns = (values[:, names.index(joint)] for joint in shared)
-        ways.append(np.array([np.ptp(np.cumsum(each * steps)) for each in columns]))
+    desired = run.velocity_desired[:, [run.desired_joint_names.index(each) for each in shared]]
+    measured = run.velocity[:, [run.joint_names.index(each) for each in shared]]
+    step = run.mask[:, None] / run.rate
+    ways = (np.ptp(np.cumsum(each * step, axis=0), axis=0) for each in (desired, measured))
     times = _times_as_far(*ways)
     if any(abs(times / known - 1) <= CLOSE for known in FACTORS):
         yield f"desired velocities go {times:.3g} times as far as measured ones: another unit?"
