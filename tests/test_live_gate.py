@@ -184,7 +184,7 @@ def test_each_stretch_of_a_stream_is_compared_with_the_same_motion(accepted, sim
     time = np.tile(run.velocity, (3, 1))  # the motion is made three times
     signals = {"velocity": time, "velocity_desired": np.tile(run.velocity_desired, (3, 1))}
     count = len(time)
-    stream.push(0.0, signals, np.ones(count, dtype=bool), np.zeros(count))
+    stream.push(np.arange(count) / run.rate, signals, np.ones(count, dtype=bool), np.zeros(count))
     reference = Reference.load(accepted)
     found = [reference.compare(each) for each in latest]
     assert [each.run.start for each in found[:3]] == pytest.approx([0.0, 0.0, 3.0])
@@ -200,13 +200,13 @@ def test_levels_that_come_in_pieces_are_those_of_the_whole(simulate):
     long = {n: np.tile(getattr(run, n), (3, 1)) for n in ("velocity", "velocity_desired")}
     count = len(long["velocity"])
     valid, lost = np.ones(count, dtype=bool), np.zeros(count)
-    stream = LevelStream(run.joint_names, run.rate)
+    stream, time = LevelStream(run.joint_names, run.rate), np.arange(count) / run.rate
     for first in range(0, count, 50):
         part = slice(first, first + 50)
         signals = {name: values[part] for name, values in long.items()}
-        stream.push(first / run.rate, signals, valid[part], lost[part])
+        stream.push(time[part], signals, valid[part], lost[part])
     found = stream.finish()
-    whole = levels(Run(time=np.arange(count) / run.rate, joint_names=run.joint_names, **long))
+    whole = levels(Run(time=time, joint_names=run.joint_names, **long))
     assert found.level.shape == whole.level.shape
     assert np.nanmax(np.abs(found.level - whole.level)[:, :, :, 1:]) < 0.5
     np.testing.assert_allclose(found.guide, whole.guide, atol=1e-3)

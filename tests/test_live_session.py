@@ -272,6 +272,22 @@ def test_live_finds_what_classify_finds_on_the_same_samples(tmp_path, library, k
         assert -0.11 <= live.stop - finding.stop <= 0.41
 
 
+@pytest.mark.parametrize("real", [955.0, 1045.0])
+def test_findings_and_levels_keep_their_times_where_the_true_rate_is_not_nominal(
+    tmp_path, library, real
+):
+    signals = motion(24.0, hum=(22.0, 22.8))
+    signals["time"] = signals["time"] * RATE / real
+    cuts = range(50, 24_000, 50)
+    _, _, summary = shown(tmp_path, signals, cuts, library=library, keep_levels=True)
+    (found,) = summary.findings
+    assert (found.start, found.stop) == pytest.approx((22e3 / real, 22.8e3 / real), abs=0.45)
+    levels = summary.levels
+    hum = levels.time[levels.level[:, :, 1].max(axis=(1, 2)) > -30.0]
+    assert (hum[0], hum[-1]) == pytest.approx((22e3 / real, 22.8e3 / real), abs=0.2)
+    assert levels.duration == pytest.approx(24e3 / real, abs=1e-3)
+
+
 def test_samples_that_are_left_out_leave_no_verdict_of_ok(tmp_path, library):
     signals = motion(3.0, hum=(9.0, 9.0))
     signals["time"][2000:] = 2.0  # the clock stands still

@@ -44,7 +44,8 @@ class Labeller:
         self._stream: nc.Stream | None = None
         self._windows: tuple[()] | tuple[nc.Lasting, nc.Bursts] = ()  # beside it
         self._samples = 0
-        self._shift: float | None = None  # from the first sample to the clock of the samples, [s]
+        self._shift = 0.0  # from samples at the nominal rate to the clock of the latest ones, [s]
+        self._edges: dict[float, float] = {}  # times of what lasts, by those at the nominal rate
         self._base, self._joints, desired = (widths.get(name, 0) for name in NOISY)
         kinds = ("desired", "measured", "error") if desired else ("measured",)
         there = (NOISE, *kinds, *(f"{kind}_joints" for kind in kinds))
@@ -69,6 +70,7 @@ class Labeller:
     def push(self, motion: Array, valid: Mask, end: float) -> Labels | None:
         """Take a motion, shape (samples, columns), that ends at a time; labels now complete."""
         self._samples += len(motion)
+        self._shift = end - self._samples / self.rate
         if self._stream is None:
             return None
         signals = noise_signals(self._names, motion, self._base, self._joints)
@@ -77,20 +79,22 @@ class Labeller:
         labels = self._stream.push(signals, valid)
         if not len(labels):
             return None
-        shift = end - self._samples / self.rate
-        self._shift = shift if self._shift is None else self._shift
-        return replace(labels, start=labels.start + shift, stop=labels.stop + shift)
+        return replace(labels, start=labels.start + self._shift, stop=labels.stop + self._shift)
 
     @property
     def lasting(self) -> tuple[Event, ...]:
         """What lasts, and bursts, so far."""
-        shift, found = self._shift or 0.0, [e for each in self._windows for e in each.events]
-        return tuple(replace(e, start=e.start + shift, stop=e.stop + shift) for e in found)
+        found = [event for each in self._windows for event in each.events]
+        edges = {time for event in found for time in (event.start, event.stop)}
+        # An edge keeps the time that it had when it came, since true rates are seldom nominal.
+        self._edges = {time: self._edges.get(time, time + self._shift) for time in edges}
+        at = self._edges
+        return tuple(replace(each, start=at[each.start], stop=at[each.stop]) for each in found)
 
     @property
     def decided(self) -> float:
         """Time before which nothing begins any more that lasts."""
-        return self._windows[0].decided + (self._shift or 0.0) if self._windows else inf
+        return self._windows[0].decided + self._shift if self._windows else inf
 
     def finish(self) -> None:
         """End the signal."""

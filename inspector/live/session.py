@@ -590,7 +590,7 @@ class LiveSession:
             self.note("samples without noise", line, int((~valid).sum()))
             motion[~valid] = 0.0
         if self._stream is not None:
-            self._stream.push(float(time[0]), signals, valid, lost)
+            self._stream.push(time, signals, valid, lost)
         edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(time)]
         for first, stop in pairwise(edges):
             piece = slice(first, stop)

@@ -4,6 +4,7 @@ A frame lasts 0.2 s and the next one begins 0.05 s later. Octaves go from 8 Hz t
 Each joint has two signals: its velocity, and its tracking error where a velocity is desired.
 """
 
+from bisect import bisect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,6 +30,7 @@ SETTLING = 1.0  # time after which filters have rung out, in [s]
 PIECE, LONGEST = 3.0, 3600.0
 LATEST = 2  # pieces of a stream that are compared while it runs
 SIGNALS = ("velocity", "tracking error")
+OVER_TIME = ("level", "guide", "pace")  # what `Levels` has of each frame
 # What the slow motion is taken from, the best first.
 GUIDES = {
     "position_desired": "desired positions",
@@ -168,18 +170,20 @@ class LevelStream:
         # Samples that wait, shape (samples, signals, joints); NaN where they are not known.
         self._held = np.empty((0, 0, 0), np.float32)
         self._before = 0  # bins of the samples held that were measured already
-        self._start = 0.0  # time of the first sample
+        # Numbers of samples, and their times in [s]: the true rate is seldom the nominal one.
+        self._clock: list[tuple[int, float]] = []
         self._count = self._frames = 0  # of samples that came, of frames that are measured
         self._parts: list[Levels] = []
         self._origin: NDArray[np.float32] | None = None
         self.too_long = False
 
     def push(
-        self, time: float, signals: Mapping[str, Array], valid: NDArray[np.bool_], lost: Array
+        self, time: Array, signals: Mapping[str, Array], valid: NDArray[np.bool_], lost: Array
     ) -> None:
-        """Take samples from a time on, in [s].
+        """Take samples.
 
         Args:
+            time: Their times, shape (samples,), in [s].
             signals: Velocities, desired ones and positions, each of shape (samples, joints).
             valid: Which samples are known, shape (samples,).
             lost: How many samples are missing before each, shape (samples,).
@@ -191,13 +195,14 @@ class LevelStream:
         samples = np.stack([signals[name] for name in self._names], axis=1, dtype=np.float32)
         samples[~known] = np.nan
         if not self._count:
-            self._start, self._held = time, samples[:0]
+            self._held = samples[:0]
         for first, stop in pairwise([0, *np.flatnonzero(lost[1:] > 0) + 1, len(samples)]):
             missing, piece = int(lost[first]), round(PIECE * self._rate)
             if missing > LONGEST * self._rate:
                 self.too_long = True
-                self._start += (missing - piece) / self._rate
                 missing = piece
+            count, end = self._count + missing, float(time[stop - 1]) + 1.0 / self._rate
+            self._clock[-1:] = [(count, float(time[first])), (count + stop - first, end)]
             for done in range(0, missing, piece):
                 shape = min(piece, missing - done), *samples.shape[1:]
                 self._add(np.full(shape, np.nan, np.float32))
@@ -212,16 +217,23 @@ class LevelStream:
             self._measure(len(self._held), None)
         if self.too_long or not self._parts:
             return None
-        return replace(self._joined(self._parts), duration=self._count / self._rate)
+        found, firsts = self._joined(self._parts), [part.start for part in self._parts]
+        # Frames of a stream that is faster or slower than its nominal rate, anew every 0.05 s.
+        numbers = np.cumsum([0, *(len(part.guide) for part in self._parts)])
+        ends = [*firsts, self._time()]
+        time = np.arange(firsts[0], ends[-1] - HOP / 2, HOP)
+        taken = np.interp(time, ends, numbers).round().astype(int).clip(max=self._frames - 1)
+        anew: dict[str, Any] = {name: getattr(found, name)[taken] for name in OVER_TIME}
+        duration = self._clock[-1][1] - firsts[0]
+        return replace(found, start=firsts[0], duration=duration, **anew)
 
     def _joined(self, parts: Sequence[Levels]) -> Levels:
         """The last pieces as one."""
         whole: dict[str, Any] = {
-            name: np.concatenate([getattr(each, name) for each in parts])
-            for name in ("level", "guide", "pace")
+            name: np.concatenate([getattr(each, name) for each in parts]) for name in OVER_TIME
         }
         frames = len(whole["guide"])
-        start = self._start + (self._frames - frames) * HOP
+        start = parts[-1].start - (frames - len(parts[-1].guide)) * HOP
         duration = (frames + BINS - 1) * HOP
         return replace(parts[-1], start=start, duration=duration, origin=self._origin, **whole)
 
@@ -237,6 +249,13 @@ class LevelStream:
             self._measure(enough, bins)
             self._held = self._held[self._samples(self._before + bins - around) :]
             self._before = around
+
+    def _time(self) -> float:
+        """Time at which the next frame to be measured begins; of those before it none is kept."""
+        sample = self._frames * self._rate * HOP
+        counts, times = zip(*self._clock, strict=True)
+        self._clock = self._clock[max(0, bisect(counts, sample) - 1) :]
+        return float(np.interp(sample, counts, times))
 
     def _samples(self, bins: int) -> int:
         return int(np.ceil(bins * self._rate * HOP - 1e-9))
@@ -264,7 +283,8 @@ class LevelStream:
                 step = 2 * np.pi * np.round(step / (2 * np.pi))
             guide = (guide + step).astype(np.float32)
         taken = slice(self._before, None if frames is None else self._before + frames)
-        part = replace(found, guide=guide[taken], level=level[taken], pace=found.pace[taken])
+        part = replace(found, start=self._time(), level=level[taken], guide=guide[taken])
+        part = replace(part, pace=found.pace[taken])
         if len(part.guide):
             self._origin = part.guide[0] if self._origin is None else self._origin
             self._parts.append(part)
