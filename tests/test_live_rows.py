@@ -4,7 +4,9 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ from inspector.live.pipe import (
     follow,
     reader_of,
 )
+from inspector.logs.read import read_log
 
 HEAD = b"time,elbow.velocity,wrist.velocity,elbow.position,wrist.position,load"
 
@@ -169,6 +172,34 @@ def test_little_waits_for_more_and_much_is_read_at_once(monkeypatch):
     assert naps == [0.0, 0.0]
     list(chunks(Trickle(b"1\n2\n3\n", 2), gather=0.5))
     assert naps[2:] == [0.5, 0.5, 0.5]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time,message,a.velocity,b.velocity\n0,,1,2\n0.1,COLLISION,3,4\n",
+        'time,a.velocity,b.velocity,note\n0,1,2,""\n0.1,3,4,"hit, so stop"\n',
+        '"time","a.velocity","b.velocity"\n0,1,2\n0.1,3,4\n',
+        "\n# a robot\n \ntime,a.velocity,b.velocity\n0,1,2\n0.1,3,4\n",
+        "# time,a.velocity,b.velocity\n0,1,2\n0.1,3,4\n",
+        "time,a.velocity,b.velocity\n0,1,2,\n0.1,3,4,\n",
+        "time,a.velocity,b.velocity,\n0,1,2,\n0.1,3,4,\n",
+        f"time,a.velocity,b.velocity\nms,deg/s,[rpm]\n0,{np.rad2deg(1)},{60 / np.pi}\n"
+        f"100,{np.rad2deg(3)},{120 / np.pi}\n",
+    ],
+)
+@pytest.mark.parametrize("size", [30, 1000])
+def test_a_stream_is_read_as_a_file_of_its_rows(text, size, tmp_path):
+    path, told = tmp_path / "live.csv", []
+    path.write_text(text)
+    session = SimpleNamespace(push=lambda **rows: told.append(rows), note=pytest.fail)
+    session.summary = SimpleNamespace(samples=2)
+    follow(Trickle(text.encode(), size), (), lambda names: nullcontext(session))
+    run = read_log(path, rate=10.0).run
+    for name, expected in (("velocity", [[1.0, 2.0], [3.0, 4.0]]), ("time", [0.0, 0.1])):
+        found = np.concatenate([rows[name] for rows in told])
+        np.testing.assert_allclose(found, expected, rtol=1e-12)
+        np.testing.assert_allclose(found, getattr(run, name), rtol=1e-6)
 
 
 def live(*arguments, text="", **options):

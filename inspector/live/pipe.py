@@ -3,10 +3,11 @@
 Rows are CSV with a header, or a JSON object per line.
 """
 
+import csv
 import json
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import date
 from itertools import chain, groupby
@@ -21,7 +22,7 @@ import numpy as np
 from inspector.errors import EXIT, Status
 from inspector.live.session import SIGNALS, LiveError, LiveSession, Summary
 from inspector.logs.clocks import UNITS
-from inspector.logs.csv import numbers_in
+from inspector.logs.csv import MISSING, numbers_in
 from inspector.logs.names import (
     TIME_UNITS,
     Naming,
@@ -31,6 +32,7 @@ from inspector.logs.names import (
     time_column,
     without_unit,
 )
+from inspector.logs.names import UNITS as SIZES
 from inspector.reference.judging import GAP
 from inspector.reference.levels import Levels
 from inspector.reference.store import Reference
@@ -53,7 +55,6 @@ MAX_LINE_BYTES = 1 << 24
 SMALL_CHUNK_BYTES = 1 << 15
 GATHER = 0.02  # how long rows wait for more, in [s]: less than half of a session's batch
 EXPECTED = "expected a CSV header and rows, or a JSON object per line"
-UNKNOWN = ("", "nan", "null")  # cells of what is not known, in lower case
 
 
 def follow(
@@ -65,12 +66,9 @@ def follow(
 ) -> Summary:
     """Show rows as they arrive, until they end, Ctrl-C is pressed, or there are enough."""
     with interruptible(chunks(stream, gather=GATHER)) as incoming:
-        lines, number = next(incoming, (b"", 1))
-        head, _, rest = lines.partition(b"\n")
-        if not head.strip():
-            raise LiveError(f"the input is empty; {EXPECTED}")
+        head, rest, number = _begun(incoming)
         reader, is_header = reader_of(head, names)
-        start = (rest, number + 1) if is_header else (lines, number)
+        start = (rest, number + 1) if is_header else (head + b"\n" + rest, number)
         with session_of(reader.names) as session:
             for lines, number in chain([start], incoming):
                 for rows in reader.read(lines, number, session.note):
@@ -80,6 +78,32 @@ def follow(
     if not session.summary.samples:
         raise LiveError(f"the input has no samples; {EXPECTED}")
     return session.summary
+
+
+def _begun(incoming: Iterator[tuple[bytes, int]]) -> tuple[bytes, bytes, int]:
+    """First line that is neither blank nor a comment, what came after it, and its number."""
+    for lines, number in incoming:
+        while lines:
+            head, _, lines = lines.partition(b"\n")
+            names = any(map(column_signal, _header(head)[0]))
+            if head.strip() and (names or not head.lstrip().startswith(b"#")):
+                return head, lines, number
+            number += 1
+    raise LiveError(f"the input is empty; {EXPECTED}")
+
+
+def _header(head: bytes) -> tuple[list[str], str]:
+    """Names of columns, and the mark between them; NumPy writes "# time"."""
+    text = head.decode("utf-8-sig", errors="replace").strip().lstrip("# ")
+    delimiter = next((mark for mark in ",;\t" if mark in text), ",")
+    return _cells(text, delimiter), delimiter
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    cells = [line[:80]]
+    with suppress(csv.Error):  # a cell of more than 128 KiB
+        cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    return [cell.strip() for cell in cells]
 
 
 def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, int]]:
@@ -144,10 +168,12 @@ class CsvReader:
     """Reads rows under a header such as ``time,elbow.velocity``; names tell the order of joints."""
 
     def __init__(self, head: bytes, names: tuple[str, ...]) -> None:
-        text = head.decode("utf-8-sig", errors="replace").strip().lstrip("# ")
-        self._delimiter = next((mark for mark in ",;\t" if mark in text), ",")
-        header = [cell.strip() for cell in text.split(self._delimiter)]
-        self._width = len(header)
+        self._header, self._delimiter = _header(head)
+        self._width, self._given, self._begun = len(self._header), names, False
+        self.names = self._find(self._header, names)
+
+    def _find(self, header: list[str], names: tuple[str, ...]) -> tuple[str, ...]:
+        """Find the columns of signals and time, and name the joints."""
         found: dict[str, dict[str, int]] = {}
         naming = Naming.of(header)
         for place, column in enumerate(header):
@@ -169,46 +195,67 @@ class CsvReader:
                 "the header names no velocity; expected columns such as elbow.velocity,"
                 f" they are {listed(header)}"
             )
-        self.names = names or tuple(found["velocity"])
+        names = names or tuple(found["velocity"])
+        for kind, by_joint in found.items():
+            if lacking := [name for name in names if name not in by_joint]:
+                raise LiveError(f"the header has no {kind} of joint {lacking[0]!r}")
+        time = time_column(header)
+        places = {kind: [by_joint[name] for name in names] for kind, by_joint in found.items()}
+        places |= {"time": [header.index(time)]} if time else {}
+        # Only these are read: others may hold text.
+        self._wanted = wanted = sorted(set().union(*places.values()))
+        self._timed, unit = bool(time), TIME_UNITS.get(without_unit(time)[1], "seconds")
         # With the sizes of their units, where one is not 1. Columns side by side are not copied.
         self._columns: dict[str, tuple[list[int] | slice, Array | None]] = {}
-        for kind, by_joint in found.items():
-            if lacking := [name for name in self.names if name not in by_joint]:
-                raise LiveError(f"the header has no {kind} of joint {lacking[0]!r}")
-            places = [by_joint[name] for name in self.names]
-            factors = np.array([factor_of(header[place]) for place in places])
-            beside = places == list(range(places[0], places[0] + len(places)))
-            chosen = slice(places[0], places[-1] + 1) if beside else places
+        for kind, of_joints in places.items():
+            factors = np.array([factor_of(header[place]) for place in of_joints])
+            factors = np.array([float(UNITS[unit])]) if kind == "time" else factors
+            taken = [wanted.index(place) for place in of_joints]
+            beside = taken == list(range(taken[0], taken[0] + len(taken)))
+            chosen = slice(taken[0], taken[-1] + 1) if beside else taken
             self._columns[kind] = chosen, None if (factors == 1.0).all() else factors
-        time = time_column(header)
-        self._time = header.index(time) if time else None
-        self._second = float(UNITS[TIME_UNITS.get(without_unit(time)[1], "seconds")])
+        return names
 
     def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
         """Read whole lines; those that cannot be read are noted."""
-        plain = numbers_in(lines, self._width, self._delimiter, range(self._width))
+        if not self._begun:
+            lines, first = self._begin(lines, first)
+        plain = numbers_in(lines, self._width, self._delimiter, self._wanted)
         table = self._read_lines(lines, first, note) if plain is None else plain[0]
         if len(table):
             rows = {}
             for name, (places, factors) in self._columns.items():
                 rows[name] = table[:, places] if factors is None else table[:, places] * factors
-            if self._time is not None:
-                rows["time"] = table[:, self._time] * self._second
+            if self._timed:
+                rows["time"] = rows["time"][:, 0]
             yield rows
+
+    def _begin(self, lines: bytes, first: int) -> tuple[bytes, int]:
+        """Take units from the first row, if it has some; rows may end with a mark more."""
+        head, _, rest = lines.partition(b"\n")
+        cells = _cells(head.decode(errors="replace"), self._delimiter)
+        self._begun = any(cells)
+        self._width += len(cells) == self._width + 1 and not cells[-1]
+        units = [cell.strip("[]() ") for cell in cells]
+        if not self._begun or not all(not u or u.lower() in {*SIZES, *TIME_UNITS} for u in units):
+            return lines, first
+        above = zip(self._header, units, strict=False)
+        self._find([f"{name} [{unit}]" if unit else name for name, unit in above], self._given)
+        return rest, first + 1
 
     def _read_lines(self, lines: bytes, first: int, note: Note) -> Array:
         """Read rows one by one, of which some have cells that are empty, padded or no numbers."""
-        width = self._width
 
         def parse(line: bytes) -> list[float]:
-            cells = line.decode(errors="replace").split(self._delimiter)
-            if len(cells) != width:
-                raise ValueError(f"{len(cells)} cells where the header names {width}")
-            return [nan if cell.strip().lower() in UNKNOWN else float(cell) for cell in cells]
+            cells = _cells(line.decode(errors="replace"), self._delimiter)
+            if len(cells) != self._width:
+                raise ValueError(f"{len(cells)} cells where the header names {self._width}")
+            wanted = (cells[place] for place in self._wanted)
+            return [nan if cell.lower() in MISSING else float(cell) for cell in wanted]
 
         # Without timestamps, the row alone keeps the time.
-        instead = [[nan] * width] if self._time is None else []
-        return np.array(_parsed(lines, first, parse, note, instead)).reshape(-1, width)
+        instead = [] if self._timed else [[nan] * len(self._wanted)]
+        return np.array(_parsed(lines, first, parse, note, instead)).reshape(-1, len(self._wanted))
 
 
 class JsonReader:
