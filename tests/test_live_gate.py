@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from commandline import call
+from recordings import read
 
 from inspector.library import demo_run
 from inspector.reference.judging import Kind
@@ -44,6 +45,12 @@ def live(rows, tmp_path, monkeypatch):
     return run
 
 
+def verdicts(folder):
+    """What was drawn in turn."""
+    found = read(folder / "live.rrd", "/verdict/words", "Points2D:labels")[1]
+    return [words for (words,) in found]
+
+
 def test_a_stream_with_a_finding_prints_it_and_ends_with_1(live):
     status, out, _ = live()
     assert status == 1
@@ -61,13 +68,16 @@ def test_single_samples_that_are_lost_or_late_hide_no_finding(live, rows):
         assert (status, "findings: 1 impact" in out) == (1, True)
 
 
-def test_a_stream_of_which_little_can_be_judged_is_not_ok(live, rows):
+def test_a_stream_of_which_little_can_be_judged_is_not_ok(live, rows, tmp_path):
     header, *lines = rows[0].splitlines()
     holes = [line for place, line in enumerate(lines) if place % 4200 > 30]
     status, out, _ = live(text="\n".join([header, *holes[:15_000], ""]))
     assert (status, "cannot-tell: gaps leave labels to" in out) == (4, True)
     status, out, _ = live(text="\n".join([header, *lines[:5900], ""]))
     assert (status, "it takes 0.6 s to tell what lasts" in out) == (4, True)
+    assert verdicts(tmp_path) == ["PASS so far", "CANNOT TELL"]
+    assert live(text="\n".join([header, *lines[:900], ""]))[0] == 4
+    assert verdicts(tmp_path) == ["CANNOT TELL"]
     status, out, _ = live(text="\n".join([header, *lines[:15_000:2], ""]))
     assert (status, "is the rate right?" in out) == (4, True)
 
@@ -124,6 +134,24 @@ def test_a_stream_louder_than_its_reference_ends_with_1_and_names_joint_and_deci
     assert summary["findings"][0]["evidence"]["joint"] == "elbow"
 
 
+def test_a_stream_beside_its_reference_is_named_and_drawn_as_its_file_is(
+    live, accepted, simulate, tmp_path
+):
+    run = simulate.run("pick", 5)
+    now = (run.time > 2.0) & (run.time < 2.1)
+    run.velocity[now, 2] += 0.1 * np.sin(2 * np.pi * 40 * run.time[now])
+    (tmp_path / "x.csv").write_text(streamed(run))
+    options = ("--reference", accepted, "--format", "json")
+    (file,) = json.loads(call("classify", tmp_path / "x.csv", *options)[1])["runs"]
+    _, out, _ = live(*options, text=streamed(run), rate=1000)
+    found = json.loads(out.splitlines()[-1])["findings"]
+    assert [each["label"] for each in found] == [each["label"] for each in file["events"]]
+    kind = found[0]["label"]
+    assert verdicts(tmp_path) == ["PASS so far", f"FAIL   1 {kind}"]
+    told = [line for (line,) in read(tmp_path / "live.rrd", "/events", "TextLog:text")[1]]
+    assert told == [f"found: {kind} from {found[0]['start']:.2f} s"]
+
+
 def test_a_touch_that_was_accepted_is_excused_at_the_end(live, simulate, tmp_path):
     good = tmp_path / "good"
     good.mkdir()
@@ -135,6 +163,7 @@ def test_a_touch_that_was_accepted_is_excused_at_the_end(live, simulate, tmp_pat
     assert status == 0, out + err
     assert "does not count: as reference: as loud as 3 of place" in out
     assert out.startswith("6000 samples, ")  # nothing before the end
+    assert verdicts(tmp_path) == ["PASS so far"]
 
 
 @pytest.mark.parametrize("scenario", ["pick", "place", "wave"])

@@ -421,6 +421,7 @@ def live(
         on_warning=partial(typer.echo, err=True),
         on_finding=gate.take,
         on_levels=None if known is None else gate.compare,
+        on_end=gate.judge,
     )
     summary = follow(
         sys.stdin.buffer,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import noisemodel as nm
 from inspector import colors
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, Status
 from inspector.levels import SPECTRUM, amplitudes, extremes, in_bands, window_length
 from inspector.live.labels import Labeller
 from inspector.recording import panels, viewer, views
@@ -33,6 +33,7 @@ from inspector.recording.views import (
     scalars,
     style_lines,
 )
+from inspector.reference.verdicts import LOUDER
 from inspector.report import spoken
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
@@ -343,11 +344,11 @@ class Drawing:
         if robot is not None:
             self._robot = LiveRobot(self._messages, robot, joint_names, moves=moves)
         self._hop, classes = labeller.hop, labeller.classes
-        self._colours = colors.of_classes((*classes, UNKNOWN))
+        self._colours = colors.of_classes((*classes, UNKNOWN, LOUDER))
         self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
         height = panels.ROW * len(self._rows) + views.AXIS
         self._classes = Panel("class", height) if classes else None
-        self._told: str | None = None  # findings of the verdict that is drawn
+        self._told = ""  # verdict that is drawn
         self._plots: dict[str, dict[str, slice]] = {}  # columns of each entity, by signal
         self._titles: dict[str, list[str]] = {}  # entities of each plot
         size = panels.JOINTS_PER_PLOT
@@ -396,12 +397,11 @@ class Drawing:
         named = views.row_labels(names, list(map(panels.readable, shades)))
         views.log_beside(recording, self._classes, named, nothing)
 
-    def begin(self, time: float, signals: Mapping[str, Array]) -> None:
+    def begin(self, signals: Mapping[str, Array]) -> None:
         """Send the layout with the first sample, whose pose places the camera.
 
         Every plot shows the last ten seconds.
         """
-        self.findings(time, ())
         over_time = [
             views.timed(NOISE_PANEL, title="Noise", between=None, last=SHOWN),
             views.timed(SPECTROGRAM_PANEL, title="Spectrum", last=SHOWN),
@@ -464,14 +464,15 @@ class Drawing:
         points = states.reshape(-1, len(self._rows))
         self._messages.add("/class/found", times.ravel(), points, _found, urgent=True)
 
-    def findings(self, time: float, found: Sequence[Event]) -> None:
+    def verdict(self, time: float, status: Status, found: Sequence[Event]) -> None:
         """Show the verdict on the stream so far, where it changes."""
         count = Counter(spoken(event.label) for event in found)
-        title = ", ".join(f"{number} {label}" for label, number in count.items())
-        if self._classes is not None and title != self._told:
-            self._told = title
-            verdict = ("findings", f"FAIL   {title}") if title else ("ok", "PASS so far")
-            views.log_verdict(self._recording, *verdict, time)
+        kinds = ", ".join(f"{number} {label}" for label, number in count.items())
+        told = {Status.OK: "PASS so far", Status.CANNOT_TELL: "CANNOT TELL"}
+        words = told.get(status, f"FAIL   {kinds}".strip())
+        if self._classes is not None and words != self._told:
+            self._told = words
+            views.log_verdict(self._recording, status, words, time)
 
     def found(self, event: Event, over: bool) -> None:
         """Add a finding that begins or is over to the list of events."""
@@ -485,10 +486,9 @@ class Drawing:
         """Add a line to the list of events."""
         log_events(self._recording, [(time, text, colour)])
 
-    def finish(self, time: float, found: Sequence[Event]) -> None:
-        """Show what waits, and the findings of the whole stream."""
-        if self._told is not None:  # there were samples
-            self.findings(time, found)
+    def finish(self, time: float, status: Status, found: Sequence[Event]) -> None:
+        """Show what waits, and the verdict on the whole stream."""
+        self.verdict(time, status, found)
         self._messages.flush()
 
 

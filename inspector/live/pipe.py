@@ -6,7 +6,7 @@ Rows are CSV with a header, or a JSON object per line.
 import csv
 import json
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import date
@@ -39,7 +39,7 @@ from inspector.reference.store import Reference
 from inspector.reference.verdicts import beside, judge
 from inspector.text import program_version
 from inspector.verdict import Finding, Verdict, counts
-from noiseclassifier import Event
+from noiseclassifier import Event, Labels
 from noiseclassifier.labels import interval
 from noisemodel.types import Array
 
@@ -328,6 +328,7 @@ class Gate:
         self._told: list[Finding] = []
         self._begin: float | None = None  # of what was compared so far
         self._heard = 0.0
+        self._verdict = Verdict(NAME, Status.CANNOT_TELL)  # on the whole stream
 
     def take(self, event: Event, over: bool) -> None:
         """Print a finding when it is there, and when it is over; beside a reference, keep it."""
@@ -335,12 +336,13 @@ class Gate:
         if self._reference is None:
             self._print(found, over=over)
 
-    def compare(self, latest: Levels) -> None:
-        """Print findings in the last 6 s beside the reference, each once."""
+    def compare(self, latest: Levels, frames: Labels | None) -> Sequence[Finding]:
+        """Print findings in the last 6 s beside the reference, each once; all of them so far."""
         if self._begin is None:
             self._begin = self._heard = latest.start
         found = tuple(self._found.values())
-        verdict = self._beside(Verdict(NAME, Status.OK, events=found, begin=self._begin), latest)
+        verdict = Verdict(NAME, Status.OK, events=found, begin=self._begin)
+        verdict = self._beside(verdict, latest, frames)
         for event in verdict.failing:
             if event.start > latest.time[-1] or event.stop < latest.start:
                 continue
@@ -348,6 +350,7 @@ class Gate:
                 self._told.append(event)
                 self._print(event, over=False)
             self._heard = max(self._heard, event.stop + GAP)
+        return tuple(self._told)
 
     def _print(self, event: Finding, *, over: bool) -> None:
         self.failed = self.failed or event.fails
@@ -364,9 +367,14 @@ class Gate:
             became = f" ({event.became})" if event.became else became
             self._tell(f"{event.label} from {event.start:.2f} s{event.novelty}{became}")
 
+    def judge(self, summary: Summary) -> Summary:
+        """Judge the whole stream."""
+        self._verdict = verdict = self._judged(summary)
+        return replace(summary, status=verdict.status, findings=verdict.failing)
+
     def end(self, summary: Summary) -> int:
         """Print what became of the stream."""
-        verdict = self._verdict(summary)
+        verdict = self._verdict
         if self._as_json:
             line: dict[str, Any] = {
                 "format": FORMAT,
@@ -401,7 +409,7 @@ class Gate:
             self._tell(f"compared with {verdict.beside.path}: {verdict.beside.words}")
         return EXIT[verdict.status]
 
-    def _verdict(self, summary: Summary) -> Verdict:
+    def _judged(self, summary: Summary) -> Verdict:
         """The verdict on the whole stream."""
         duration = summary.samples / summary.rate
         events = tuple(map(Finding.of, summary.findings))
@@ -412,12 +420,13 @@ class Gate:
             status = Status.FINDINGS if self._told else Status.OK
             verdict = replace(verdict, status=status, events=tuple(self._told))
         else:
-            verdict = self._beside(replace(verdict, begin=summary.levels.start), summary.levels)
+            verdict = replace(verdict, begin=summary.levels.start)
+            verdict = self._beside(verdict, summary.levels, summary.frames)
         if summary.status is Status.CANNOT_TELL and summary.model and verdict.status is Status.OK:
             return replace(verdict, status=Status.CANNOT_TELL)  # too little of it was seen
         return verdict
 
-    def _beside(self, verdict: Verdict, levels: Levels) -> Verdict:
+    def _beside(self, verdict: Verdict, levels: Levels, frames: Labels | None) -> Verdict:
         assert self._reference is not None
-        verdict = beside(verdict, self._reference.compare(levels), self._reference)
+        verdict = beside(verdict, self._reference.compare(levels), self._reference, frames)
         return judge(verdict, self._reference, today=date.today())

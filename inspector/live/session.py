@@ -22,7 +22,7 @@ from inspector.logs.mapping import check_joints
 from inspector.logs.motion import LONG, LimitWatch
 from inspector.recording.views import FARTHEST
 from inspector.reference.levels import LONGEST, Levels, LevelStream
-from noiseclassifier import Event, merged
+from noiseclassifier import Event, Labels, merged
 from noiseclassifier.lasting import SHORTEST
 from noisemodel.files import beyond, limit
 from noisemodel.robot import joint_limits
@@ -304,6 +304,7 @@ class Summary:
     findings: Sequence[Event] = ()  # each from the start of its first frame to the end of its last
     reason: str = "no frame was labelled"  # why nothing can be told
     levels: Levels | None = None  # of the whole session once it is closed, if they were kept
+    frames: Labels | None = None  # labels of its frames, if levels were kept
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {label}" for label, count in self.labels.items())
@@ -336,7 +337,10 @@ class LiveSession:
         overwrite: Whether a file that exists may be replaced.
         keep_levels: Whether octave levels are kept, of an hour at most, 8 kB a second of 7 joints
             at 1 kHz, which `Reference.compare` takes at the end.
-        on_levels: Called every 3 s with the levels of the last 6 s, a second after these came.
+        on_levels: Called every 3 s with the levels of the last 6 s, a second after these came, and
+            the labels of all frames. The findings that it returns are drawn instead of those of the
+            model.
+        on_end: Called with the summary before the recording ends. What it returns is drawn.
         on_warning: Called with a line for what cannot be shown, once per kind.
         on_finding: Called with each finding as soon as it is confirmed, and False; and with it and
             True when it is over. The latter are those of the summary.
@@ -358,7 +362,8 @@ class LiveSession:
         connect: str | None = None,
         overwrite: bool = False,
         keep_levels: bool = False,
-        on_levels: Callable[[Levels], None] | None = None,
+        on_levels: Callable[[Levels, Labels | None], Sequence[Event]] | None = None,
+        on_end: Callable[[Summary], Summary] = lambda summary: summary,
         on_warning: Callable[[str], None] = lambda line: None,
         on_finding: Callable[[Event, bool], None] | None = None,
     ) -> None:
@@ -367,7 +372,7 @@ class LiveSession:
         self._rate, self._robot, self._names = rate, robot, tuple(joint_names)
         self._library = load_library() if library is None else library
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
-        self._on_finding, self._on_levels = on_finding, on_levels
+        self._on_finding, self._on_levels, self._on_end = on_finding, on_levels, on_end
         self._keep_levels = keep_levels or on_levels is not None
         self._latest, self._now = -1.0 / rate, 0.0  # timestamp that came, time that was worked on
         self._buffer: SampleBuffer | None = None  # what follows is there once there are samples
@@ -376,6 +381,8 @@ class LiveSession:
         self._last: tuple[Array, dict[str, Array]] | None = None  # time and signals of a sample
         self._counts: Counter[str] = Counter()  # frames that were labelled, by class
         self._levels: Levels | None = None
+        self._frames: list[Labels] = []  # if levels are kept
+        self._judged: Sequence[Event] = ()  # what `on_levels` found
         self._closed = False
         self._sink = Sink(Path(save) if save else None, connect, overwrite=overwrite)
 
@@ -454,6 +461,7 @@ class LiveSession:
             findings=findings,
             reason=reason,
             levels=self._levels,
+            frames=self._kept,
         )
 
     def _doubt(self, samples: int) -> str:
@@ -487,7 +495,8 @@ class LiveSession:
                 if self._stream.too_long:
                     line = f"more than {LONGEST / 60:.0f} minutes are not compared as a whole"
                     self.note("streams too long for a reference", line)
-            self._drawing.finish(self._now, self._found)
+            summary = self._on_end(self.summary)
+            self._drawing.finish(self._now, summary.status, summary.findings)
         finally:
             if not self._sink.close():
                 self._note_unseen()
@@ -529,7 +538,8 @@ class LiveSession:
         if self._keep_levels:
             # A file's name is none that a reference knows.
             named = "" if robot is None or Path(robot).suffix else robot
-            self._stream = LevelStream(names, self._rate, named, self._on_levels)
+            tell = None if self._on_levels is None else self._compare
+            self._stream = LevelStream(names, self._rate, named, tell)
         self._noisy = [name for name in NOISY if name in widths]
         self._clock = Clock(self._rate, self._warnings)
         self._labeller = Labeller(self._library, self._rate, widths)
@@ -564,8 +574,26 @@ class LiveSession:
         """The findings so far, as if the signal ended here."""
         return merged(*self._findings.events, *self._labeller.lasting)
 
+    @property
+    def _kept(self) -> Labels | None:
+        """Labels of the frames so far, if levels are kept."""
+        self._frames = [Labels.concatenated(self._frames)] if self._frames else []
+        return next(iter(self._frames), None)
+
+    def _compare(self, latest: Levels) -> None:
+        """Have what came lately judged, and draw what was found."""
+        assert self._on_levels is not None
+        frames, told = self._kept, len(self._judged)
+        if frames is not None and self._stream is not None and self._stream.too_long:
+            first = int(np.searchsorted(frames.stop, latest.start))
+            self._frames = [frames.part(slice(first, None))]
+        self._judged = self._on_levels(latest, frames)
+        for event in self._judged[told:]:
+            self._drawing.found(event, False)
+
     def _tell(self, event: Event, over: bool) -> None:
-        self._drawing.found(event, over)
+        if self._on_levels is None:
+            self._drawing.found(event, over)
         if self._on_finding is not None:
             self._on_finding(event, over)
 
@@ -577,7 +605,7 @@ class LiveSession:
         if not len(time):
             return
         if self._last is None:
-            self._drawing.begin(float(time[0]), signals)
+            self._drawing.begin(signals)
         time, signals, lost = self._filled(time, signals, lost)
         self._now = float(time[-1])
         motion = np.hstack([signals[name] for name in self._noisy])
@@ -643,8 +671,10 @@ class LiveSession:
         self._news.update(told, decided, float(labels.stop[-1]))
         self._counts.update(labels.raw.tolist())
         self._drawing.labels(labels)
+        self._frames += [labels] if self._keep_levels else []
         if self._sink.open:
-            self._drawing.findings(end, self._found)
+            found = self._found if self._on_levels is None else self._judged
+            self._drawing.verdict(end, Status.FINDINGS if found else Status.OK, found)
 
     def _note_unseen(self) -> None:
         """Count the samples since the viewer was last known to be there and to keep up."""
