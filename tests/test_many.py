@@ -95,6 +95,14 @@ def test_each_run_has_its_row_of_classes_and_of_levels_in_the_order_given(tmp_pa
     assert "/curves/001" in curves
 
 
+def test_runs_that_cannot_be_judged_do_not_pass(tmp_path):
+    paths = [run_file(tmp_path, name) for name in "abc"]
+    impact = (Event("impact", 1.0, 1.1, 0.9),)
+    for findings, told in (((), "CANNOT TELL   3 of 3 runs"), ([impact], "FAIL   1 of 3 runs")):
+        write(laid(*paths, findings=findings), tmp_path / "out.rrd", overwrite=True)
+        assert read(tmp_path / "out.rrd", "/verdict/words", "Points2D:labels")[1] == [[told]]
+
+
 def test_the_table_has_a_row_for_each_run_and_marks_the_worst(tmp_path):
     paths = [run_file(tmp_path, name) for name in "abc"]
     events = (Event("highaccelerations", 1.0, 1.2, 0.9), Event("impact", 2.0, 2.1, 0.8))

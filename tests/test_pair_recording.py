@@ -235,6 +235,7 @@ def test_runs_of_few_samples_are_compared_too(tmp_path, samples):
     )
     write(compared(tmp_path, run, run), tmp_path / "out.rrd")
     assert scalars(tmp_path / "out.rrd", "/noise/after")[1].shape == (samples, 1)
+    assert read(tmp_path / "out.rrd", "/verdict/words", "Points2D:labels")[1] == [["CANNOT TELL"]]
 
 
 def test_different_joints_are_shown_each(tmp_path):

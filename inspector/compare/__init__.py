@@ -18,7 +18,7 @@ import rerun as rr
 
 from inspector import colors
 from inspector.analysis import Analysis, analyse, robot_known, with_links, worst_joint, worst_signal
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, Status
 from inspector.levels import FLOOR_DB, SPECTRUM, STEP, Spectrogram, spectrogram
 from inspector.library import Library
 from inspector.logs.read import Opened, open_run
@@ -614,7 +614,10 @@ def _log_text(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]
     kinds = {change.kind for change in found}
     worse, better = kinds & {NEW, LOUDER}, kinds & {RESOLVED, QUIETER}
     told = f"{'WORSE' if worse else 'BETTER' if better else 'SAME'}   {_counts(found)}".strip()
-    verdict = views.log_verdict(recording, "findings" if worse else "ok", told)
+    status = Status.FINDINGS if worse else Status.OK
+    if not found and Status.CANNOT_TELL in (pair.before.status, pair.after.status):
+        status, told = Status.CANNOT_TELL, "CANNOT TELL"
+    verdict = views.log_verdict(recording, status, told)
     text = views.text("Before \u2192 after")
     if found:
         text = views.tabs(text, views.events("Changes"))

@@ -12,6 +12,7 @@ import rerun as rr
 
 from inspector import colors, levels
 from inspector.analysis import Analysis, analyse
+from inspector.errors import Status
 from inspector.levels import FLOOR_DB
 from inspector.library import Library
 from inspector.logs.read import Opened
@@ -97,9 +98,13 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         end = max(float(side.run.time[-1]) for side in several.sides)
         views.log_span(recording, begin, end)
         failing = sum(bool(side.findings) for side in several.sides)
-        told = f"FAIL   {failing} of {len(several.names)} runs" if failing else "PASS   no finding"
-        verdict = views.log_verdict(recording, "findings" if failing else "ok", told)
-        count = len(several.names)
+        unknown = sum(side.status is Status.CANNOT_TELL for side in several.sides)
+        count, told = len(several.names), (Status.OK, "PASS   no finding")
+        if failing or unknown:
+            told = (Status.CANNOT_TELL, f"CANNOT TELL   {unknown} of {count} runs")
+        if failing:
+            told = (Status.FINDINGS, f"FAIL   {failing} of {count} runs")
+        verdict = views.log_verdict(recording, *told)
         room = WHOLE - TABLE - CURVE
         row = min((room / 2 - views.AXIS) / count, HIGHEST)
         apart = row >= LOWEST
