@@ -104,17 +104,17 @@ def link_levels(noise: LinkNoise) -> tuple[Array, Array]:
 
 
 WINDOW = 0.1024  # length of the window in [s]: the paper's 1024 samples at 10 kHz
-COLUMNS = 400  # most windows of a spectrogram
+COLUMNS = 400  # most columns of a spectrogram
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrogram:
-    """Amplitudes of a signal in windows."""
+    """Amplitudes of a signal in windows; of long ones, a column is the maximum of several."""
 
-    time: Array  # centres of the windows, shape (columns,), in [s]
+    time: Array  # centres of the columns, shape (columns,), in [s]
     frequency: Array  # shape (bins,), in [Hz]; the mean is left out
     amplitude: Array  # shape (bins, columns), in the unit of the signal; 0 where not valid
-    valid: Mask  # false for windows that touch a gap, shape (columns,)
+    valid: Mask  # false where all windows touch a gap, shape (columns,)
 
     @cached_property
     def decibel(self) -> Array:
@@ -125,16 +125,26 @@ class Spectrogram:
 def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spectrogram:
     """Compute the spectrogram of a signal for viewing; ``start`` is its first time, in [s]."""
     length = min(window_length(rate), len(signal))
-    hop = max(1, length // 4, -(-(len(signal) - length) // (COLUMNS - 1)))
+    step = max(1, length // 4, -(-(len(signal) - length) // (COLUMNS - 1)))
+    several = -(-step // length)  # windows of a column, so that no sample is between them
+    hop = -(-step // several)
     windows = np.lib.stride_tricks.sliding_window_view(signal, length)[::hop]
-    whole = np.lib.stride_tricks.sliding_window_view(valid, length)[::hop].all(axis=1)
-    columns = np.arange(len(windows), dtype=np.float64)
-    bins = np.arange(1, length // 2 + 1, dtype=np.float64)
+    touched = np.lib.stride_tricks.sliding_window_view(~valid, length)[::hop]
+    whole = ~np.max(touched, axis=1)
+    column = np.arange(len(windows)) // several
+    amplitude = np.zeros((column[-1] + 1, length // 2))
+    for first in range(0, len(windows), COLUMNS):
+        part = slice(first, first + COLUMNS)
+        firsts = np.flatnonzero(np.diff(column[part], prepend=-1))
+        loudest = np.maximum.reduceat(amplitudes(windows[part]) * whole[part, None], firsts)
+        own = column[part][firsts]
+        amplitude[own] = np.maximum(amplitude[own], loudest)
+    middles = np.arange(len(amplitude)) * several * hop + ((several - 1) * hop + length) / 2
     return Spectrogram(
-        time=start + (columns * hop + length / 2) / rate,
-        frequency=bins * rate / length,
-        amplitude=amplitudes(windows).T * whole,
-        valid=np.asarray(whole),
+        time=np.asarray(start + middles / rate),
+        frequency=np.arange(1, length // 2 + 1) * rate / length,
+        amplitude=amplitude.T,
+        valid=np.bincount(column, whole) > 0,
     )
 
 
@@ -158,9 +168,9 @@ def window_length(rate: float) -> int:
 
 
 def amplitudes(windows: Array) -> Array:
-    """Amplitude spectra of Hann windows, each freed of its mean."""
+    """Amplitude spectra of Hann windows, each freed of its mean under the window."""
     hann = np.hanning(windows.shape[1] + 1)[:-1]  # periodic
-    centred = windows - windows.mean(axis=1, keepdims=True)
+    centred = windows - (windows @ hann / hann.sum())[:, None]
     return np.asarray(np.abs(np.fft.rfft(centred * hann, axis=1))[:, 1:] * 2 / hann.sum())
 
 

@@ -12,6 +12,7 @@ from inspector.levels import (
     JOINTS,
     LINKS,
     STEP,
+    amplitudes,
     extremes,
     in_bands,
     link_levels,
@@ -138,11 +139,20 @@ def test_times_are_those_of_the_run():
     assert shown.time[shown.amplitude.max(axis=0).argmax()] == pytest.approx(7.5, abs=0.03)
 
 
-def test_columns_are_few_however_long_the_run():
-    signal = wave(50.0, 1000.0, 300.0)
-    shown = spectrogram(signal, 1000.0, start=0.0, valid=everywhere(signal))
-    assert shown.amplitude.shape[1] <= COLUMNS
-    assert shown.time[-1] > 299.0
+def test_a_window_does_not_see_a_sample_at_its_edge_where_it_is_zero():
+    np.testing.assert_allclose(amplitudes(np.eye(1, 64)), 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("seconds", [30.0, 41.0, 300.0, 1000.0])
+def test_columns_are_few_and_show_a_tone_wherever_it_is_in_a_long_run(seconds):
+    for start in np.linspace(1.0, seconds - 1.0, 7):
+        signal, now = np.zeros(round(1000 * seconds)), slice(round(1000 * start), None)
+        signal[now][:200] = wave(83.0, 1000.0, 0.2)
+        shown = spectrogram(signal, 1000.0, start=5.0, valid=everywhere(signal))
+        level = shown.decibel.max(axis=0)
+        assert shown.amplitude.shape[1] <= COLUMNS
+        assert level.max() == pytest.approx(0.0, abs=1.5)
+        assert shown.time[level.argmax()] == pytest.approx(5.1 + start, abs=0.1 + seconds / 400)
 
 
 def test_a_band_has_the_largest_amplitude_within_it_or_that_of_the_nearest_bin():
