@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 from itertools import pairwise
 from math import inf
 from pathlib import Path
@@ -143,7 +144,7 @@ class Recorder:
         meta = dict(self._meta)
         if "time" in signals:
             stamps = signals.pop("time")[:, 0]
-            meta["start"] = f"{stamps[0]:.9g}"
+            meta["start"] = f"{Decimal(str(stamps[0])).normalize():f}"
             time, valid, signals = self._uniform(stamps - stamps[0], valid, signals, meta)
         else:
             time = np.arange(self._count) / self._rate

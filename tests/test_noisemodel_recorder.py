@@ -157,7 +157,7 @@ def stamped(stamps, rate=128, **signals):
     recorder = nm.Recorder(None, rate)
     for stamp in stamps:
         time = stamp * STEP
-        recorder.push(time=5.0 + time, **{name: make(time) for name, make in signals.items()})
+        recorder.push(time=5.0009765625 + time, **{n: make(time) for n, make in signals.items()})
     return recorder.run()
 
 
@@ -186,7 +186,7 @@ def test_samples_are_interpolated_between_stamps_and_not_in_gaps_or_at_single_sa
     np.testing.assert_array_equal(run.time, np.arange(44) * STEP)
     known = [*range(7), *range(12, 15), 30, 31, *range(40, 44)]
     assert np.flatnonzero(run.mask).tolist() == known
-    assert run.meta["start"] == "5"
+    assert run.meta["start"] == "5.0009765625"
     assert run.meta["jitter"] == pytest.approx({"rms": STEP * np.sqrt(0.75 / 12), "max": STEP / 2})
     there, gap = run.time[known], ~run.mask
     np.testing.assert_allclose(run.velocity[known], [*map(ramp, there)], rtol=1e-12)
