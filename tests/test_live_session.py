@@ -299,13 +299,13 @@ def test_samples_that_are_left_out_leave_no_verdict_of_ok(tmp_path, library):
 def test_unknown_values_make_no_noise_and_no_label(tmp_path, library):
     signals = motion(2.0, hum=(9.0, 9.0))
     signals["velocity"][1000:1003, 1] = np.nan
-    signals["velocity"][1500, 0] = np.inf
+    signals["velocity"][1500:1502, 0] = np.inf, 2.0**31
     path, warned, summary = shown(tmp_path, signals, library=library)
     assert warned == [
         "velocity or velocity_desired is not known at 1.000 s: such samples make no noise, frames"
         " with one have no label"
     ]
-    assert summary.warnings == {"samples without noise": 4}
+    assert summary.warnings == {"samples without noise": 5}
     _, noise = read(path, "/noise/simplified", "Scalars:scalars")
     assert np.isfinite(noise).all()
     centres, _ = read(path, "/score", "Scalars:scalars")

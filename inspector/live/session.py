@@ -19,7 +19,7 @@ from inspector.live.drawing import Drawing, Sink
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
 from inspector.logs.clocks import UNITS
 from inspector.logs.mapping import check_joints
-from inspector.logs.motion import LONG, LimitWatch
+from inspector.logs.motion import ABSURD, LONG, LimitWatch
 from inspector.recording.views import FARTHEST
 from inspector.reference.levels import LONGEST, Levels, LevelStream
 from noiseclassifier import Event, Labels, merged
@@ -95,7 +95,8 @@ class SampleBuffer:
         for name in self._widths:
             values = whole[name][:count]
             values = values if kept.all() else values[kept]
-            usable = np.abs(values) < LARGEST  # the square of others would overflow
+            # As in a file; places may be far, but their squares must not overflow.
+            usable = np.abs(values) < (LARGEST if name == "base_pose" else ABSURD)
             signals[name] = values if usable.all() else np.where(usable, values, np.nan)
         self._pieces = [{name: values[count:] for name, values in whole.items()}]
         self.room = self._size
