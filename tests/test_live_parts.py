@@ -33,6 +33,16 @@ def taken(stamps, rate=1000.0, size=50):
     return np.array(kept), np.array(times), lost, counted.counts, lines
 
 
+@pytest.mark.parametrize("rate", [240.0, 300.0, 400.0, 480.0, 600.0, 700.0, 800.0, 900.0])
+@pytest.mark.parametrize("rounded", [np.round, np.floor])
+@pytest.mark.parametrize("size", [50, 7, 1])
+def test_stamps_in_whole_milliseconds_lose_nothing_and_have_the_right_rate(rate, rounded, size):
+    stamps = rounded(np.arange(2000) * 1e3 / rate) / 1e3
+    kept, _, lost, _, lines = taken(stamps, rate, size)
+    assert (kept.all(), lost, lines) == (True, 0, [])
+    assert taken(np.delete(stamps, range(700, 705)), rate, size)[2] == pytest.approx(5, abs=1)
+
+
 def test_even_stamps_lose_nothing_and_jitter_is_no_gap():
     random = np.random.default_rng(0)
     kept, _, lost, _, lines = taken(np.arange(500) / 1000 + random.uniform(-2e-4, 2e-4, 500))

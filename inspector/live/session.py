@@ -131,7 +131,7 @@ AGREE = 5  # timestamps in a row that make a jump a new segment, and no outlier
 # Jump ahead up to which samples are missing, in [s]; beyond, the clock was set.
 LONGEST_GAP = 3600.0
 RATE_TOLERANCE = 0.05  # share by which the rate of the timestamps may differ from the nominal one
-RATE_STEPS = 20  # steps from which a rate is estimated
+RATE_STEPS = 40  # steps from which a rate is estimated
 BACKWARDS, TIMELESS = "samples out of order", "samples without time"
 OUTLYING = "outlying timestamps"
 # Kinds of warnings of samples that are left out.
@@ -249,8 +249,10 @@ class Clock:
             return lost
         self._first_steps = np.concatenate((self._first_steps, steps))
         if len(self._first_steps) > RATE_STEPS:
-            step, self._first_steps = float(np.median(self._first_steps)), None
-            if abs(step - 1.0) > RATE_TOLERANCE:
+            known, self._first_steps = self._first_steps[1:], None
+            # Where stamps are rounded, the median is wrong; where samples are missing, the mean.
+            step, usual = float(known.mean()), median(known.tolist())
+            if min(abs(step - 1.0), abs(usual - 1.0)) > RATE_TOLERANCE:
                 line = (
                     f"timestamps have {self._rate / step:.4g} Hz, the nominal rate is"
                     f" {self._rate:g} Hz: labels and spectrogram are wrong, set --rate"
@@ -261,7 +263,9 @@ class Clock:
     def _missing(self, steps: Array) -> Array:
         """Samples that are missing before each: a late one after an early one tells of none."""
         lost = np.zeros(len(steps))
-        usual = min(max(median(steps.tolist()), 1.0 - RATE_TOLERANCE), 1.0 + RATE_TOLERANCE)
+        near = steps[steps < GAP_STEPS]
+        usual = float(near.mean()) if len(near) else 1.0
+        usual = usual if abs(usual - 1.0) <= RATE_TOLERANCE else 1.0  # as where stamps are rounded
         late, done = self._late, 0
         for place in [*np.flatnonzero(steps >= GAP_STEPS).tolist(), len(steps)]:
             late += float((steps[done : place + 1] - usual).sum())
