@@ -245,7 +245,8 @@ def test_invalid_input_begins_no_session(content, reason):
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_with_the_summary_and_a_whole_file(tmp_path):
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_with_the_summary_and_a_whole_file(tmp_path, sent):
     path = tmp_path / "live.rrd"
     command = [sys.executable, "-m", "inspector", "live", "--rate", "1000", "--save", str(path)]
     process = subprocess.Popen(
@@ -254,7 +255,7 @@ def test_ctrl_c_ends_with_the_summary_and_a_whole_file(tmp_path):
     process.stdin.write(csv(700) + "0.800,1\n")  # its warning on that line shows that it runs
     process.stdin.flush()
     assert "line 702: 2 cells" in process.stderr.readline()
-    process.send_signal(signal.SIGINT)
+    process.send_signal(sent)
     out, err = process.communicate()
     assert process.returncode == 0, err
     assert "700 samples, 0.70 s at 1000 Hz" in out

@@ -53,6 +53,8 @@ CHUNK_BYTES = 1 << 18  # bytes that are read at once, if there are so many
 MAX_LINE_BYTES = 1 << 24
 # Below this, reading waits for more: half of what a pipe holds by default.
 SMALL_CHUNK_BYTES = 1 << 15
+# Signals that end a stream and leave its file whole: a terminal that closes, Ctrl-C and `kill`.
+ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
 GATHER = 0.02  # how long rows wait for more, in [s]: less than half of a session's batch
 EXPECTED = "expected a CSV header and rows, or a JSON object per line"
 
@@ -64,7 +66,7 @@ def follow(
     *,
     enough: Callable[[], bool] = lambda: False,
 ) -> Summary:
-    """Show rows as they arrive, until they end, Ctrl-C is pressed, or there are enough."""
+    """Show rows as they arrive, until they end, a signal comes, or there are enough."""
     with interruptible(chunks(stream, gather=GATHER)) as incoming:
         head, rest, number = _begun(incoming)
         reader, is_header = reader_of(head, names)
@@ -129,7 +131,7 @@ def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, in
 
 @contextmanager
 def interruptible(items: Iterator[Item]) -> Iterator[Iterator[Item]]:
-    """Items until the first Ctrl-C, which does nothing else; a second one raises as usual."""
+    """Items until the first Ctrl-C or `kill`, which does nothing else; a second one raises."""
     pressed = waits = False
 
     def press(number: int, frame: FrameType | None) -> None:
@@ -150,11 +152,14 @@ def interruptible(items: Iterator[Item]) -> Iterator[Iterator[Item]]:
                 waits = False
             yield item
 
-    before = signal.signal(signal.SIGINT, press)
+    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN  # by `nohup`
+    ending = ENDING[1:] if ignored else ENDING
+    before = {each: signal.signal(each, press) for each in ending}
     try:
         yield handed_out()
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def reader_of(head: bytes, names: tuple[str, ...]) -> "tuple[CsvReader | JsonReader, bool]":
