@@ -44,6 +44,15 @@ def test_a_failure_lies_in_the_band_in_which_it_shakes(low, high):
     assert found[1] - found[0] >= 0.4 * (high - low)
 
 
+@pytest.mark.parametrize("hertz", [79, 80, 81, 82, 83, 84, 88, 98])
+def test_the_band_of_a_tone_holds_its_frequency_and_so_do_its_words(hertz):
+    low, high = band(shaken_run(hertz, hertz), SHAKE, [SHAKE])
+    assert low <= hertz <= high <= low + 2.6
+    told = words(Localisation("measured", band=(low, high)))[2].removesuffix(" Hz").split("-")
+    assert float(told[0]) <= low
+    assert high <= float(told[-1])
+
+
 def test_a_hum_throughout_the_run_is_no_failure():
     quiet_block = Block(4.5, 5.5, "impact")
     found = band(shaken_run(300, 320), quiet_block, [SHAKE, quiet_block])

@@ -516,8 +516,8 @@ def band(run: Run, failure: Failure, failures: Sequence[Failure]) -> tuple[float
 
     The excess is the power spectrum of the measured velocities above 10 Hz, mean over the failure,
     less the 90th percentile of the spectra of quiet stretches, without any of ``failures``. The
-    band is the narrowest that holds 70 % of it, in [Hz]; None without excess. The resolution is the
-    inverse of the failure's duration, and 2.5 Hz at best.
+    band is the narrowest that holds 70 % of it, in [Hz], of several the one that holds most; None
+    without excess. The resolution is the inverse of the failure's duration, and 2.5 Hz at best.
     """
     length = min(max(failure.stop - failure.start, BRIEFEST), WIDEST, run.duration)
     size = max(2, round(length * run.rate))
@@ -542,7 +542,8 @@ def band(run: Run, failure: Failure, failures: Sequence[Failure]) -> tuple[float
     below = np.concatenate(([0.0], np.cumsum(excess)))
     stops = np.searchsorted(below, below[:-1] + HELD * below[-1])
     firsts = np.flatnonzero(stops < len(below))
-    best = firsts[np.argmin(stops[firsts] - firsts)]
+    held = below[stops[firsts]] - below[firsts]
+    best = firsts[np.lexsort((-held, stops[firsts] - firsts))[0]]
     return float(frequency[best]), float(frequency[stops[best] - 1])
 
 

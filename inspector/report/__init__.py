@@ -1,6 +1,7 @@
 """Findings and annotations of an analysis in words, as recordings and pages show them."""
 
 from collections.abc import Iterable
+from math import ceil, floor
 
 from inspector.analysis import Analysis
 from inspector.errors import Status
@@ -33,7 +34,8 @@ def words(found: Localisation) -> tuple[str, str, str]:
     if found.lag > 0.0:
         stage = f"{stage}, {1e3 * found.lag:.1f} ms before {found.following}"
     joints = ", ".join(f"{joint} {share:.0%}" for joint, share in found.joints if share >= LEAST)
-    low, high = (f"{frequency:.0f}" for frequency in found.band or (0.0, 0.0))
+    edges = found.band or (0.0, 0.0)
+    low, high = floor(round(edges[0], 1)), ceil(round(edges[1], 1))  # no tone is rounded out of it
     band = f"{low} Hz" if low == high else f"{low}-{high} Hz"
     return stage, joints, band if found.band else ""
 
