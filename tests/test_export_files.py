@@ -76,6 +76,9 @@ def test_parquet_holds_every_number_to_the_bit(exported, demo):
     np.testing.assert_array_equal(table["time"].to_numpy(), demo.time)
     np.testing.assert_array_equal(table["simplified"].to_numpy(), content.simplified)
     np.testing.assert_array_equal(table["extended"].to_numpy(), content.extended)
+    (event,) = content.analysis.findings
+    inside = (demo.time >= event.start) & (demo.time < event.stop)
+    assert table["finding"].to_pylist() == [event.label if each else None for each in inside]
     assert table.schema.field("simplified").metadata == {b"unit": b"rad/s"}
     assert table.schema.metadata[b"model"] == b"general"
 
@@ -107,7 +110,7 @@ def test_csv_has_the_values_of_parquet(exported):
     assert list(rows[0]) == table.column_names
     for name in ("time", "simplified", "extended"):
         assert [float(row[name]) for row in rows] == table[name].to_pylist()
-    for name in ("label", "annotated"):
+    for name in ("label", "annotated", "finding"):
         assert [row[name] or None for row in rows] == table[name].to_pylist()
 
 

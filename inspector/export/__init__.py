@@ -98,8 +98,8 @@ def arrow_table(content: Content) -> Any:
     """Exported data as an Arrow table.
 
     Columns are time, simplified, extended (with a robot), annotated (with blocks), and with labels
-    frame_start, frame_stop, label and a score_<class> each: from the frame whose middle is
-    nearest, and null before the first and after the last frame's share.
+    finding, and frame_start, frame_stop, label and a score_<class> each: from the frame whose
+    middle is nearest, and null before the first and after the last frame's share.
     """
     import pyarrow as pa
 
@@ -107,12 +107,15 @@ def arrow_table(content: Content) -> Any:
     found: dict[str, Any] = {"time": time, "simplified": content.simplified}
     if content.extended is not None:
         found["extended"] = content.extended
-    if content.analysis.run.blocks:
-        annotated: list[str | None] = [None] * len(time)
-        for block in content.analysis.run.blocks:
-            first, last = np.searchsorted(time, (block.start, block.stop))
-            annotated[first:last] = [block.label] * int(last - first)
-        found["annotated"] = annotated
+    spans: dict[str, Sequence[Block | Event]] = {"annotated": content.analysis.run.blocks}
+    spans |= {} if labels is None else {"finding": content.analysis.findings}
+    for name, each in spans.items():
+        words: list[str | None] = [None] * len(time)
+        for span in each:
+            first, last = np.searchsorted(time, (span.start, span.stop))
+            words[first:last] = [span.label] * int(last - first)
+        if each or name == "finding":
+            found[name] = pa.array(words, pa.string())
     if labels is not None:
         middles = (labels.start + labels.stop) / 2
         steps = np.diff(middles) if len(middles) > 1 else labels.stop - labels.start
@@ -147,7 +150,7 @@ def write_csv(content: Content, path: Path) -> None:
 
     table = arrow_table(content)
     for place, name in enumerate(table.column_names):
-        if name in ("label", "annotated"):
+        if name in ("label", "annotated", "finding"):
             cells = [None if each is None else cell(each) for each in table[name].to_pylist()]
             table = table.set_column(place, name, [cells])
     with path.open("w", newline="", encoding="utf-8") as file:
