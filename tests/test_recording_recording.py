@@ -35,7 +35,7 @@ from inspector.recording.run import height, write
 from inspector.reference.judging import Scenario, compare
 from inspector.reference.levels import levels as levels_of
 from noiseclassifier import Event
-from noisemodel import Run
+from noisemodel import Block, Run
 
 
 def panda_run(**changes):
@@ -291,8 +291,10 @@ def test_a_chatter_of_35_hz_is_at_35_hz_in_the_spectrogram_of_its_joint(tmp_path
     assert float(loudest.removesuffix(" Hz")) == pytest.approx(35.0, rel=0.3)  # windows of 0.1 s
 
 
-def test_the_verdict_is_said_first_in_its_colour(whole, tmp_path):
-    write(inspected(panda_run(robot=None), tmp_path), tmp_path / "o")  # without a model
+def test_the_verdict_is_said_first_in_its_colour(whole, tmp_path, capfd):
+    odd = panda_run(robot=None, blocks=(Block(0.1, 0.2, "my, label #1"),))
+    write(inspected(odd, tmp_path), tmp_path / "o")  # without a model
+    assert "Unescaped" not in "".join(capfd.readouterr())  # whatever words annotations have
     for path, told, shade in (
         (whole[0], "FAIL   1 impact", "findings"),
         (tmp_path / "o", "CANNOT TELL", "cannot-tell"),

@@ -182,7 +182,7 @@ def log_class(
     }
     for (how, own), color, ends in zip(stretches.items(), shades, between, strict=True):
         called = f"{side}, {how}: {spoken(name)}" if side else f"{how}: {spoken(name)}"
-        path = "/".join(["/class", *([side] if side else []), how, name])
+        path = f"/class/{side}/{how}/".replace("//", "/") + rr.escape_entity_path_part(name)
         low, high = (views.TOP * (1.0 - (row + share) / count) for share in reversed(ends))
         views.log_stretches(recording, path, own, (low, high), called, color, opaque=True)
 
