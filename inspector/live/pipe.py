@@ -416,9 +416,9 @@ class Gate:
 
     def _judged(self, summary: Summary) -> Verdict:
         """The verdict on the whole stream."""
-        duration = summary.samples / summary.rate
         events = tuple(map(Finding.of, summary.findings))
-        verdict = Verdict(NAME, summary.status, summary.model, events, duration=duration)
+        known = (summary.status, summary.model, events)
+        verdict = Verdict(NAME, *known, duration=summary.duration)
         if self._reference is None or (summary.levels is None and self._begin is None):
             return verdict
         if summary.levels is None:  # too long to be compared as a whole

@@ -310,12 +310,12 @@ class Summary:
     reason: str = "no frame was labelled"  # why nothing can be told
     levels: Levels | None = None  # of the whole session once it is closed, if they were kept
     frames: Labels | None = None  # labels of its frames, if levels were kept
+    duration: float = 0.0  # by the timestamps, in [s]
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {label}" for label, count in self.labels.items())
         lines = [
-            f"{self.samples} samples, {self.samples / self.rate:.2f} s at {self.rate:g} Hz,"
-            f" {self.where}",
+            f"{self.samples} samples, {self.duration:.2f} s at {self.rate:g} Hz, {self.where}",
             headline(self.status, self.findings, self.reason),
             *(f"  {finding}" for finding in self.findings),
             f"labels by {self.model}: {counts}" if counts else "no labels",
@@ -379,7 +379,8 @@ class LiveSession:
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
         self._on_finding, self._on_levels, self._on_end = on_finding, on_levels, on_end
         self._keep_levels = keep_levels or on_levels is not None
-        self._latest, self._now = -1.0 / rate, 0.0  # timestamp that came, time that was worked on
+        self._latest = -1.0 / rate  # timestamp that came
+        self._first = self._now = 0.0  # time of the first sample, time that was worked on
         self._buffer: SampleBuffer | None = None  # what follows is there once there are samples
         self._samples = self._unconfirmed = 0  # since the viewer was last known to be there
         self._added = 0  # that were missing and are interpolated
@@ -467,6 +468,7 @@ class LiveSession:
             reason=reason,
             levels=self._levels,
             frames=self._kept,
+            duration=self._now - self._first + 1.0 / self._rate,
         )
 
     def _doubt(self, samples: int) -> str:
@@ -611,6 +613,7 @@ class LiveSession:
             return
         if self._last is None:
             self._drawing.begin(signals)
+            self._first = float(time[0])
         time, signals, lost = self._filled(time, signals, lost)
         self._now = float(time[-1])
         motion = np.hstack([signals[name] for name in self._noisy])
