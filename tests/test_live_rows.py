@@ -183,7 +183,6 @@ def test_little_waits_for_more_and_much_is_read_at_once(monkeypatch):
         "\n# a robot\n \ntime,a.velocity,b.velocity\n0,1,2\n0.1,3,4\n",
         "# time,a.velocity,b.velocity\n0,1,2\n0.1,3,4\n",
         "time,a.velocity,b.velocity\n0,1,2,\n0.1,3,4,\n",
-        "time,a.velocity,b.velocity,\n0,1,2,\n0.1,3,4,\n",
         f"time,a.velocity,b.velocity\nms,deg/s,[rpm]\n0,{np.rad2deg(1)},{60 / np.pi}\n"
         f"100,{np.rad2deg(3)},{120 / np.pi}\n",
     ],

@@ -136,9 +136,7 @@ def window(path):
 
 
 @pytest.mark.parametrize("start", [0.0, 1.7e9])
-def test_plots_show_the_last_ten_seconds_and_nothing_lies_before_the_start(
-    tmp_path, library, start
-):
+def test_plots_show_ten_seconds_and_nothing_lies_before_the_start(tmp_path, library, start):
     signals = motion(0.5)
     signals["time"] = signals["time"] + start
     path, _, _ = shown(tmp_path, signals, library=library)
@@ -176,10 +174,9 @@ def test_no_peak_of_a_joint_is_lost(tmp_path, library):
 
 @pytest.mark.parametrize(("watched", "messages"), [(True, 10), (False, 1)])
 @pytest.mark.parametrize("seconds", [1.0, 0.97])
-def test_lines_are_drawn_every_tenth_of_a_second_for_a_viewer_and_none_is_left_out(
+def test_a_viewer_gets_lines_every_tenth_of_a_second_and_a_file_all_at_once(
     tmp_path, library, seconds, watched, messages, monkeypatch
 ):
-    """In a file alone, a message has two seconds."""
     monkeypatch.setattr(Sink, "watched", watched)
     signals = motion(seconds)
     path, _, _ = shown(tmp_path, signals, cuts=[7, 500, 501], library=library)
@@ -273,16 +270,13 @@ def test_live_finds_what_classify_finds_on_the_same_samples(tmp_path, library, k
 
 
 @pytest.mark.parametrize("real", [955.0, 1045.0])
-def test_findings_and_levels_keep_their_times_where_the_true_rate_is_not_nominal(
-    tmp_path, library, real
-):
+def test_findings_and_levels_have_their_times_at_any_true_rate(tmp_path, library, real):
     signals = motion(24.0, hum=(22.0, 22.8))
     signals["time"] = signals["time"] * RATE / real
-    cuts = range(50, 24_000, 50)
-    _, _, summary = shown(tmp_path, signals, cuts, library=library, keep_levels=True)
-    (found,) = summary.findings
+    options = {"library": library, "keep_levels": True}
+    _, _, summary = shown(tmp_path, signals, range(50, 24_000, 50), **options)
+    (found,), levels = summary.findings, summary.levels
     assert (found.start, found.stop) == pytest.approx((22e3 / real, 22.8e3 / real), abs=0.45)
-    levels = summary.levels
     hum = levels.time[levels.level[:, :, 1].max(axis=(1, 2)) > -30.0]
     assert (hum[0], hum[-1]) == pytest.approx((22e3 / real, 22.8e3 / real), abs=0.2)
     assert [levels.duration, summary.duration] == pytest.approx([24e3 / real] * 2, abs=2e-3)

@@ -214,16 +214,12 @@ def test_a_run_beside_itself_changes_nothing_that_is_drawn(tmp_path):
 
 
 def test_the_same_two_runs_make_the_same_recording_id_and_others_do_not(tmp_path):
-    runs = {
-        "ab": (panda(), panda(2.0)),
-        "again": (panda(), panda(2.0)),
-        "ba": (panda(2.0), panda()),
-    }
-    ids = {}
-    for name, (before, after) in runs.items():
-        write(compared(tmp_path, before, after, robot=False), tmp_path / f"{name}.rrd")
-        ids[name] = RrdReader(tmp_path / f"{name}.rrd").recordings()[0].recording_id
-    assert ids["ab"] == ids["again"] != ids["ba"]
+    ids, path = [], tmp_path / "out.rrd"
+    for before, after in ((1.0, 2.0), (1.0, 2.0), (2.0, 1.0)):
+        pair = compared(tmp_path, panda(before), panda(after), robot=False)
+        write(pair, path, overwrite=True)
+        ids.append(RrdReader(path).recordings()[0].recording_id)
+    assert ids[0] == ids[1] != ids[2]
 
 
 @pytest.mark.parametrize("samples", [2, 9, 60])
