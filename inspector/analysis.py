@@ -23,6 +23,7 @@ from inspector.localisation import Localisation, extent, line_extent, localise
 from inspector.localisation.order import Order, order
 from inspector.logs.clocks import without_hold
 from inspector.logs.read import Opened, open_run
+from inspector.text import counted, printable
 from noiseclassifier import Event
 from noiseclassifier.lasting import joined
 from noisemodel import Block, Run
@@ -32,6 +33,8 @@ from noisemodel.robot import is_name
 from noisemodel.run import is_robot_file
 from noisemodel.runfile import pieces
 from noisemodel.types import Array
+
+LEAST_LABELLED = 0.5  # share of a run that has labels in a verdict of `ok`
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -198,7 +201,7 @@ def analyse(
         status=Status.CANNOT_TELL,
         run=run,
         audit=audit(run, library, slower=slower),
-        notes=(left_out,) if left_out else (),
+        notes=(*_of_log(run), *filter(None, [left_out])),
         unknown=unknown,
         sha256=sha256,
         assumed=assumed,
@@ -209,7 +212,7 @@ def analyse(
         spans, findings = extents(slower, labels, labelled.lasting, labelled.bursts)
     except (CannotTellError, nc.SignalError, nm.RunError) as error:
         return replace(found, reason=str(error))
-    status, reason = _status(found.audit, labels, findings)
+    status, reason = _status(run, found.audit, labels, findings)
     return replace(
         found,
         status=status,
@@ -224,7 +227,20 @@ def analyse(
     )
 
 
-def _status(seen: Audit, labels: nc.Labels, findings: Sequence[Event]) -> tuple[Status, str]:
+def _of_log(run: nm.Run) -> Iterator[str]:
+    """What was left out of a run when its log was read, and its gaps, sentences."""
+    told = run.meta.get("notes")
+    for each in told if isinstance(told, list) else ():
+        yield f"{printable(str(each))[:1].upper()}{printable(str(each))[1:]}."
+    if lost := gaps(run):
+        seconds = sum(stop - start for start, stop in lost)
+        many = counted(len(lost), "gap")
+        yield f"{many}, {seconds:.3g} s in all, the first at {lost[0][0]:.6g} s: not judged."
+
+
+def _status(
+    run: nm.Run, seen: Audit, labels: nc.Labels, findings: Sequence[Event]
+) -> tuple[Status, str]:
     """Status of a run that has labels, and why it cannot be told."""
     if findings:
         return Status.FINDINGS, ""
@@ -232,6 +248,10 @@ def _status(seen: Audit, labels: nc.Labels, findings: Sequence[Event]) -> tuple[
         return Status.CANNOT_TELL, " ".join(summary(seen))
     if (labels.label == nc.UNKNOWN).all():
         return Status.CANNOT_TELL, f"every frame is {nc.UNKNOWN}"
+    length = float(labels.stop[0] - labels.start[0])
+    share = len(labels) / max(1.0, (run.duration - length) / labels.step)
+    if share < LEAST_LABELLED:
+        return Status.CANNOT_TELL, f"gaps leave labels to {share:.0%} of the run"
     return Status.OK, ""
 
 

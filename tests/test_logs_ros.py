@@ -166,14 +166,61 @@ def test_every_version_of_a_controllers_state_has_measured_and_desired_motion(
     assert np.array_equal(run.velocity_desired, POSITION)
 
 
-def test_joint_states_take_precedence_over_a_controllers_feedback(tmp_path):
+@pytest.mark.parametrize(
+    ("every", "start", "rate", "other"),
+    [
+        (1, 0, 100.0, "/arm/state/actual/positions"),
+        (2, 0, 100.0, "/joint_states/position"),
+        (2, 200, 50.0, "/arm/state/actual/positions"),  # the whole motion counts more
+    ],
+)
+def test_of_joint_states_and_a_controllers_feedback_the_faster_is_read(
+    tmp_path, every, start, rate, other
+):
     talk = Talk()
-    state = controller_states(talk, OLD_STATE)
-    own = joint_states(talk, position=EFFORT, velocity=EFFORT)
+    state = controller_states(talk, OLD_STATE)[start:]
+    own = joint_states(talk, TIMES[::every], position=EFFORT[::every], velocity=EFFORT[::every])
     imported = read_log(bag(tmp_path, {"/joint_states": own, "/arm/state": state}, talk=talk))
-    assert np.array_equal(imported.run.position, EFFORT)
-    assert np.array_equal(imported.run.position_desired, VELOCITY)
-    assert any("not read: /arm/state/actual/positions" in each for each in imported.remarks)
+    run, taken = imported.run, POSITION if other.startswith("/joint") else EFFORT
+    assert (run.rate, len(run.time)) == (rate, 400 * rate / 100)
+    assert np.array_equal(run.position, taken[:: round(100 / rate)])
+    assert start or np.array_equal(run.position_desired, VELOCITY)
+    assert any(f"not read: {other}" in each for each in imported.remarks)
+
+
+def test_the_fastest_joints_are_read_as_they_are_and_slower_ones_are_interpolated(tmp_path):
+    slow = numbers(5)[::4] / 10
+    hand = joint_states(TALK, TIMES[::4], [f"f{n}" for n in range(5)], position=slow)
+    imported = read_log(bag(tmp_path, {"/arm": states(), "/hand": hand}))
+    assert imported.run.rate == 100.0
+    assert np.array_equal(imported.run.position[:, :3], POSITION[:397])
+    assert np.allclose(imported.run.position[::4, 3:], slow)
+    note = "position of f0 to f4: interpolated from 25 Hz: nothing above 12.5 Hz is left"
+    assert imported.run.meta["notes"] == [note]
+    assert note in imported.remarks
+
+
+@pytest.mark.parametrize(
+    ("part", "share"),
+    [(slice(300, None), 25), (slice(100), 25), (np.r_[:150, 250:400], 75), (slice(10, None), 0)],
+)
+def test_a_side_topic_that_is_late_early_or_interrupted_cuts_no_motion_away(tmp_path, part, share):
+    sides = {
+        "/gripper": joint_states(TALK, TIMES[part], ["finger"], position=POSITION[part, :1]),
+        "/joint_commands": joint_states(TALK, TIMES[part], velocity=VELOCITY[part]),
+    }
+    imported = read_log(bag(tmp_path, {"/joint_states": states()} | sides))
+    run = imported.run
+    assert (run.velocity_desired is None, "finger" in run.joint_names) == (share > 0, share == 0)
+    assert len(run.time) == (400 if share else 390)  # little is cut away
+    if share:
+        assert np.array_equal(run.velocity, VELOCITY)
+        assert run.mask.all()
+        why = f"left out, there for {share}% of the time"
+        named = ("position of finger", "velocity desired of shoulder, elbow, wrist")
+        assert run.meta["notes"] == [f"{each}: {why}" for each in named]
+    else:
+        assert "cut to the 3.9 s that all its signals cover" in imported.remarks
 
 
 def test_odometry_is_the_base_in_body_axes(tmp_path):

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inspector.analysis import headline
+from inspector.analysis import LEAST_LABELLED, headline
 from inspector.errors import InspectorError, Status
 from inspector.library import Library, load_library
 from inspector.live.drawing import Drawing, Sink
@@ -292,7 +292,6 @@ BATCH = 0.05  # samples are worked on in batches of this duration, in [s]
 FASTEST = 1e6  # highest rate, in [Hz]
 MOST_DROPPED = 0.05  # share of the samples that may be left out for a verdict of `ok`
 MOST_ADDED = 0.2  # share of the samples that may be missing and interpolated in such a verdict
-LEAST_LABELLED = 0.5  # share of the stream that has labels in such a verdict
 
 
 @dataclass(frozen=True)

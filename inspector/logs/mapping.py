@@ -67,6 +67,8 @@ ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 NEAR = 0.05  # largest relative difference of a nominal rate to the round one that replaces it
 # Rates between these, and how near a nominal one has to be to them.
 BETWEEN, VERY_NEAR = (1.2, 1.5, 2.4, 4.8, 9.6), 0.01
+SAME_RATE = 1.01  # ratio of two rates up to which no band is lost from one to the other
+COVERS = 0.9  # least share of a signal's time for which another one is to be there
 UNIFORM = 1e-3  # largest relative deviation of a uniform clock's steps from their median
 GAP = 5.0  # length of a step, in nominal ones, above which it is a gap
 
@@ -133,6 +135,15 @@ class Stamps:
         gaps = tuple((float(self.time[at]), float(self.time[at + 1])) for at in wide)
         stretches = tuple(slice(start, stop) for start, stop in pairwise(edges))
         return Clock(nominal, rate, uniform, *jitter, gaps, stretches)
+
+
+def fastest(clocks: Iterable[Stamps]) -> list[Stamps]:
+    """Those as fast as the fastest of those that last as long as the longest, without gaps."""
+    steps = {each: float(np.median(np.diff(each.time))) for each in clocks if len(each.time) > 1}
+    lasts = {each: step * len(each.time) for each, step in steps.items()}
+    long = [each for each in steps if lasts[each] >= COVERS * max(lasts.values())]
+    step = min((steps[each] for each in long), default=0.0)
+    return [each for each in long if steps[each] <= SAME_RATE * step]
 
 
 @dataclass(frozen=True, eq=False)
@@ -672,12 +683,17 @@ def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice
 
 
 def _unique(log: Log, choices: Sequence[_Choice]) -> list[_Choice]:
-    """One column for each signal of each joint: by the options, else of the lowest rank."""
+    """One column for each signal of each joint: by the options, else the fastest source's."""
     found: dict[tuple[str, str], _Choice] = {}
     for choice in choices:
         target = choice.signal, "" if choice.signal in BASE_SIGNALS else choice.joint
         other = found.setdefault(target, choice)
-        rank, before = ((each.by != "options", each.field.rank) for each in (choice, other))
+        ranked = choice.field.rank != other.field.rank
+        fast = fastest(each.field.stamps for each in (choice, other)) if ranked else []
+        rank, before = (
+            (each.by != "options", ranked and each.field.stamps not in fast, each.field.rank)
+            for each in (choice, other)
+        )
         if rank < before:
             found[target] = choice
         elif rank == before and other is not choice:

@@ -17,7 +17,18 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs import clocks
-from inspector.logs.mapping import UNIFORM, Log, ReadOptions, Track, known_limits, tracks_of
+from inspector.logs.mapping import (
+    COVERS,
+    SAME_RATE,
+    UNIFORM,
+    Log,
+    ReadOptions,
+    Stamps,
+    Track,
+    fastest,
+    known_limits,
+    tracks_of,
+)
 from inspector.logs.names import BASE_SIGNALS, listed, tells_unit
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
@@ -28,7 +39,7 @@ from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask, Real
 
 LARGEST_RATE_RATIO = 1.5  # of the specified rate to the stamps' rate, or the inverse
-SAME_RATE = 1.01  # ratio of two rates up to which no band is lost from one to the other
+CUT = 0.5  # time that is cut from a log without a note in its verdict, in [s]
 MOST_SAMPLES_PER_STAMP = 20  # of the run, above which most of it is gaps
 
 
@@ -389,11 +400,18 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     remarks = [*_remarks(logs, tracks)]
     remarks += [f"{logs[-1].path.name}: {said}"] if said else []
     own = tracks[every.index(main)].stamps
-    time, valid = clocks.common_time(tracks, own)
+    kept, notes = _covering(tracks, own, len(logs[0].tracks))
+    time, valid = clocks.common_time(kept, own)
     if len(time) < 2 or not valid.any():
         others = [each.stamps for each in tracks if each.stamps is not own]
         raise LogError(logs[-1].path, clocks.no_overlap(others[-1] if others else own, own))
-    start = own.start + Decimal(str(time[0]))
+    start, step = own.start + Decimal(str(time[0])), 1 / own.clock.rate
+    duration = float(time[-1] - time[0]) + step
+    if (lost := float(own.time[-1]) - duration) > 0:
+        extent = "both logs" if len(logs) > 1 else "all its signals"
+        cut = f"cut to the {duration:.6g} s that {extent} cover"
+        (notes if lost > CUT else remarks).append(cut)
+    remarks += notes
     meta: dict[str, Any] = {
         **{key: value for log in logs for key, value in log.meta.items()},
         "source": [log.path.name for log in logs],
@@ -401,24 +419,46 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
         "jitter": {"rms": own.clock.jitter_rms, "max": own.clock.jitter_max},
     }
     meta |= {} if offset is None else {"offset": {"seconds": offset}}
-    covered, slack = float(own.time[-1]), UNIFORM / own.clock.rate
+    meta |= {"notes": notes} if notes else {}
     logs.clear()
-    kept = [*tracks]
     del every, tracks, main  # each signal is freed when it has been resampled
     parts: dict[str, Track] = {}
     while kept:
         track = kept.pop(0)
-        track = replace(track, values=clocks.resampled(time, valid, track, slack))
+        track = replace(track, values=clocks.resampled(time, valid, track, UNIFORM * step))
         _add(parts, track)
     signals, differentiated, told = _signals_of(parts, time - time[0], valid)
     meta |= {"differentiated": differentiated} if differentiated else {}
     run = Run(time=time - time[0], valid=valid, robot=options.robot or None, meta=meta, **signals)
-    if run.duration < covered:
-        extent = "both logs" if len(meta["source"]) > 1 else "all its signals"
-        remarks.append(f"cut to the {run.duration:.6g} s that {extent} cover")
     if start:
         remarks.append(f"time starts at 0; the first stamp, {meta['start']} s, is in meta")
     return Imported(run, (*remarks, *told), name)
+
+
+def _covering(
+    tracks: Sequence[Track], main: Stamps, optional: int
+) -> tuple[list[Track], list[str]]:
+    """Tracks without those of the first few that would cut the motion short, and what they lack."""
+    moving = [t for t in tracks if t.stamps is main and t.signal in ("position", "velocity")]
+    whole = int(clocks.common_time(moving, main)[1].sum())
+    kept, told = list[Track](), dict[str, list[str]]()
+    for place, track in enumerate(tracks):
+        share, what = 1.0, ""
+        if track not in moving and (track.stamps is not main or track.missing is not None):
+            share = int(clocks.common_time([*moving, track], main)[1].sum()) / max(1, whole)
+        if share < COVERS and place < optional:
+            what = f"left out, there for {share:.0%} of the time"
+        else:
+            kept.append(track)
+            rate = track.stamps.clock.nominal
+            if not track.is_desired and (lost := _lost(main.clock.nominal, rate)):
+                what = f"interpolated from {plain(rate, 4)} Hz{lost}" if track.joints else ""
+        if what:
+            names = track.joints
+            of = ", ".join(names) if len(names) <= 3 else f"{names[0]} to {names[-1]}"
+            what = f"{' of ' * bool(names)}{of}: {what}"
+            told.setdefault(what, []).append(track.signal.replace("_", " "))
+    return kept, [f"{', '.join(signals)}{what}" for what, signals in told.items()]
 
 
 def _add(parts: dict[str, Track], track: Track) -> None:
@@ -457,12 +497,13 @@ def _with_desired(measured: Log, desired: Log) -> list[Log]:
 
 
 def _main(log: Log, options: ReadOptions) -> Track:
-    """The track whose stamps become the run's time: the one with the most joints."""
+    """The track whose stamps become the run's time: of the fastest the one with most joints."""
     moving = [track for track in log.tracks if track.signal in ("position", "velocity")]
     if not moving:
         only = ", only desired" if log.tracks else ""
         raise LogError(log.path, f"holds no measured motion{only}")
-    track = max(moving, key=lambda track: len(track.joints))
+    fast = fastest(track.stamps for track in moving)
+    track = max((t for t in moving if t.stamps in fast), key=lambda track: len(track.joints))
     time, nominal, rate = track.stamps.time, track.stamps.clock.nominal, options.rate
     if rate is not None and not 1 / LARGEST_RATE_RATIO <= rate / nominal <= LARGEST_RATE_RATIO:
         problem = f"the rate of the stamps is {nominal:g} Hz; a run of {rate:g} Hz cannot be made"
