@@ -43,6 +43,20 @@ def test_rounded_stamps_have_the_rate_of_all_of_them(tmp_path):
         assert run.time[-1] == pytest.approx(time[-1], abs=1e-4)
 
 
+@pytest.mark.parametrize("rate", [240, 600, 700, 800, 960])
+def test_stamps_rounded_to_a_millisecond_are_even_unless_a_sample_is_lost(tmp_path, rate):
+    time = np.arange(4000) / rate
+    kept = (time < 1) | (time >= 1.2)  # a gap stays one
+    moved = {"elbow.velocity": swing(time[kept])[1]}
+    imported = read_log(log(tmp_path, np.round(time, 3)[kept], **moved))
+    assert np.allclose(imported.run.velocity[kept, 0], moved["elbow.velocity"], rtol=1e-9)
+    assert np.array_equal(imported.run.mask, kept)
+    told = f"log.csv: stamps rounded to 0.001 s, taken for even ones of {rate} Hz"
+    assert told in imported.remarks
+    lost = np.delete(np.round(time, 3), [1000, 1700, 3100])
+    assert told not in read_log(log(tmp_path, lost)).remarks
+
+
 def test_steps_of_which_none_is_near_the_median_have_its_rate(tmp_path):
     time = np.cumsum(np.tile([0.01, 0.05], 200))[:399]  # as many short ones as long ones
     assert read_log(log(tmp_path, time - time[0])).run.rate == pytest.approx(100 / 3, rel=0.1)

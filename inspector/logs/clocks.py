@@ -8,7 +8,7 @@ An offset below ``LAG`` is attributed to the controller, not to the clocks.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
-from math import log
+from math import log, log10
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.mapping import SAMPLES, UNIFORM, ReadOptions, Stamps, Track
+from inspector.logs.mapping import GAP, SAMPLES, UNIFORM, ReadOptions, Stamps, Track
 from inspector.logs.names import TIME_UNITS, time_column, without_unit
 from inspector.text import counted
 from noisemodel import Run
@@ -221,6 +221,29 @@ def clocks_of(tracks: Sequence[Track]) -> list[Stamps]:
 def on_clocks(tracks: Sequence[Track], changed: Mapping[Stamps, Stamps]) -> list[Track]:
     """Tracks with other stamps in place of some."""
     return [replace(track, stamps=changed.get(track.stamps, track.stamps)) for track in tracks]
+
+
+def even(stamps: Stamps) -> Stamps:
+    """Stamps of a uniform clock that were rounded to a decimal, without the rounding.
+
+    Their steps are of two lengths, a unit of the decimal apart, and they stay within that unit of
+    a uniform clock's: a lost sample puts all that follow a step off.
+    """
+    steps = np.diff(stamps.time)
+    usual = steps[steps <= GAP * np.median(steps)]
+    mean, apart = (float(usual.mean()), float(np.ptp(usual))) if len(usual) else (0.0, 0.0)
+    unit = 10.0 ** round(log10(apart)) if apart > UNIFORM * mean else 0.0
+    # A shorter step would not be; one that is seldom longer may be a lost sample.
+    if not unit or abs(apart / unit - 1) > 0.01 or len(usual) * (mean - unit) < FEWEST * unit:
+        return stamps
+    for digits in range(2, 10):
+        rate = float(f"{1 / mean:.{digits}g}")
+        count = np.where(steps <= GAP * mean, 1.0, np.rint(steps * rate))
+        time = np.append(0.0, np.cumsum(count)) / rate
+        if np.ptp(stamps.time - time) <= unit * (1 + UNIFORM):
+            told = f"stamps rounded to {unit:g} s, taken for even ones of {rate:g} Hz"
+            return replace(stamps, time=time, remark=stamps.remark or told)
+    return stamps
 
 
 def ordered(path: Path, tracks: Sequence[Track]) -> tuple[list[Track], str]:

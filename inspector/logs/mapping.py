@@ -115,7 +115,7 @@ class Stamps:
             expected = f"{SHORTEST:g} s to {LONGEST:g} s"
             raise InspectorError(f"the stamps' median step is {step:g} s, expected {expected}")
         uniform = bool((np.abs(steps - step) <= UNIFORM * step).all())
-        near = steps if uniform else steps[np.abs(steps - step) < 0.5 * step]
+        near = steps if uniform else steps[np.abs(steps - step) <= (0.5 + UNIFORM) * step]
         if len(near):  # what rounding makes of a single step would add up
             step = float(near.mean())
         nominal = float(f"{1 / step:.9g}")

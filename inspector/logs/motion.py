@@ -72,6 +72,9 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None, beside: Log | 
     tracks = [t for each in tracks if (t := _finite(path, each, remarks)) is not None]
     tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks, beside)
     tracks, order = clocks.ordered(path, tracks)
+    tracks = clocks.on_clocks(
+        tracks, {each: clocks.even(each) for each in clocks.clocks_of(tracks)}
+    )
     tracks = _without_frozen(tracks, remarks)
     return replace(
         log,
