@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from csvlogs import write
+from csvlogs import TIME, write
 
 from inspector import read_log
 from inspector.errors import LogError
@@ -65,6 +65,17 @@ def test_a_bad_log_is_one_line_that_names_the_row(tmp_path, body, message):
         read_log(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["sim_time", "t", "timestamps", "times", "tout"])
+def test_a_robots_clock_is_preferred_to_a_computers(tmp_path, name):
+    columns = {"wall_time": 1e9 + 1.7 * TIME, name: TIME, "a.velocity": TIME}
+    assert read_log(write(tmp_path / "log.csv", columns)).run.rate == 100.0
+
+
+def test_microseconds_since_a_robot_started_are_no_dates_of_years_ago(tmp_path):
+    columns = {"time": np.int64(np.rint((TIME / 5 + 1200) * 1e6)), "a.velocity": TIME}
+    assert read_log(write(tmp_path / "log.csv", columns)).run.rate == 500.0
 
 
 def test_of_two_columns_of_nanoseconds_the_usual_name_counts(tmp_path):

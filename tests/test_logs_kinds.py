@@ -450,11 +450,14 @@ def test_velocities_without_relation_to_positions_are_told_by_import_and_audit(t
     assert expected in call("audit", path)[1]
 
 
-def test_a_robot_that_stands_still_is_not_frozen(tmp_path):
+def test_a_robot_that_stands_still_or_is_not_logged_yet_is_not_frozen(tmp_path):
     position, velocity = Q6.copy(), V6.copy()
     position[400:], velocity[400:] = position[400], 0.0
+    position[:100], velocity[:100] = np.nan, np.nan
     path = written(tmp_path, f"t,{names('q#', 6)},{names('dq#', 6)}", T6, position, velocity)
-    assert read_log(path).run.mask.all()
+    imported = read_log(path)
+    assert np.array_equal(imported.run.mask, np.arange(len(T6)) >= 100)
+    assert not any("froze" in remark for remark in imported.remarks)
 
 
 @pytest.mark.parametrize(

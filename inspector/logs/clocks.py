@@ -52,7 +52,7 @@ LARGEST_STEP = 1.0  # larger steps of a position are a turn or a reset, in [rad]
 FITS = 0.98
 # Relative difference from which a rate found from the values contradicts a stated one.
 DISAGREE = 0.1
-LONGEST_DATES = 3600.0  # longest step of stamps that are dates, in [s]
+LONGEST_DATES = 60.0  # longest step of stamps that are dates, in [s]
 SLOW = 0.02  # median step from which stamps in seconds may be in milliseconds, in [s]
 # Share of samples out of order above which a log is refused: it is several, or has no stamps.
 MOST_UNORDERED = 0.1

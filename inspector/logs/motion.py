@@ -177,6 +177,7 @@ def _without_frozen(tracks: list[Track], remarks: list[str]) -> list[Track]:
         if not any(track.signal == "position" for track in measured):
             continue
         rows = [(track.values[1:] == track.values[:-1]).all(axis=1) for track in measured]
+        rows += [~t.missing[1:] for t in measured if t.missing is not None]  # filled, not logged
         frozen = np.zeros(len(stamps.time), dtype=bool)
         for first, last, speed in _repeats(stamps.time, np.logical_and.reduce(rows), ours):
             frozen[first + 1 : last + 1] = True
@@ -513,7 +514,9 @@ def _main(log: Log, options: ReadOptions) -> Track:
         raise LogError(log.path, f"{problem} of it")
     if time[-1] * nominal > MOST_SAMPLES_PER_STAMP * len(time):
         jump = int(np.argmax(steps := np.diff(time)))
-        problem = f"time jumps by {steps[jump]:.6g} s; most of the log is gaps"
+        problem = (
+            f"time jumps by {steps[jump]:.6g} s; most of the log is gaps: remove what lies before"
+        )
         raise track.fault(log.path, problem, jump + 1)
     return track
 

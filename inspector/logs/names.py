@@ -16,14 +16,22 @@ BASE_SIGNALS = ("base_pose", "base_velocity")
 SIGNALS = (*JOINT_SIGNALS, *BASE_SIGNALS)
 
 # Names of a time column, in any case; the first of these that a log has is used.
-TIMES = ("time", "timestamp", "t", "__time", "stamp", "ts", "elapsed", "sec", "secs", "seconds")
-# ``field.header.stamp``, ``ros_time``, ``elapsed_time``.
-TIME = (
-    r"(?:.*[./])?(?:(?:elapsed|ros|rosbag|system|sys|robot|host|pc|unix|wall|sim|log)[_ ]?)?"
-    r"(?P<name>__time|time[_ ]?stamp|time|stamp|t|ts|elapsed|secs?|seconds)"
+TIMES = (
+    *("time", "times", "timestamp", "timestamps", "t", "tout", "__time", "stamp", "ts", "elapsed"),
+    *("sec", "secs", "seconds"),
 )
-# Flags of D4RL and Gymnasium: the last step of an episode has one.
-EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
+# ``field.header.stamp``, ``ros_time``, ``elapsed_time``; a computer's clock is no robot's.
+TIME = (
+    r"(?:.*[./])?(?:(?:elapsed|ros|rosbag|robot|sim|log|(?P<host>system|sys|host|pc|unix|wall))"
+    r"[_ ]?)?(?P<name>__time|time[_ ]?stamps?|times?|stamp|tout|t|ts|elapsed|secs?|seconds)"
+)
+# Flags of D4RL, Gymnasium and RLDS: the last step of an episode has one.
+EPISODE_ENDS = (
+    *("terminals", "timeouts", "terminations", "truncations", "dones"),
+    *("terminated", "truncated", "done", "is_last"),
+)
+EPISODE_NUMBERS = ("episode_index", "episode")  # columns with the number of the episode
+EPISODES = (*EPISODE_ENDS, *EPISODE_NUMBERS)
 # Units of stamps, as names of columns have them.
 TIME_UNITS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), "seconds"),
@@ -310,12 +318,12 @@ def rank_of(column: str) -> int:
 
 def time_column(names: Sequence[str]) -> str:
     """Name of the column or array that holds the stamps; empty if there is none."""
-    found: dict[tuple[bool, int], str] = {}
+    found: dict[tuple[bool, bool, int], str] = {}
     for name in names:
         if match := _fits(TIME, without_unit(name)[0]):
             word = re.sub("[_ ](?=stamp)", "", match["name"].lower())
             of_record = "/" in name or "." in name
-            found.setdefault((of_record, TIMES.index(word)), name)
+            found.setdefault((of_record, bool(match["host"]), TIMES.index(word)), name)
     return found[min(found)] if found else ""
 
 
