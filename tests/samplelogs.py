@@ -137,7 +137,7 @@ def write_lerobot(folder, episodes, *, names, v3=True, fps=30):
         "codebase_version": "v3.0" if v3 else "v2.1",
         "robot_type": "so101",
         "fps": fps,
-        "features": {"observation.state": feature, "action": feature},
+        "features": {"observation.state": feature, "action": feature, "timestamp": {}},
     }
     (folder / "meta").mkdir(parents=True)
     (folder / "meta" / "info.json").write_text(json.dumps(info))

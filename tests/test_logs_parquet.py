@@ -56,6 +56,10 @@ def test_what_does_not_fit_is_an_error_of_one_line(tmp_path):
     message = r"'joint_pos' has 3 columns, --joints names 2; take a part of it .*\[0:2\]"
     with pytest.raises(LogError, match=message):
         read_log(path, rate=100, joints=["a", "b"])
+    merged = {"time": TIMES, "q1": np.where(np.arange(400) % 2, POSITION[:, 0], np.nan)}
+    message = "column 'q1' is empty in 50% of the rows; columns with another clock must"
+    with pytest.raises(LogError, match=message):
+        read_log(wide(tmp_path, **merged))
     with pytest.raises(LogError, match=r"log.parquet: damaged or cut off \("):
         read_log(cut(path, 0.5))
 
@@ -75,6 +79,7 @@ def test_a_lerobot_data_set_is_a_run_per_episode(tmp_path, v3):
         assert run.rate == 30.0
         assert set(run.meta["differentiated"]) == {"velocity", "velocity_desired"}
         assert run.meta["robot_type"] == "so101"
+    assert not any("timestamp" in remark for remark in next(read_logs(folder)).remarks)
 
 
 def test_one_episode_is_chosen_by_its_number(tmp_path):
