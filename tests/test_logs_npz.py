@@ -94,6 +94,23 @@ def test_isaacs_arrays_are_recognised_and_its_root_is_mapped(tmp_path):
         read_log(path, mapping=wrong, rate=200)
 
 
+@pytest.mark.parametrize("scale", [1.0, 1.02])
+def test_a_row_without_numbers_leaves_a_floating_base_what_it_is(tmp_path, scale):
+    turn = scale * np.tile([0.6, 0.0, 0.8, 0.0], (400, 1))
+    state = np.hstack((np.zeros((400, 3)), turn, POSITION))
+    state[7] = np.nan
+    path = save(tmp_path, time=TIME, qpos=state, qvel=np.hstack((np.zeros((400, 6)), VELOCITY)))
+    if scale != 1.0:
+        message = "qpos has 10 columns and qvel 9, but there is no quaternion; name the joints"
+        with pytest.raises(LogError, match=message):
+            read_log(path)
+        return
+    run = read_log(path).run
+    assert np.array_equal(np.flatnonzero(~run.mask), [7])
+    assert np.array_equal(run.velocity[run.mask], VELOCITY[run.mask])
+    assert run.base_pose is not None
+
+
 @pytest.mark.parametrize(
     "names",
     [("q", "dq", "q_d", "dq_d"), ("q", "dq", "qd", "dq_d"),

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from csvlogs import write
 from samplelogs import EPOCH, Talk, joint_states, motion, write_bag
 
 from inspector import read_log, read_logs
@@ -316,6 +317,28 @@ def test_d4rls_episodes_are_told_apart_by_their_ends(tmp_path):
         assert (first.name, second.name) == ("pen-0", "pen-1")
         assert np.array_equal(first.run.position, position[:150])
         assert np.array_equal(second.run.velocity, velocity[150:])
+
+
+@pytest.mark.parametrize("name", ["done", "terminated", "is_last", "episode", "episode_index"])
+def test_episodes_are_told_apart_in_the_same_way_in_every_format(tmp_path, name):
+    time, position, velocity = moved(20, 2)
+    number, last = np.arange(STEPS) // 150, np.isin(np.arange(STEPS), [149, 299, STEPS - 1])
+    columns = {"time": time, "q1": position[:, 0], "dq1": velocity[:, 0]}
+    columns[name] = number if name.startswith("episode") else last
+    pq.write_table(pa.table(columns), tmp_path / "a.parquet")
+    paths = (savez(tmp_path / "a.npz", **columns), hdf5(tmp_path / "a.h5", columns))
+    for path in (*paths, tmp_path / "a.parquet", write(tmp_path / "a.csv", columns)):
+        found = [*read_logs(path)]
+        assert [each.name for each in found] == ["a-0", "a-1", "a-2"]
+        assert [len(each.run.time) for each in found] == [150, 150, 100]
+        assert np.array_equal(found[1].run.velocity[:, 0], velocity[150:300, 0])
+        assert not any("not read" in remark for remark in found[1].remarks)
+
+
+def test_a_flag_that_stays_until_the_end_loses_no_samples(tmp_path):
+    time, position, _ = moved(20, 1)
+    path = savez(tmp_path / "a.npz", time=time, q1=position[:, 0], done=time > 5)
+    assert len(read_log(path).run.time) == STEPS
 
 
 def test_alohas_actions_are_targets(tmp_path):

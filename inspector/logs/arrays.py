@@ -38,6 +38,8 @@ from inspector.logs.mapping import (
 )
 from inspector.logs.names import (
     EPISODE_ENDS,
+    EPISODE_NUMBERS,
+    EPISODES,
     JOINT_SIGNALS,
     SIGNALS,
     TIMES,
@@ -88,6 +90,7 @@ CELLS = re.compile(
 RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate", "fs")
 # Names of the number that is the rate in [Hz], or the step in [s].
 STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
+SPARSE = 0.5  # share of rows without a number from which a column has another clock
 MOTION = {*SIGNALS, QPOS, QVEL} - {"effort"}
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -153,15 +156,28 @@ def log_of(
         for name, what in roles.items()
         if len(arrays[name]) == samples and name != time
     ]
+    _refuse_sparse(path, fields)
     read = {time, *(each.name for each in fields)}
     return Log(
         path,
         tuple(fields),
         not_read=(*(n for n in arrays if n not in read and meaning(n) != COPY), *not_read),
-        suggested=tuple(_of_mujoco(arrays, roles)),
+        suggested=tuple(_of_mujoco(path, arrays, roles)),
         time=time,
         in_radians=any(what in (QPOS, QVEL) or STATES.fullmatch(n) for n, what in roles.items()),
     )
+
+
+def _refuse_sparse(path: Path, fields: Sequence[Field]) -> None:
+    """Refuse columns of which most rows are empty: several topics were merged into one table."""
+    for each in fields:
+        lacking = np.isnan(each.values)
+        for column, share in zip(lacking.T, lacking.mean(axis=0), strict=True):
+            if SPARSE <= share < 1:
+                how = "columns with another clock must be in a separate log (--desired)"
+                problem = f"column {each.name!r} is empty in {share:.0%} of the rows; {how}"
+                rows, first = each.stamps.rows, int(np.argmax(column))
+                raise LogError(path, problem, None if rows is None else rows[first])
 
 
 def _of_samples(arrays: Arrays) -> Arrays:
@@ -169,7 +185,7 @@ def _of_samples(arrays: Arrays) -> Arrays:
     return {
         n: each[:, 0] if each.shape[1:] == (1,) and n.rpartition("/")[2].lower() in TIMES else each
         for n, each in arrays.items()
-        if each.ndim in (1, 2) and len(each) > 1
+        if each.ndim in (1, 2) and len(each) > 1 and n.lower() not in EPISODES
     }
 
 
@@ -195,12 +211,17 @@ def floats(values: NDArray[Any]) -> Real:
 
 
 def episodes_of(arrays: Arrays) -> dict[str, slice]:
-    """Episodes of a file that has them one after the other, of two samples or more."""
-    ends = [each.ravel() for name, each in arrays.items() if name.lower() in EPISODE_ENDS]
-    found: list[slice] = []
-    if len({len(each) for each in ends}) == 1:
-        last = np.flatnonzero(np.logical_or.reduce(ends)) + 1
-        edges = [0, *(int(each) for each in last if each < len(ends[0])), len(ends[0])]
+    """Episodes of a log that has them one after the other, of two samples or more."""
+    last, found = list[NDArray[np.bool_]](), list[slice]()
+    for name, each in arrays.items():
+        if each.size > 1 and name.lower() in EPISODE_ENDS:
+            flags = np.nan_to_num(each.ravel()) != 0
+            last.append(flags[:-1] & ~flags[1:])  # a flag may stay until the end
+        elif each.size > 1 and name.lower() in EPISODE_NUMBERS:
+            last.append(each.ravel()[1:] != each.ravel()[:-1])
+    if len({len(each) for each in last}) == 1:
+        ends = np.flatnonzero(np.logical_or.reduce(last)) + 1
+        edges = [0, *ends.tolist(), len(last[0]) + 1]
         found = [slice(start, stop) for start, stop in pairwise(edges) if stop - start > 1]
     return {str(n): part for n, part in enumerate(found)} if len(found) > 1 else {"": slice(None)}
 
@@ -270,7 +291,7 @@ def _stamped(
     return stamps_of(path, name, arrays[name], options.rate), arrays
 
 
-def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
+def _of_mujoco(path: Path, arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
     """Mapping of MuJoCo's state: a floating base, then joints, up to an object that floats."""
     names = {what: name for name, what in roles.items() if what in (QPOS, QVEL, FORCE)}
     flat = {what: arrays[name].reshape(len(arrays[name]), -1) for what, name in names.items()}
@@ -283,13 +304,17 @@ def _of_mujoco(arrays: Arrays, roles: Mapping[str, str]) -> Iterator[Entry]:
     def is_free(place: int) -> bool:
         """Whether a joint is free from there on: x, y, z and a quaternion."""
         length = np.linalg.norm(qpos[:, place + 3 : place + 7], axis=1)
-        return place + 7 <= width and bool((np.abs(length - 1) < 0.01).all())
+        known = length[np.isfinite(length)]
+        return place + 7 <= width and bool(len(known)) and abs(float(np.median(known)) - 1) < 0.01
 
     count = width - flat[QVEL].shape[1] if QVEL in flat else 1
     base = count > 0 and is_free(0)
     # Without velocities, four numbers of norm 1 among joints may be chance.
     others = range(7 * base, width - 6) if QVEL in flat and count > base else ()
     stop, first = next(filter(is_free, others), width), 7 * base
+    if QVEL in flat and count > 0 and not base and stop == width:
+        problem = f"qpos has {width} columns and qvel {width - count}, but there is no quaternion"
+        raise LogError(path, f"{problem}; name the joints, such as --map position=qpos[7:{width}]")
     if base:
         yield Entry("base_pose", "wxyz", f"{names[QPOS]}[0:7]")
     if stop > first:

@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
+from functools import partial
 from io import StringIO
 from itertools import islice
 from operator import itemgetter
@@ -17,10 +18,11 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.arrays import log_of, may_hold
+from inspector.logs.arrays import episodes_of, log_of, may_hold
 from inspector.logs.clocks import stamps_since
 from inspector.logs.mapping import Log, LogReader, ReadOptions, Stamps, errors_of, no_motion
 from inspector.logs.names import (
+    EPISODES,
     JOINT_SIGNALS,
     TIME_UNITS,
     Naming,
@@ -38,9 +40,9 @@ DELIMITERS = (";", "\t", ",", " ")  # marks between cells
 COMMENTS = ("#", "%", "//")
 # Cells without a number, in any case.
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
+FLAGS = {"true": "1", "false": "0"}
 HEAD = 200  # lines among which the first row of numbers is looked for
 COLUMNS = "such as --columns time,q1,q2,dq1,dq2 (without stamps: no time, but --rate HZ)"
-SPARSE = 0.5  # share of rows without a number from which a column has another clock
 LONGEST_LINE = 4 * 2**20  # characters of a line: far more than all columns that are read can have
 DIGITS = 30  # stamps have at most so many digits before or after the point
 PIECE = 2**20  # characters that are read at once
@@ -64,7 +66,21 @@ class Layout(NamedTuple):
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of a CSV log."""
-    return LogReader("CSV", ("",), lambda _: _read(path, options), lambda: _listing(path, options))
+    with _opened(path) as stream:
+        layout = _layout(path, stream, options)
+        episodes = _episodes(path, stream, layout)
+    listing = partial(_listing, path, options)
+    return LogReader("CSV", (*episodes,), lambda n: _read(path, options, episodes[n]), listing)
+
+
+def _episodes(path: Path, stream: TextIO, layout: Layout) -> dict[str, slice]:
+    """Episodes that columns number or end; one if they hold other text."""
+    places = [at for at, name in enumerate(layout.header) if name.lower() in EPISODES]
+    if places:
+        with suppress(LogError):
+            _, values, _ = _table(path, stream, layout, places, ())
+            return episodes_of({layout.header[at]: values[:, n] for n, at in enumerate(places)})
+    return {"": slice(None)}
 
 
 def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
@@ -97,8 +113,8 @@ def _opened(path: Path) -> Iterator[TextIO]:
             raise LogError(path, "not a CSV log: not text in UTF-8") from error
 
 
-def _read(path: Path, options: ReadOptions) -> Log:
-    """Log with the columns whose signal is known."""
+def _read(path: Path, options: ReadOptions, part: slice) -> Log:
+    """Log of a part of the rows, with the columns whose signal is known."""
     with _opened(path) as stream:
         layout = _layout(path, stream, options)
         header = layout.header
@@ -107,6 +123,7 @@ def _read(path: Path, options: ReadOptions) -> Log:
         options = options.for_columns(path, names)
         wanted = _wanted(path, layout, times, options)
         rows, values, cells = _table(path, stream, layout, wanted, times)
+        rows, values, cells = rows[part], values[part], cells[part]
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
     stamps = replace(Stamps.counted(len(rows)), rows=rows)
@@ -116,13 +133,12 @@ def _read(path: Path, options: ReadOptions) -> Log:
         since = np.array([float(stamp - exact[0]) for stamp in exact])
         unit = "" if _date(cells[0]) is None else "seconds"
         stamps = stamps_since(path, time, exact[0], since, options.rate, rows, unit)
-    for place, lacking in zip(wanted, np.isnan(values).T, strict=True):
-        if SPARSE <= (share := lacking.mean()) < 1:
-            how = "columns with another clock must be in a separate log (--desired)"
-            problem = f"column {header[place]!r} is empty in {share:.0%} of the rows; {how}"
-            raise LogError(path, problem, rows[int(np.argmax(lacking))])
     read = {*times, *wanted}
-    not_read = [n for place, n in enumerate(header) if n and place not in read]
+    not_read = [
+        name
+        for place, name in enumerate(header)
+        if name and place not in read and name.lower() not in EPISODES
+    ]
     arrays = {header[place]: values[:, at] for at, place in enumerate(wanted)}
     log = log_of(path, arrays, options, stamps=stamps, not_read=not_read)
     return replace(log, remarks=layout.remarks)
@@ -356,6 +372,8 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
 
 def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -> list[float]:
     """Numbers of cells of which some are empty, have a decimal comma, or are no numbers."""
+    pairs = [*zip(names, cells, strict=True)]
+    cells = [FLAGS.get(cell.lower(), cell) if n.lower() in EPISODES else cell for n, cell in pairs]
     for name, cell in zip(names, cells, strict=True):
         if not (_is_missing(cell) or _is_number(cell)):
             raise LogError(path, f"column {name!r} holds {cell[:40]!r}, which is not a number", row)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs import arrays
 from inspector.logs.mapping import Log, LogReader, ReadOptions, errors_of
-from inspector.logs.names import EPISODE_ENDS, TIMES, listed
+from inspector.logs.names import EPISODES as EPISODE_NAMES
+from inspector.logs.names import TIMES, listed
 from inspector.text import counted
 from noisemodel.runfile import check_unpacked
 
@@ -27,7 +28,7 @@ NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
 # Errors that h5py raises for damaged files.
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
 SMALL = 8 * 2**20  # bytes up to which a dataset is read whatever its name is
-NAMES = {*TIMES, *EPISODE_ENDS}
+NAMES = {*TIMES, *EPISODE_NAMES}
 
 MATLAB = b"MATLAB 7.3"  # the first bytes of a file that MATLAB wrote
 REFERENCES = "#refs#"  # the group in which MATLAB keeps the cells and objects of a file
@@ -57,7 +58,7 @@ def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str
             if found := [n for n in groups.values() if home == EPISODES or NUMBERED.fullmatch(n)]:
                 found.sort(key=lambda name: [int(number) for number in re.findall(r"\d+", name)])
                 return home, tuple(found)
-    flags = {name: file.get(name) for name in EPISODE_ENDS}
+    flags = {name: file.get(name) for name in EPISODE_NAMES}
     datasets = {name: each for name, each in flags.items() if isinstance(each, h5py.Dataset)}
     return "", tuple(arrays.episodes_of(_values(path, file, datasets)))
 

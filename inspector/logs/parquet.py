@@ -23,10 +23,10 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.arrays import floats, log_of, may_hold
+from inspector.logs.arrays import episodes_of, floats, log_of, may_hold, part_of
 from inspector.logs.clocks import stamps_of
 from inspector.logs.mapping import Field, Log, LogReader, ReadOptions, Stamps, errors_of, no_motion
-from inspector.logs.names import Naming, array_signal, listed
+from inspector.logs.names import EPISODES, Naming, array_signal, listed
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
 from noisemodel.files import beyond, limit
@@ -82,9 +82,11 @@ def _schema(path: Path) -> Any:
 
 
 def _episodes(path: Path) -> tuple[str, ...]:
-    """Episodes in a file; "" if it does not number them."""
-    if EPISODE not in _schema(path).names:
-        return ("",)
+    """Episodes in a file; "" if it neither numbers nor ends them."""
+    names = _schema(path).names
+    if EPISODE not in names:
+        found = [name for name in names if name.lower() in EPISODES]
+        return (*episodes_of(_arrays(path, _table([path], found, ""), found)),) if found else ("",)
     column = _table([path], [EPISODE], "").column(0)
     if not pyarrow.types.is_integer(column.type) or column.null_count:
         raise LogError(path, f"column {EPISODE!r} holds {column.type}, expected whole numbers")
@@ -114,7 +116,8 @@ def _values(path: Path, table: Any, name: str) -> NDArray[Any] | None:
     flat = column.combine_chunks()
     while pyarrow.types.is_list(flat.type) or pyarrow.types.is_fixed_size_list(flat.type):
         flat = flat.flatten()
-    if not (pyarrow.types.is_floating(flat.type) or pyarrow.types.is_integer(flat.type)):
+    types = pyarrow.types
+    if not any(kind(flat.type) for kind in (types.is_floating, types.is_integer, types.is_boolean)):
         return None
     numbers = flat.to_numpy(zero_copy_only=False)
     widths = pc.list_value_length(column).unique() if pyarrow.types.is_list(column.type) else ()
@@ -122,6 +125,16 @@ def _values(path: Path, table: Any, name: str) -> NDArray[Any] | None:
         problem = f"column {name!r} has {len(numbers)} numbers in {samples} rows of any length"
         raise LogError(path, problem)
     return np.asarray(numbers).reshape(samples, -1)
+
+
+def _arrays(path: Path, table: Any, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Columns of numbers, as arrays."""
+    values = {name: _values(path, table, name) for name in names}
+    return {
+        name: each[:, 0] if each.shape[1] == 1 else each
+        for name, each in values.items()
+        if each is not None
+    }
 
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
@@ -133,16 +146,15 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     wanted = [n for n in names if n in mapped or may_hold(n, naming) or array_signal(n)]
     if not wanted:
         raise no_motion(path, schema.names)
+    flags = [name for name in names if name.lower() in EPISODES]
     wanted += [time] if time else []
-    table = _table([path], wanted, episode)
-    arrays = {
-        name: values[:, 0] if values.shape[1] == 1 else values
-        for name in wanted
-        if (values := _values(path, table, name)) is not None
-    }
+    table = _table([path], [*wanted, *flags], episode if EPISODE in schema.names else "")
+    arrays = _arrays(path, table, [*wanted, *flags])
+    if EPISODE not in schema.names:
+        arrays = part_of(arrays, episode)
     if time and time not in arrays:
         raise LogError(path, f"column {time!r} holds no stamps but {table.column(time).type}")
-    not_read = [name for name in schema.names if name not in (*arrays, EPISODE)]
+    not_read = [name for name in schema.names if name not in (*arrays, *EPISODES)]
     return log_of(path, arrays, options, not_read=not_read)
 
 
@@ -329,7 +341,9 @@ def _episode(
     return Log(
         path,
         tuple(fields),
-        not_read=tuple(n for n in features if n not in arrays and not n.startswith(IMAGES)),
+        not_read=tuple(
+            n for n in features if n not in {*arrays, STAMP} and not n.startswith(IMAGES)
+        ),
         remarks=tuple(remarks),
         units=UNKNOWN if any(dot and end in PARTS for dot, end in ends) else "",
         meta={key: value for key, value in meta.items() if value},

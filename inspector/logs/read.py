@@ -24,7 +24,7 @@ from inspector.logs.mapping import (
     read_options,
 )
 from inspector.logs.motion import Imported, prepared, run_of
-from inspector.logs.names import BASE_SIGNALS, EPISODE_ENDS, JOINT_SIGNALS, listed
+from inspector.logs.names import BASE_SIGNALS, EPISODES, JOINT_SIGNALS, listed
 from inspector.text import counted, printable
 from noisemodel import NoiseModelError, Robot, Run, RunFileError, runfile
 from noisemodel.files import also_reading
@@ -390,7 +390,7 @@ def _is_npz(path: Path) -> bool:
 def _ends_episodes(path: Path) -> bool:
     """Whether an archive holds arrays of several episodes, one after the other."""
     try:
-        return any(name.lower() in EPISODE_ENDS for name in runfile.names_in(path))
+        return any(name.lower() in EPISODES for name in runfile.names_in(path))
     except (OSError, runfile.ArchiveError):
         return False
 
