@@ -67,21 +67,21 @@ def test_a_bad_log_is_one_line_that_names_the_row(tmp_path, body, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["sim_time", "t", "timestamps", "times", "tout"])
-def test_a_robots_clock_is_preferred_to_a_computers(tmp_path, name):
-    columns = {"wall_time": 1e9 + 1.7 * TIME, name: TIME, "a.velocity": TIME}
-    assert read_log(write(tmp_path / "log.csv", columns)).run.rate == 100.0
+NUMBER = np.arange(400)
 
 
-def test_microseconds_since_a_robot_started_are_no_dates_of_years_ago(tmp_path):
-    columns = {"time": np.int64(np.rint((TIME / 5 + 1200) * 1e6)), "a.velocity": TIME}
-    assert read_log(write(tmp_path / "log.csv", columns)).run.rate == 500.0
-
-
-def test_of_two_columns_of_nanoseconds_the_usual_name_counts(tmp_path):
-    rows = "".join(f"0,{n}0000000,0,{n}\n" for n in range(90))
-    (tmp_path / "log.csv").write_text(f"sec,nsec,nanosec,elbow.velocity\n{rows}")
-    assert read_log(tmp_path / "log.csv").run.rate == 100.0
+@pytest.mark.parametrize(
+    ("clocks", "rate"),
+    [
+        *(({"wall_time": 1.7 * TIME, name: TIME}, 100) for name in ("sim_time", "t", "timestamps")),
+        *(({"host_time": 1.7 * TIME, name: TIME}, 100) for name in ("times", "tout")),
+        ({"time": np.int64(np.rint((TIME / 5 + 1200) * 1e6))}, 500),  # no dates a long time ago
+        ({"sec": NUMBER // 100, "nsec": NUMBER % 100 * 10**7, "nanosec": 0 * NUMBER}, 100),
+    ],
+)
+def test_of_several_clocks_a_robots_own_and_the_usual_name_count(tmp_path, clocks, rate):
+    path = write(tmp_path / "log.csv", clocks | {"a.velocity": TIME})
+    assert read_log(path).run.rate == rate
 
 
 def test_a_file_that_is_no_log_is_named(tmp_path):

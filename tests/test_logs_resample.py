@@ -43,16 +43,18 @@ def test_rounded_stamps_have_the_rate_of_all_of_them(tmp_path):
         assert run.time[-1] == pytest.approx(time[-1], abs=1e-4)
 
 
-@pytest.mark.parametrize("rate", [240, 600, 700, 800, 960])
+@pytest.mark.parametrize("rate", [100, 240, 600, 700, 800, 960])
 def test_stamps_rounded_to_a_millisecond_are_even_unless_a_sample_is_lost(tmp_path, rate):
     time = np.arange(4000) / rate
     kept = (time < 1) | (time >= 1.2)  # a gap stays one
     moved = {"elbow.velocity": swing(time[kept])[1]}
     imported = read_log(log(tmp_path, np.round(time, 3)[kept], **moved))
-    assert np.allclose(imported.run.velocity[kept, 0], moved["elbow.velocity"], rtol=1e-9)
+    assert np.allclose(
+        imported.run.velocity[kept, 0], moved["elbow.velocity"], rtol=1e-12, atol=1e-12
+    )
     assert np.array_equal(imported.run.mask, kept)
     told = f"log.csv: stamps rounded to 0.001 s, taken for even ones of {rate} Hz"
-    assert told in imported.remarks
+    assert (told in imported.remarks) == (rate > 100)
     lost = np.delete(np.round(time, 3), [1000, 1700, 3100])
     assert told not in read_log(log(tmp_path, lost)).remarks
 
@@ -113,13 +115,6 @@ def test_gaps_are_marked_and_nothing_is_computed_in_them(tmp_path):
     _, velocity = swing(run.time)
     assert np.abs(run.velocity[:, 0] - velocity)[~gap].max() < 5e-3 * 2 * np.pi
     assert "log.csv: 1 gap, 0.2" in imported.remarks[1]
-
-
-def test_a_uniform_log_with_a_gap_keeps_its_samples(tmp_path):
-    time = np.delete(TIME, slice(100, 120))
-    run = read_log(log(tmp_path, time)).run
-    assert np.array_equal(np.flatnonzero(~run.mask), np.arange(100, 120))
-    assert np.allclose(run.velocity[run.mask, 0], swing(time)[1], rtol=1e-12, atol=1e-12)
 
 
 def test_angles_that_wrap_are_interpolated_the_short_way(tmp_path):

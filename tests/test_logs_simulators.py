@@ -319,26 +319,26 @@ def test_d4rls_episodes_are_told_apart_by_their_ends(tmp_path):
         assert np.array_equal(second.run.velocity, velocity[150:])
 
 
-@pytest.mark.parametrize("name", ["done", "terminated", "is_last", "episode", "episode_index"])
-def test_episodes_are_told_apart_in_the_same_way_in_every_format(tmp_path, name):
-    time, position, velocity = moved(20, 2)
-    number, last = np.arange(STEPS) // 150, np.isin(np.arange(STEPS), [149, 299, STEPS - 1])
+@pytest.mark.parametrize(
+    ("name", "lengths"),
+    [
+        *((name, [150, 150, 100]) for name in ("done", "is_last", "episode", "episode_index")),
+        ("terminated", [STEPS]),  # to the end, once it is set
+    ],
+)
+def test_episodes_are_told_apart_in_the_same_way_in_every_format(tmp_path, name, lengths):
+    number = np.arange(STEPS) // 150
+    flag = number > 1 if name == "terminated" else np.append(np.diff(number) > 0, True)
+    time, position, velocity = moved(20, 1)
     columns = {"time": time, "q1": position[:, 0], "dq1": velocity[:, 0]}
-    columns[name] = number if name.startswith("episode") else last
+    columns[name] = number if name.startswith("episode") else flag
     pq.write_table(pa.table(columns), tmp_path / "a.parquet")
     paths = (savez(tmp_path / "a.npz", **columns), hdf5(tmp_path / "a.h5", columns))
     for path in (*paths, tmp_path / "a.parquet", write(tmp_path / "a.csv", columns)):
         found = [*read_logs(path)]
-        assert [each.name for each in found] == ["a-0", "a-1", "a-2"]
-        assert [len(each.run.time) for each in found] == [150, 150, 100]
-        assert np.array_equal(found[1].run.velocity[:, 0], velocity[150:300, 0])
-        assert not any("not read" in remark for remark in found[1].remarks)
-
-
-def test_a_flag_that_stays_until_the_end_loses_no_samples(tmp_path):
-    time, position, _ = moved(20, 1)
-    path = savez(tmp_path / "a.npz", time=time, q1=position[:, 0], done=time > 5)
-    assert len(read_log(path).run.time) == STEPS
+        assert [len(each.run.time) for each in found] == lengths
+        assert np.array_equal(np.concatenate([each.run.velocity for each in found]), velocity)
+        assert not any("not read" in remark for each in found for remark in each.remarks)
 
 
 def test_alohas_actions_are_targets(tmp_path):
