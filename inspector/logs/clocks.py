@@ -413,11 +413,11 @@ def _estimated(
         seconds, correlation, next_best, change = found
         said = f"offset {seconds:+.4f} s (correlation {correlation:.2f}, next best {next_best:.2f})"
         if correlation >= CORRELATION and next_best <= NEXT_BEST * correlation:
-            drifts = f"; the clocks drift: it is {change:+.4f} s larger in the second half"
-            drifts = drifts if abs(change) >= DRIFT else ""
             if abs(seconds) <= LAG:
-                return None, f"{said}: a controller's lag, the stamps are not changed{drifts}"
-            return seconds, f"{said}: its stamps are shifted by that{drifts}"
+                return None, f"{said}: a controller's lag, the stamps are not changed"
+            drifts = f"; the clocks drift: it is {change:+.4f} s larger in the second half"
+            shown = drifts if abs(change) >= DRIFT else ""
+            return seconds, f"{said}: its stamps are shifted by that{shown}"
         unknown = f"the offset cannot be estimated ({said})"
     if apart:
         raise LogError(path, f"{apart}{unknown}; {HOW}")
