@@ -223,6 +223,9 @@ def on_clocks(tracks: Sequence[Track], changed: Mapping[Stamps, Stamps]) -> list
     return [replace(track, stamps=changed.get(track.stamps, track.stamps)) for track in tracks]
 
 
+SHORTER = 10  # fewest steps' worth of rounding that tells rounded stamps from a lost sample
+
+
 def even(stamps: Stamps) -> Stamps:
     """Stamps of a uniform clock that were rounded to a decimal, without the rounding.
 
@@ -234,7 +237,7 @@ def even(stamps: Stamps) -> Stamps:
     mean, apart = (float(usual.mean()), float(np.ptp(usual))) if len(usual) else (0.0, 0.0)
     unit = 10.0 ** round(log10(apart)) if apart > UNIFORM * mean else 0.0
     # A shorter step would not be; one that is seldom longer may be a lost sample.
-    if not unit or abs(apart / unit - 1) > 0.01 or len(usual) * (mean - unit) < FEWEST * unit:
+    if not unit or abs(apart / unit - 1) > 0.01 or len(usual) * (mean - unit) < SHORTER * unit:
         return stamps
     for digits in range(2, 10):
         rate = float(f"{1 / mean:.{digits}g}")
