@@ -16,7 +16,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field, is_dataclass, replace
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import cache, partial
 from pathlib import Path
@@ -309,8 +309,11 @@ class Verdict:
 
 @cache
 def _parts_of(kind: Any) -> tuple[Any, tuple[Any, ...], Mapping[str, Any]]:
-    """Origin and arguments of a type, and the types of the fields of a dataclass."""
-    return get_origin(kind), get_args(kind), get_type_hints(kind) if is_dataclass(kind) else {}
+    """Origin and arguments of a type, and the types of the fields of a dataclass that count."""
+    if not is_dataclass(kind):
+        return get_origin(kind), get_args(kind), {}
+    hints = get_type_hints(kind)
+    return None, (), {each.name: hints[each.name] for each in fields(kind) if each.compare}
 
 
 def read_as(kind: Any, value: Any) -> Any:

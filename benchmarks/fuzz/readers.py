@@ -35,7 +35,7 @@ from inspector.logs.names import (
     Naming,
     array_signal,
     column_signal,
-    says_twice,
+    rank_of,
     time_column,
 )
 from inspector.logs.read import listing, read_logs
@@ -415,7 +415,7 @@ def _read_names(path: Path) -> None:
     names = path.read_text(errors="replace").splitlines()[:20]
     naming = Naming.of(names, ("elbow",))
     for name in names:
-        column_signal(name, naming), array_signal(name), says_twice(name)
+        column_signal(name, naming), array_signal(name), rank_of(name)
     time_column(names)
 
 

@@ -39,8 +39,8 @@ LOWEST = 13.0  # lowest frequency, in [Hz]
 WIDTH = 5  # frequencies of a window that are one line
 NEAR = 5  # windows on either side that are no rest
 REST, PAST = 8, 16  # least windows of the rest of a file, and of the past of a stream
-# Thresholds: of 528 good runs of 24 simulated robots (0.88 h) at 1000 and 250 Hz, 14 of six motions
-# have a burst. Of tones of half a second, 34, 68, 90 and 98 % are found at 10, 15, 20 and 30 dB
+# Thresholds: of 528 good runs of 24 simulated robots (0.88 h) at 1000 and 250 Hz, 11 of six motions
+# have a burst. Of tones of half a second, 33, 66, 89 and 98 % are found at 10, 15, 20 and 30 dB
 # above the level of their joint and octave.
 LEVEL = -50.0  # least level of a line, in [dB re 1 rad/s]
 PROMINENT = 22.0  # least level of a line over the median of the frequencies around it, in [dB]
@@ -48,6 +48,9 @@ PROMINENT = 22.0  # least level of a line over the median of the frequencies aro
 # has is not known of a stream.
 SCORE = 1.0 - 0.5 * 10.0 ** (-(PROMINENT - STRONG) / 10.0)
 PURE = 0.7  # least share of a line in its octave
+ALONE = (
+    0.99  # the same of a line that is no part of its neighbourhood: ripple and ringing are broad
+)
 # Least level of a line over the mean of the rest of the run at its frequencies, in [dB]. Where the
 # joint moves faster than in the rest, it is that much more: what a drive does rises with its speed.
 ABOVE = 18.0
@@ -184,14 +187,15 @@ def prominent(power: Array, frequency: Array, rate: float) -> tuple[Index, Index
     sums = power.cumsum(axis=1)
     own = sums[pair, stop - 1] - sums[pair, first - 1]
     whole = sums[pair, high - 1] - sums[pair, low - 1]
-    pure = own >= PURE * whole
-    pair, place = pair[pure], place[pure]
-    # It is far enough above the median of those beside if it is above more than half of them. Its
-    # own are none: of a low line they would be half.
+    share = own / np.maximum(whole, TINY)
+    pure = share >= PURE
+    pair, place, alone = pair[pure], place[pure], share[pure] >= ALONE
+    # It is far enough above the median of those beside if it is above more than half of them. Of a
+    # low line that is all but alone in its octave, its own are none of these.
     low, high = around(frequency, place, AROUND)
     number = np.arange(len(frequency))
     beside = (number >= low[:, None]) & (number < high[:, None])
-    beside &= np.abs(number - place[:, None]) > WIDTH // 2
+    beside &= ~alone[:, None] | (np.abs(number - place[:, None]) > WIDTH // 2)
     far = 10.0 ** (PROMINENT / 10.0) * power[pair] <= power[pair, place][:, None]
     kept = 2 * (far & beside).sum(axis=1) > beside.sum(axis=1)
     return rows[pair[kept]], windows[pair[kept]], place[kept]

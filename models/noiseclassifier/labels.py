@@ -40,7 +40,7 @@ class Event:
     novel: bool = False  #: whether one of its frames is out of distribution
     #: Of a line that was followed, the joint, as a row of the signals that go joint by joint, and
     #: the frequency, in [Hz].
-    line: tuple[int, float] | None = field(default=None, compare=False)
+    line: tuple[int, float] | None = field(default=None, compare=False, kw_only=True)
 
     @property
     def novelty(self) -> str:
