@@ -178,7 +178,8 @@ class _Command(_Taking, TyperCommand):
             if name == "robot" and isinstance(value, str):
                 paths = [Path(value)]
             if name == "runs":  # of folders, commands name the logs: outputs may lie beside these
-                paths = [each for each in paths if each and not each.is_dir()]
+                # `Path.is_dir` raises an error where a name is too long.
+                paths = [each for each in paths if each and not os.path.isdir(each)]  # noqa: PTH112
             files[name in OUTPUTS] += [each for each in paths if isinstance(each, Path)]
         if self.added:
             ctx.obj = self.reading.callback(**{x.name: ctx.params.pop(x.name) for x in self.added})
