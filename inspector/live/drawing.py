@@ -158,10 +158,8 @@ def _viewer(connect: str | None) -> tuple[str, int]:
     if connect is not None:
         match = ADDRESS.fullmatch(connect)
         if match is None or not 0 < int(match["port"]) < 65536:
-            raise SinkError(
-                f"{connect!r} is no address of a viewer; expected PORT, HOST:PORT or"
-                " rerun+http://HOST:PORT/proxy"
-            )
+            expected = "expected PORT, HOST:PORT or rerun+http://HOST:PORT/proxy"
+            raise SinkError(f"{connect!r} is no address of a viewer; {expected}")
         host, port = match["host"] or HOST, int(match["port"])
     if viewer.listens(host, port):
         return host, port
@@ -171,9 +169,8 @@ def _viewer(connect: str | None) -> tuple[str, int]:
     elif connect is None:
         problem = "there is no display to open one on"
     if problem:
-        raise SinkError(
-            f"no viewer at {host}:{port}, {problem}; use --connect HOST:PORT or --save FILE.rrd"
-        )
+        advice = "use --connect HOST:PORT or --save FILE.rrd"
+        raise SinkError(f"no viewer at {host}:{port}, {problem}; {advice}")
     return host, port
 
 

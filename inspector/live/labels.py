@@ -12,7 +12,7 @@ from inspector.library import Library
 from noiseclassifier import Event, Labels
 from noiseclassifier.lasting import ERROR, MEASURED
 from noiseclassifier.profile import NOMINAL
-from noiseclassifier.signals import JOINTS, NOISE
+from noiseclassifier.signals import NOISE
 from noisemodel.types import Array, Mask
 
 # What makes noise, in the order of the columns of a motion: where one is unknown, no label is.
@@ -26,12 +26,8 @@ def noise_signals(names: Sequence[str], motion: Array, base: int, joints: int) -
     if any(name.startswith("error") for name in names):
         of_joints["error"] = of_joints["desired"] - of_joints["measured"]
     norms_of = {**of_joints, "measured": motion[:, :moved], NOISE: motion}
-    return {
-        name: of_joints[name.removesuffix("_joints")].T
-        if name in JOINTS
-        else nm.simplified(norms_of[name])
-        for name in names
-    }
+    each = {f"{name}_joints": moved_of.T for name, moved_of in of_joints.items()}
+    return {name: each[name] if name in each else nm.simplified(norms_of[name]) for name in names}
 
 
 class Labeller:
@@ -55,10 +51,8 @@ class Labeller:
             self.remark = f"No labels: {error}."
             return
         if abs(rate / chosen.rate - 1.0) > NOMINAL:
-            self.remark = (
-                f"No labels: samples come at {rate:g} Hz, the nearest model takes"
-                f" {chosen.rate:g} Hz; only files are decimated."
-            )
+            rates = f"samples come at {rate:g} Hz, the nearest model takes {chosen.rate:g} Hz"
+            self.remark = f"No labels: {rates}; only files are decimated."
             return
         self.model, self.classes, self.length = model, chosen.classes, chosen.profile.duration
         self.hop = chosen.profile.hop / rate
@@ -154,9 +148,8 @@ class Findings:
     @property
     def events(self) -> tuple[Event, ...]:
         """The events so far, as if the signal ended here."""
-        if self._open is None or self._quiet:
-            return tuple(self._closed)
-        return (*self._closed, *self._open.events())
+        waiting = () if self._open is None or self._quiet else self._open.events()
+        return (*self._closed, *waiting)
 
 
 class News:

@@ -121,9 +121,8 @@ def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, in
             yield lines + end, number
             number += lines.count(b"\n") + 1
         elif len(rest) > MAX_LINE_BYTES:
-            raise LiveError(
-                f"line {number} is longer than {MAX_LINE_BYTES} bytes: this is no CSV or JSON"
-            )
+            long = f"line {number} is longer than {MAX_LINE_BYTES} bytes"
+            raise LiveError(f"{long}: this is no CSV or JSON")
         sleep(gather if len(chunk) < SMALL_CHUNK_BYTES else 0.0)
     if rest.strip():
         yield rest + b"\n", number
@@ -196,10 +195,9 @@ class CsvReader:
                 raise LiveError(f"the header names the {kind} of {joint!r} twice")
             found[kind][joint] = place
         if "velocity" not in found:
-            raise LiveError(
-                "the header names no velocity; expected columns such as elbow.velocity,"
-                f" they are {listed(header)}"
-            )
+            expected = "expected columns such as elbow.velocity"
+            problem = f"the header names no velocity; {expected}"
+            raise LiveError(f"{problem}, they are {listed(header)}")
         names = names or tuple(found["velocity"])
         for kind, by_joint in found.items():
             if lacking := [name for name in names if name not in by_joint]:
@@ -374,7 +372,17 @@ class Gate:
 
     def judge(self, summary: Summary) -> Summary:
         """Judge the whole stream."""
-        self._verdict = verdict = self._judged(summary)
+        events = tuple(map(Finding.of, summary.findings))
+        verdict = Verdict(NAME, summary.status, summary.model, events, duration=summary.duration)
+        if self._reference is not None and summary.levels is not None:
+            verdict = replace(verdict, begin=summary.levels.start)
+            verdict = self._beside(verdict, summary.levels, summary.frames)
+        elif self._begin is not None:  # too long to be compared as a whole
+            status = Status.FINDINGS if self._told else Status.OK
+            verdict = replace(verdict, status=status, events=tuple(self._told))
+        if summary.status is Status.CANNOT_TELL and summary.model and verdict.status is Status.OK:
+            verdict = replace(verdict, status=Status.CANNOT_TELL)  # too little of it was seen
+        self._verdict = verdict
         return replace(summary, status=verdict.status, findings=verdict.failing)
 
     def end(self, summary: Summary) -> int:
@@ -413,23 +421,6 @@ class Gate:
         if verdict.beside is not None:
             self._tell(f"compared with {verdict.beside.path}: {verdict.beside.words}")
         return EXIT[verdict.status]
-
-    def _judged(self, summary: Summary) -> Verdict:
-        """The verdict on the whole stream."""
-        events = tuple(map(Finding.of, summary.findings))
-        known = (summary.status, summary.model, events)
-        verdict = Verdict(NAME, *known, duration=summary.duration)
-        if self._reference is None or (summary.levels is None and self._begin is None):
-            return verdict
-        if summary.levels is None:  # too long to be compared as a whole
-            status = Status.FINDINGS if self._told else Status.OK
-            verdict = replace(verdict, status=status, events=tuple(self._told))
-        else:
-            verdict = replace(verdict, begin=summary.levels.start)
-            verdict = self._beside(verdict, summary.levels, summary.frames)
-        if summary.status is Status.CANNOT_TELL and summary.model and verdict.status is Status.OK:
-            return replace(verdict, status=Status.CANNOT_TELL)  # too little of it was seen
-        return verdict
 
     def _beside(self, verdict: Verdict, levels: Levels, frames: Labels | None) -> Verdict:
         assert self._reference is not None

@@ -69,10 +69,8 @@ class SampleBuffer:
             first = self._widths.get(name, 0)
             given = rows.get(name, np.empty((len(time), 0)))
             if (now := given.shape[1]) != first:
-                line = (
-                    f"{name} has {now} columns from {time[0]:.3f} s on, and had {first} at first:"
-                    " not shown, and not labelled where it makes noise"
-                )
+                line = f"{name} has {now} columns from {time[0]:.3f} s on, and had {first} at first"
+                line += ": not shown, and not labelled where it makes noise"
                 self._warnings.note(f"samples with another width of {name}", line, len(time))
                 given = np.full((len(time), first), np.nan)
             if name in self._widths:
@@ -112,10 +110,8 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
         except (TypeError, ValueError) as error:
             raise LiveError(f"{name}: holds no numbers ({error})") from error
         if array.ndim not in (1, 2):
-            raise LiveError(
-                f"{name}: shape {array.shape}, expected (joints,) for one sample or"
-                " (samples, joints)"
-            )
+            expected = "expected (joints,) for one sample or (samples, joints)"
+            raise LiveError(f"{name}: shape {array.shape}, {expected}")
         rows[name] = np.atleast_2d(array)
         if len(rows[name]) != len(rows["velocity"]):
             listed = ", ".join(f"{len(array)} of {name}" for name, array in rows.items())
@@ -253,10 +249,8 @@ class Clock:
             # Where stamps are rounded, the median is wrong; where samples are missing, the mean.
             step, usual = float(known.mean()), median(known.tolist())
             if min(abs(step - 1.0), abs(usual - 1.0)) > RATE_TOLERANCE:
-                line = (
-                    f"timestamps have {self._rate / step:.4g} Hz, the nominal rate is"
-                    f" {self._rate:g} Hz: labels and spectrogram are wrong, set --rate"
-                )
+                rates = f"{self._rate / step:.4g} Hz, the nominal rate is {self._rate:g} Hz"
+                line = f"timestamps have {rates}: labels and spectrogram are wrong, set --rate"
                 self._warnings.note("wrong rate", line)
         return lost
 
@@ -424,8 +418,13 @@ class LiveSession:
         given = (velocity, velocity_desired, position, base_velocity, base_pose)
         named = zip(SIGNALS, given, strict=True)
         rows = rows_of({name: values for name, values in named if values is not None})
-        stamps = self._stamps(time, len(rows["velocity"]))
-        if not len(stamps):
+        samples = len(rows["velocity"])
+        stamps = self._latest + np.arange(1, samples + 1) / self._rate
+        if time is not None:
+            stamps = np.asarray(time, dtype=np.float64).reshape(-1)
+        if stamps.shape != (samples,):
+            raise LiveError(f"time: shape {stamps.shape}, expected ({samples},)")
+        if not samples:
             return
         self._latest = float(stamps[-1])
         buffer = self._buffer = self._buffer or self._begin(rows)
@@ -534,10 +533,9 @@ class LiveSession:
         if not self._names and robot is not None:
             known = tuple(joint_limits(robot))
             if len(known) < joints:
-                raise LiveError(
-                    f"{joints} velocities, and {robot} has {len(known)} joints:"
-                    f" {', '.join(known)}; name those of the samples (--names)"
-                )
+                there = f"{robot} has {len(known)} joints: {', '.join(known)}"
+                advice = "name those of the samples (--names)"
+                raise LiveError(f"{joints} velocities, and {there}; {advice}")
             names = known[:joints]
         absent = check_joints(names, robot)
         self._stream: LevelStream | None = None
@@ -566,14 +564,6 @@ class LiveSession:
                 line = f"taken for {', '.join(names)}; {line} (--names says otherwise)"
                 self.note("joints assumed stationary", line, len(absent))
         return SampleBuffer(max(1, round(BATCH * self._rate)), widths, self._warnings)
-
-    def _stamps(self, time: ArrayLike | None, samples: int) -> Array:
-        stamps = self._latest + np.arange(1, samples + 1) / self._rate
-        if time is not None:
-            stamps = np.asarray(time, dtype=np.float64).reshape(-1)
-        if stamps.shape != (samples,):
-            raise LiveError(f"time: shape {stamps.shape}, expected ({samples},)")
-        return stamps
 
     @property
     def _found(self) -> tuple[Event, ...]:
@@ -618,10 +608,8 @@ class LiveSession:
         motion = np.hstack([signals[name] for name in self._noisy])
         valid = np.asarray(np.isfinite(motion).all(axis=1))
         if not valid.all():
-            line = (
-                f"{' or '.join(self._noisy)} is not known at {time[~valid][0]:.3f} s:"
-                " such samples make no noise, frames with one have no label"
-            )
+            line = f"{' or '.join(self._noisy)} is not known at {time[~valid][0]:.3f} s"
+            line += ": such samples make no noise, frames with one have no label"
             self.note("samples without noise", line, int((~valid).sum()))
             motion[~valid] = 0.0
         if self._stream is not None:
