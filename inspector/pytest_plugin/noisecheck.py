@@ -98,11 +98,7 @@ class Noise:
             if verdict.status is Status.CANNOT_TELL and Status.CANNOT_TELL not in allowed:
                 cause = f"cannot tell whether {shown} is quiet: {analysis.reason}"
                 pytest.fail(cause, pytrace=False)
-            events = [
-                event
-                for event in verdict.failing
-                if not any(each.covers(event.label, event.start, event.stop) for each in stretches)
-            ]
+            events = [e for e in verdict.failing if not any(each.covers(e) for each in stretches)]
             if events or verdict.missing:
                 left = self._leave(stem, analysis, comparison, shown)
                 pytest.fail(_told(verdict, events, shown, left), pytrace=False)

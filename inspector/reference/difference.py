@@ -138,12 +138,10 @@ class Difference:
         """The worst of all scenarios and files; "cannot tell" if none has another status."""
         codes = [EXIT[self.status(row)] for row in self.rows]
         told = [code for code in codes if code != EXIT[Status.CANNOT_TELL]] or codes
-        bad = [
-            EXIT[each.status]
-            for each in self.failed
-            if self.unread_fails or each.status is Status.INTERNAL_ERROR or not self.rows
-        ]
-        return worst_code([*told, *bad])
+        all_fail = self.unread_fails or not self.rows
+        bad = (each.status for each in self.failed)
+        lost = [EXIT[each] for each in bad if all_fail or each is Status.INTERNAL_ERROR]
+        return worst_code([*told, *lost])
 
 
 class _Run(NamedTuple):
@@ -188,9 +186,8 @@ def difference(
     rows.sort(key=lambda row: (ORDER.index(row.outcome), not row.new, row.name))
     if all(sides) and all(row.outcome in ALONE for row in rows):
         here, there = (", ".join(list(side)[:3]) for side in sides)
-        raise InspectorError(
-            f"{before} and {after} have no scenario in common by name ({here} and {there})"
-        )
+        apart = "have no scenario in common by name"
+        raise InspectorError(f"{before} and {after} {apart} ({here} and {there})")
     return Difference(tuple(rows), tuple(failed), margin)
 
 

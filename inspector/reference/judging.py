@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from inspector.reference.levels import HIGHEST, HOP, SIGNALS, Levels, Octaves
 from inspector.text import counted
 from inspector.verdict import Evidence, Finding
+from noiseclassifier import Event
 from noisemodel.types import Array
 
 PAD = 20  # frames for which a repetition is held before its start and after its end: delays
@@ -99,9 +100,10 @@ class Expected:
     reason: str = ""
     until: date | None = None  # last day of a waiver
 
-    def covers(self, label: str, start: float, stop: float) -> bool:
-        """Whether it is about a finding of a class that lasts from onset to end."""
-        return self.label in ("", label) and self.start <= start and stop <= self.stop
+    def covers(self, event: Event, begin: float = 0.0) -> bool:
+        """Whether it is about a finding in a run that begins at a time, in [s]."""
+        inside = self.start <= event.start - begin and event.stop - begin <= self.stop
+        return self.label in ("", event.label) and inside
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +179,9 @@ class Cells:
         cls, run: Levels, others: Sequence[Levels], by: Callable[[Iterable[bool]], bool] = all
     ) -> "Cells":
         """Those of a run that all others have, or any."""
-        return cls(
-            tuple(j for j in run.joints if by(j in each.joints for each in others)),
-            tuple(o for o in run.octaves if by(_place(o, each) >= 0 for each in others)),
-        )
+        joints = tuple(j for j in run.joints if by(j in each.joints for each in others))
+        bands = tuple(o for o in run.octaves if by(_place(o, each) >= 0 for each in others))
+        return cls(joints, bands)
 
     def of(self, run: Levels) -> Real32:
         """Levels of a run, shape (frames, joints, 2, octaves); NaN of those that it lacks."""
@@ -264,15 +265,10 @@ class Comparison:
             place = np.unravel_index(exceeded.argmax(), exceeded.shape)
             frame, joint, signal, octave = map(int, place)
             row = group[frame]
-            evidence = Evidence(
-                str(self.kind[row]),
-                round(float(exceeded.max()), 2),
-                round(float(time[row]), 4),
-                self.joints[joint],
-                SIGNALS[signal],
-                self.octaves[octave],
-                round(float(level[row, joint, signal, octave]), 2),
-            )
+            cell = self.joints[joint], SIGNALS[signal], self.octaves[octave]
+            over, peak = round(float(exceeded.max()), 2), round(float(time[row]), 4)
+            level_db = round(float(level[row, joint, signal, octave]), 2)
+            evidence = Evidence(str(self.kind[row]), over, peak, *cell, level_db)
             # A frame reaches 0.1 s to each side; what is loud in it begins about its middle.
             start = max(run.start, time[group[0]] - HOP)
             stop = min(run.start + run.duration, time[group[-1]] + HOP)
@@ -303,10 +299,8 @@ class Comparison:
         low = known.band[0] if known is not None and known.band else 0.0
         joints = [joint in (None, each) for each in self.joints]
         octaves = [high > low for _, high in self.octaves]
-        own, over = (
-            np.any(np.isfinite(every[inside][:, joints][..., octaves]), axis=3)
-            for every in (cells.of(self.run), self.over)
-        )
+        parts = (of[inside][:, joints][..., octaves] for of in (cells.of(self.run), self.over))
+        own, over = (np.any(np.isfinite(part), axis=3) for part in parts)
         # The reference has to have tracking errors if the run has.
         whole = np.any(over, axis=(1, 2)) & np.all(over[:, :, 1] >= own[:, :, 1], axis=1)
         return bool(inside.any() and (whole & np.isfinite(self.score[inside])).all())
@@ -334,16 +328,16 @@ def compare(run: Levels, scenarios: Sequence[Scenario]) -> Comparison:
     remarks += told
     quieter, band = 0.0, np.full((frames, 2), np.nan)
     if aligned:
-        quieter, band = _quieter(run, aligned, cells), _band(aligned, cells)
+        quieter = _quieter(run, aligned, cells)
+        noise = [np.where(at.same, cells.noise(each)[at.frame], np.nan) for each, at in aligned]
+        band = np.stack((np.fmin.reduce(noise), np.fmax.reduce(noise)), axis=1)
         over, covered = _over_repetitions(run, aligned, cells)
         kind[covered & bool(over.size)] = Kind.REPETITIONS
         margins[Kind.REPETITIONS] = margin_of([db for each in known for db in each.scores_db])
         longest = max(each.duration for each, _ in aligned)
         if run.duration > longest + max(LONGER, SHARE_LONGER * longest):
-            remarks.append(
-                f"longer than its scenario, {run.duration:.1f} of {longest:.1f} s: the rest is"
-                " compared with other motions"
-            )
+            lasts = f"longer than its scenario, {run.duration:.1f} of {longest:.1f} s"
+            remarks.append(f"{lasts}: the rest is compared with other motions")
     left = np.flatnonzero(kind == Kind.GENERAL)
     others = _repetitions([each for each in known if each not in matched] or matched)
     if over.size and len(left) and others:
@@ -586,12 +580,6 @@ def _quieter(run: Levels, aligned: "Paths", cells: Cells) -> float:
     return max(0.0, min((each for each in margins if np.isfinite(each)), default=0.0))
 
 
-def _band(aligned: "Paths", cells: Cells) -> Array:
-    """Quietest and loudest repetition at each frame of the run, shape (frames, 2)."""
-    noise = [np.where(path.same, cells.noise(each)[path.frame], np.nan) for each, path in aligned]
-    return np.stack((np.fmin.reduce(noise), np.fmax.reduce(noise)), axis=1)
-
-
 # --- alignment
 
 
@@ -648,24 +636,25 @@ def align(run: Array, repetitions: Sequence[Array]) -> list[Aligned]:
     run, longest = run / scale, max(map(len, repetitions)) + 2 * PAD
     thin = int(np.ceil(np.sqrt(len(run) * longest / LARGEST)))
     pad = -(-PAD // thin) * thin  # thinned, both have their first frames
-    held = [
-        (
-            np.pad(each / scale, ((pad, pad), (0, 0)), mode="edge"),
-            np.pad(np.full(len(each), np.inf), pad, constant_values=OUTSIDE),
-        )
-        for each in repetitions
-    ]
-    thinned = [(_means(other, thin), most[::thin]) for other, most in held]
+    longer = [np.pad(each / scale, ((pad, pad), (0, 0)), mode="edge") for each in repetitions]
+    most = [np.pad(np.full(len(e), np.inf), pad, constant_values=OUTSIDE) for e in repetitions]
+    held = list(zip(longer, most, strict=True))
+    thinned = [(_means(other, thin), costs[::thin]) for other, costs in held]
     paths = _paths(_means(run, thin), thinned, [pad // thin] * len(held))
     if thin > 1:
         at, nodes = np.arange(len(run)), np.arange(0, len(run), thin)
         rough = [np.interp(at, nodes, path * thin).astype(np.int64) for path in paths]
         paths = _refined(run, held, np.stack(rough), 3 * thin)
-    found = []
-    for path, (other, _), repetition in zip(paths, held, repetitions, strict=True):
+    frames, found = np.arange(len(run)), []
+    low, high = np.maximum(frames - REACH, 0), np.minimum(frames + REACH, len(run) - 1)
+    time = high - low
+    for path, other, repetition in zip(paths, longer, repetitions, strict=True):
         residual = np.abs(run - other[path]).max(axis=1)
         inside = (path >= pad) & (path < pad + len(repetition))
-        residual[inside & ~_comparable(path)] = np.inf
+        # Whether both are about equally fast around each frame; one more or less is rounding.
+        advance = path[high] - path[low]
+        comparable = (advance >= SLOPE[0] * time - 1) & (advance <= SLOPE[1] * time + 1)
+        residual[inside & ~comparable] = np.inf
         found.append(Aligned(np.clip(path - pad, 0, len(repetition) - 1), residual))
     return found
 
@@ -693,15 +682,6 @@ def _refined(
         path = low[:, None] + _paths(run[rows], near, begin - low)
         found[:, first : first + BLOCK] = path[:, first - rows.start :][:, :BLOCK]
     return found
-
-
-def _comparable(path: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether run and repetition are about equally fast around each frame."""
-    frames = np.arange(len(path))
-    low, high = np.maximum(frames - REACH, 0), np.minimum(frames + REACH, len(path) - 1)
-    time, advance = high - low, path[high] - path[low]
-    # One frame more or less is rounding.
-    return np.asarray((advance >= SLOPE[0] * time - 1) & (advance <= SLOPE[1] * time + 1))
 
 
 def _paths(

@@ -129,9 +129,7 @@ class Reference:
             StoreError: If the store is damaged or of a later version.
             InspectorError: If a run cannot be read.
         """
-        path = Path(path)
-        if path.name == NAME:
-            path = path.parent
+        path = Path(path).parent if Path(path).name == NAME else Path(path)
         if os.path.lexists(path / NAME):
             return _read(path)
         if not path.exists():
@@ -183,10 +181,8 @@ def scenario_of(run: Run, path: Path, root: Path | None = None) -> str:
     known = run.meta.get("scenario")
     if isinstance(known, str) and known.strip() and not known.strip().isdigit():
         return known.strip()
-    inside = path.relative_to(root) if root and path.is_relative_to(root) else Path(path.name)
-    if inside == Path():
-        inside = Path(path.name)
-    name = inside.with_suffix("").as_posix()
+    inside = path.relative_to(root) if root and path.is_relative_to(root) else Path()
+    name = (inside if inside.parts else Path(path.name)).with_suffix("").as_posix()
     match = REPETITION.fullmatch(name)
     return match["name"] if match else name
 
@@ -400,7 +396,12 @@ def save(reference: Reference, folder: Path) -> None:
     ]
     names: set[str] = set()
     for scenario in reference.scenarios:
-        name = _file_name(scenario.name, names)
+        plain = re.sub(r"[^\w.-]+", "-", scenario.name, flags=re.ASCII).strip("-.")
+        slug = plain[:80] or "scenario"
+        name = f"{slug}.npz"
+        if slug != scenario.name or name.lower() in {each.lower() for each in names}:
+            name = f"{slug}~{hashlib.sha256(scenario.name.encode()).hexdigest()[:8]}.npz"
+        names.add(name)
         sha256 = _write_levels(folder / name, scenario)
         newest = scenario.repetitions[-1]
         alike = [each for each in reference.scenarios if robot_fits(newest, each)]
@@ -421,15 +422,6 @@ def _holds_levels(path: Path) -> bool:
             return {"level_0.npy", "guide_0.npy"} <= set(archive.namelist())
     except (OSError, zipfile.BadZipFile):
         return False
-
-
-def _file_name(name: str, taken: set[str]) -> str:
-    slug = re.sub(r"[^\w.-]+", "-", name, flags=re.ASCII).strip("-.")[:80] or "scenario"
-    unique = f"{slug}.npz"
-    if slug != name or unique.lower() in {each.lower() for each in taken}:
-        unique = f"{slug}~{hashlib.sha256(name.encode()).hexdigest()[:8]}.npz"
-    taken.add(unique)
-    return unique
 
 
 def _write_levels(path: Path, scenario: Scenario) -> str:
@@ -515,9 +507,8 @@ def _read(folder: Path) -> Reference:
         raise StoreError(path, f"no store of references ({error})") from error
     form = content.pop("format", None)
     if form != FORMAT:
-        raise StoreError(
-            path, f"of format {toml_shown(form)}, this version reads {FORMAT!r}; update the program"
-        )
+        reads = f"this version reads {FORMAT!r}; update the program"
+        raise StoreError(path, f"of format {toml_shown(form)}, {reads}")
     rows = content.pop("scenario", [])
     if content or not isinstance(rows, list) or len(rows) > MOST_SCENARIOS:
         raise StoreError(path, "expected a format and entries [[scenario]] alone")
@@ -605,15 +596,7 @@ def _levels(path: Path, where: str, row: Mapping[str, Any]) -> tuple[Levels, ...
             raise StoreError(file, f"its arrays do not belong to {again}")
         known = {name: each.get(key, "") for key, name in REPEATED.items()}
         known |= {name: float(each.get(key, 0.0)) for key, name in MEASURED.items()}
-        measured = Levels(
-            **known,
-            name=row["name"],
-            robot=row.get("robot", ""),
-            joints=own,
-            octaves=bands,
-            level=decoded(level.astype(np.uint8)),
-            guide=guide.astype(np.float32),
-            pace=pace.astype(np.float32),
-        )
-        found.append(measured)
+        known |= {"name": row["name"], "robot": row.get("robot", ""), "octaves": bands}
+        known |= {"guide": guide.astype(np.float32), "pace": pace.astype(np.float32)}
+        found.append(Levels(**known, joints=own, level=decoded(level.astype(np.uint8))))
     return tuple(found)

@@ -41,7 +41,7 @@ from inspector.verdict import (
     Ruling,
     Verdict,
 )
-from noiseclassifier import UNKNOWN, Event, Labels
+from noiseclassifier import UNKNOWN, Labels
 
 LOGS = r"\d+ of (\d+) logs"  # what a scenario with too few of them has
 LOUDER = "louder"  # class of a finding that only the reference shows
@@ -141,9 +141,8 @@ def _root(run: Path, store: Path) -> Path | None:
 def _asked(scenario: Scenario, folder: Path, top: Path) -> bool:
     """Whether a folder should hold runs of a scenario: all of it, unless it is a part of it."""
     inside = folder.relative_to(top).parts[1:] if folder.is_relative_to(top) else ()
-    return all(
-        Path(each.run).parts[-len(inside) - 1 : -1] == inside for each in scenario.repetitions
-    )
+    part = slice(-len(inside) - 1, -1)
+    return all(Path(each.run).parts[part] == inside for each in scenario.repetitions)
 
 
 @dataclass(frozen=True)
@@ -328,19 +327,14 @@ def judge(
         if gate is not None and ruling in FAILING and (filtered := gate.reason(event)):
             ruling, reason = Ruling.FILTERED, filtered
         events.append(replace(event, ruling=ruling, reason=reason))
-    spans = [_span(event, verdict.begin) for event in verdict.events]
     for scenario in scenarios:
         for each in scenario.wanted:
-            if each.required and not any(each.covers(*span) for span in spans):
+            if each.required and not any(each.covers(e, verdict.begin) for e in verdict.events):
                 when = (round(verdict.begin + at, 6) for at in (each.start, each.stop))
                 start, stop = (at if isfinite(at) else None for at in when)
                 missing.append(Missing(each.label or "a finding", start, stop, each.reason))
-    judged = replace(
-        verdict,
-        events=tuple(events),
-        missing=tuple(missing),
-        expectations="" if reference is None else str(reference.path),
-    )
+    store = "" if reference is None else str(reference.path)
+    judged = replace(verdict, events=tuple(events), missing=tuple(missing), expectations=store)
     if judged.failing or judged.missing:
         message = re.sub(NOTHING, "", verdict.message)
         return replace(judged, status=Status.FINDINGS, message=message)
@@ -349,26 +343,21 @@ def judge(
     return judged
 
 
-def _span(event: Event, begin: float) -> tuple[str, float, float]:
-    """Class of a finding, and its onset and end from the start of the run."""
-    return event.label, event.start - begin, event.stop - begin
-
-
 def _ruled(
     event: Finding, begin: float, scenarios: Sequence[Scenario], today: date
 ) -> tuple[Ruling, str]:
     """What becomes of a finding by what the first scenario that is about it waives or wants."""
     if event.evidence.excused:
         return Ruling.AS_REFERENCE, event.evidence.excused
-    joint, level, span = event.evidence.joint, event.evidence.level_db, _span(event, begin)
+    joint, level = event.evidence.joint, event.evidence.level_db
     for scenario in scenarios:
         for each in reversed(scenario.waive):
-            if each.covers(*span) and each.until is not None:
+            if each.covers(event, begin) and each.until is not None:
                 if today <= each.until:
                     return Ruling.WAIVED, each.reason
                 return Ruling.EXPIRED, f"{each.until}, {each.reason}"
         for each in reversed(scenario.wanted):
-            if each.covers(*span) and (not each.joints or joint in each.joints):
+            if each.covers(event, begin) and (not each.joints or joint in each.joints):
                 most = each.loudest_db
                 if most is None or level is None or level <= most:
                     return Ruling.ALLOWED, each.reason or "it is wanted"
