@@ -297,10 +297,6 @@ def extents(
 
     Those that overlap or touch are one, of the class that lasts longer.
     """
-
-    def length(event: Event) -> float:
-        return event.stop - event.start
-
     frame, pairs = float(labels.stop[0] - labels.start[0]), list[tuple[Event, Event]]()
     found = [(event, 0.0) for event in labels.events()]
     # A line fills most of its windows: it begins before the last hop of the first.
@@ -318,8 +314,8 @@ def extents(
             span = joined(before, span)
             start, stop = min(located.start, own.start), max(located.stop, own.stop)
             if span.line is None and span.label == "oscillations":  # a line may be most of it
-                longer = max(located, own, key=lambda each: (each.line is not None, length(each)))
-                most = 2.0 * length(longer) >= stop - start
+                longer = max(located, own, key=lambda e: (e.line is not None, e.stop - e.start))
+                most = 2.0 * (longer.stop - longer.start) >= stop - start
                 span = replace(span, line=longer.line if most else None)
             own = replace(span, start=start, stop=stop)
         pairs.append((span, own))
@@ -340,8 +336,7 @@ def _missing(run: nm.Run) -> Iterator[str]:
         yield "The run has no desired velocities: the noise counts the measured motion alone."
     for signal, method in run.meta.get("differentiated", {}).items():
         yield f"The run had no {signal}: it was differentiated ({method})."
-    lost = int((~run.mask).sum())
-    if lost:
+    if lost := int((~run.mask).sum()):
         yield f"{lost} samples lie in gaps; frames that touch one are not labelled."
 
 
@@ -362,12 +357,9 @@ class Moment:
 
 def gaps(run: Run) -> list[tuple[float, float]]:
     """Start and stop of each gap, in [s]."""
-    lost = np.concatenate(([False], ~run.mask, [False]))
-    edges = np.flatnonzero(lost[1:] != lost[:-1]).reshape(-1, 2)
-    last = len(run.time) - 1
-    return [
-        (float(run.time[first]), float(run.time[min(stop, last)])) for first, stop in edges.tolist()
-    ]
+    edges = np.flatnonzero(np.diff(run.mask, prepend=True, append=True))
+    times = run.time[np.minimum(edges, len(run.time) - 1)].tolist()
+    return list(zip(times[::2], times[1::2], strict=True))
 
 
 def worst(analysis: Analysis) -> tuple[Moment, ...]:
@@ -410,8 +402,7 @@ def worst_joint(analysis: Analysis) -> int | None:
         if known.joints and near:
             return analysis.run.joint_names.index(known.joints[0][0])
     _, level = analysis.joint_levels
-    power = np.nansum(10.0 ** (level / 10.0), axis=0)
-    return int(np.argmax(power))
+    return int(np.argmax(np.nansum(10.0 ** (level / 10.0), axis=0)))
 
 
 def worst_signal(analysis: Analysis, joint: int | None) -> Array:
@@ -495,10 +486,9 @@ def noise_level(run: Run, estimate: Estimate) -> str:
     pressure = np.where(run.mask, estimate.pressure, 0.0)
     if not np.isfinite(pressure).all():
         sample = int(np.argmin(np.isfinite(pressure)))
-        raise InspectorError(
-            f"the {estimate.kind} noise is {pressure[sample]:g} at {run.time[sample]:.6g} s:"
-            " no robot moves so fast, or is so large"
-        )
+        found = f"{pressure[sample]:g} at {run.time[sample]:.6g} s"
+        limit = "no robot moves so fast, or is so large"
+        raise InspectorError(f"the {estimate.kind} noise is {found}: {limit}")
     energy = estimate.power[run.mask].sum(axis=0)
     shares, unit = energy / (energy.sum() or 1.0), estimate.unit
     rms = float(np.sqrt(np.mean(pressure[run.mask] ** 2)))

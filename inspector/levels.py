@@ -131,21 +131,16 @@ def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spe
     windows = np.lib.stride_tricks.sliding_window_view(signal, length)[::hop]
     touched = np.lib.stride_tricks.sliding_window_view(~valid, length)[::hop]
     whole = ~np.max(touched, axis=1)
-    column = np.arange(len(windows)) // several
-    amplitude = np.zeros((column[-1] + 1, length // 2))
-    for first in range(0, len(windows), COLUMNS):
-        part = slice(first, first + COLUMNS)
-        firsts = np.flatnonzero(np.diff(column[part], prepend=-1))
-        loudest = np.maximum.reduceat(amplitudes(windows[part]) * whole[part, None], firsts)
-        own = column[part][firsts]
-        amplitude[own] = np.maximum(amplitude[own], loudest)
+    firsts, size = np.arange(0, len(windows), several), several * max(1, COLUMNS // several)
+    amplitude = np.empty((len(firsts), length // 2))
+    for first in range(0, len(windows), size):  # not all at once: a long run has many
+        loud = amplitudes(windows[first : first + size]) * whole[first : first + size, None]
+        own = slice(first // several, (first + size) // several)
+        amplitude[own] = np.maximum.reduceat(loud, np.arange(0, len(loud), several))
     middles = np.arange(len(amplitude)) * several * hop + ((several - 1) * hop + length) / 2
-    return Spectrogram(
-        time=np.asarray(start + middles / rate),
-        frequency=np.arange(1, length // 2 + 1) * rate / length,
-        amplitude=amplitude.T,
-        valid=np.bincount(column, whole) > 0,
-    )
+    time = np.asarray(start + middles / rate)
+    frequency = np.arange(1, length // 2 + 1) * rate / length
+    return Spectrogram(time, frequency, amplitude.T, np.logical_or.reduceat(whole, firsts))
 
 
 def in_bands(frequency: Array, amplitude: Array, edges: Array) -> Array:

@@ -156,7 +156,9 @@ def line_extent(run: Run, event: Event, reach: float) -> tuple[float, float]:
 
 def _amplitude(run: Run, event: Event, part: slice) -> Array:
     """Amplitude of a finding's line around each sample of a part, in any unit; 0 in gaps."""
-    joint, frequency = _line(run, event)
+    assert event.line is not None
+    row, frequency = event.line
+    joint = row if run.velocity_desired is None else in_both(run)[0][row]
     # Of differences: slow motion, which is far louder, would leak.
     velocity, valid = run.velocity[part, joint].astype(np.float64), run.mask[part]
     slope = np.diff(velocity, prepend=velocity[:1])
@@ -166,13 +168,6 @@ def _amplitude(run: Run, event: Event, part: slice) -> Array:
     taper = np.hanning(size + 2)[1:-1]
     there = np.convolve(valid, taper, "same")
     return np.asarray(valid * np.abs(np.convolve(wave, taper, "same")) / np.maximum(there, 1e-9))
-
-
-def _line(run: Run, event: Event) -> tuple[int, float]:
-    """Column of the joint of a finding's line, and its frequency, in [Hz]."""
-    assert event.line is not None
-    row, frequency = event.line
-    return row if run.velocity_desired is None else in_both(run)[0][row], frequency
 
 
 # --- stage and joints
@@ -254,12 +249,8 @@ def quiet_statistics(run: Run, failures: Sequence[Failure]) -> QuietStatistics:
     weights = _prediction(change, lags, warm) if stages > 1 else nothing
     *_, level = _innovation(change, weights, lags, valid)
     level = level[..., warm:]  # shape (stretches, stages, samples)
-    return QuietStatistics(
-        weights,
-        lags,
-        power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
-        peak=np.percentile(level.max(axis=2), 90.0, axis=0),
-    )
+    power = np.percentile(np.square(level).mean(axis=2), 90.0, axis=0)
+    return QuietStatistics(weights, lags, power, np.percentile(level.max(axis=2), 90.0, axis=0))
 
 
 def _prediction(change: Array, lags: Indices, warm: int) -> Array:
@@ -428,10 +419,8 @@ def _earliest(
     early, late = (max(1, round(time * rate)) for time in AROUND)
     around = slice(max(0, moment - early), min(level.shape[1], moment + late))
     least = PASSED_ON * total[:, around].max(axis=1)
-    onsets = [
-        onset(each, moment, around, rate=rate, least=own)
-        for each, own in zip(level, least.tolist(), strict=True)
-    ]
+    stages = zip(level, least.tolist(), strict=True)
+    onsets = [onset(each, moment, around, rate=rate, least=own) for each, own in stages]
     found = sorted((at, place) for place, at in enumerate(onsets) if at is not None)
     if found and found[0][1] == 0 and len(onsets) > 1:
         common = float(level[0, around].max()) <= EXCEEDS * quiet.peak[0]
@@ -547,9 +536,8 @@ def band(run: Run, failure: Failure, failures: Sequence[Failure]) -> tuple[float
     return float(frequency[best]), float(frequency[stops[best] - 1])
 
 
-def _of_line(run: Run, event: Event) -> Localisation:
-    """Joints by their shares of a line's power, and its frequency with the resolution."""
-    _, frequency = _line(run, event)
+def _of_line(run: Run, event: Event, frequency: float, known: Localisation) -> Localisation:
+    """With joints by their shares of a line's power, and its frequency with the resolution."""
     duration = min(max(event.stop - event.start, BRIEF), NEAR, run.duration)
     size = max(3, round(duration * run.rate))
     first = min(round((event.start - float(run.time[0])) * run.rate), len(run.time) - size)
@@ -562,10 +550,9 @@ def _of_line(run: Run, event: Event) -> Localisation:
         power += np.square(np.abs(taper @ slope))
     shares = power / (power.sum() or 1.0)
     ranked = np.argsort(-shares, kind="stable")[:JOINTS].tolist()
-    return Localisation(
-        joints=tuple((run.joint_names[i], float(shares[i])) for i in ranked if shares[i] > 0.0),
-        band=(max(0.0, frequency - 1.0 / duration), frequency + 1.0 / duration),
-    )
+    joints = tuple((run.joint_names[i], float(shares[i])) for i in ranked if shares[i] > 0.0)
+    band = (max(0.0, frequency - 1.0 / duration), frequency + 1.0 / duration)
+    return replace(known, joints=joints, band=band, onset=None)
 
 
 def _spectrum(velocity: Real) -> Array:
@@ -638,8 +625,7 @@ def localise(
         reach = max(ANNOTATED, frame) if failure in found else ANNOTATED
         known = first_stage(run, quiet, failure, reach=reach)
         if isinstance(failure, Event) and failure.line is not None:
-            line = _of_line(run, failure)
-            localised[failure] = replace(known, joints=line.joints, band=line.band, onset=None)
+            localised[failure] = _of_line(run, failure, failure.line[1], known)
         else:
             localised[failure] = replace(known, band=band(run, failure, failures))
     return localised
