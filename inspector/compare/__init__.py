@@ -156,10 +156,9 @@ def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
     rate = min(before.rate, after.rate)
     for place, run in enumerate(sides):
         if run.rate > rate * (1 + SAME_RATE):
-            remarks.append(
-                f"The run {SIDES[place]} is decimated from {run.rate:g} Hz to the {rate:g} Hz of"
-                " the other, without its positions and efforts."
-            )
+            rates = f"from {run.rate:g} Hz to the {rate:g} Hz of the other"
+            without = "without its positions and efforts"
+            remarks.append(f"The run {SIDES[place]} is decimated {rates}, {without}.")
             sides[place] = decimated(run, rate)
     return sides[0], sides[1], tuple(remarks)
 
@@ -169,11 +168,9 @@ def together(before: Run, after: Run, alignment: Alignment) -> tuple[Run, Run, t
     first = max(0, alignment.lag)
     stop = min(len(before.time), len(after.time) + alignment.lag)
     if stop - first < 2:
-        raise InspectorError(
-            f"before lasts {before.duration:.2f} s, and after starts"
-            f" {alignment.seconds:+.2f} s from it: they share no time; `--align start` lays their"
-            " starts beside each other"
-        )
+        apart = f"before lasts {before.duration:.2f} s, and after starts {alignment.seconds:+.2f} s"
+        advice = "`--align start` lays their starts beside each other"
+        raise InspectorError(f"{apart} from it: they share no time; {advice}")
     time, lag = before.time[first:stop], alignment.lag
     cut = _cut(before, first, stop, time), _cut(after, first - lag, stop - lag, time)
     remarks = tuple(
@@ -318,8 +315,7 @@ def within(pair: Pair, start: float, stop: float) -> Level:
     first, last = (max(0, round((each - pair.time[0]) * pair.rate)) for each in (start, stop))
     count = max(int(pair.valid[first:last].sum()), 1)
     power = [np.sum(fast[first:last] ** 2) / count for fast in pair.vibration]
-    before, after = np.maximum(decibel(np.array(power)), FLOOR_DB).tolist()
-    return Level(before, after)
+    return Level(*np.maximum(decibel(np.array(power)), FLOOR_DB).tolist())
 
 
 def whole(pair: Pair) -> Level:
@@ -350,10 +346,8 @@ class Change:
     level: Level
 
     def __str__(self) -> str:
-        return (
-            f"{self.kind}: {spoken(self.label)}, {self.start:.2f} s to {self.stop:.2f} s,"
-            f" {self.level.change:+.1f} dB"
-        )
+        when = f"{self.start:.2f} s to {self.stop:.2f} s"
+        return f"{self.kind}: {spoken(self.label)}, {when}, {self.level.change:+.1f} dB"
 
 
 def changes(pair: Pair) -> tuple[Change, ...]:
@@ -464,10 +458,8 @@ def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change
     nothing = {"none": colors.CLASSES["unknown"]}
     views.log_lines(recording, "/change/none", time[[0, -1]], np.zeros((2, 1)), nothing)
     panels.log_shades(recording, "/change/finding", changed, SHADES, (-reach, reach))
-    marks = [
-        Label(0.5 + mark / reach / 2, views.written(mark), 44.0)
-        for mark in (-reach / 2, 0.0, reach / 2)
-    ]
+    ticks = (-reach / 2, 0.0, reach / 2)
+    marks = [Label(0.5 + tick / reach / 2, views.written(tick), 44.0) for tick in ticks]
     signed = f"{peak:+.0f}".replace("-", "\u2212").replace("+0", "0")
     left, right = [Label(0.6, "change\n[dB]", -22.0), *marks], [Label(0.5, f"largest\n{signed}")]
     views.log_beside(recording, CHANGED, left, right)
@@ -497,10 +489,8 @@ def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> list[P
 
 
 def _sides(*places: float) -> list[Label]:
-    return [
-        Label(place, name, color=color)
-        for place, (name, color) in zip(places or (0.75, 0.4), SIDE_COLORS.items(), strict=True)
-    ]
+    sides = zip(places or (0.75, 0.4), SIDE_COLORS.items(), strict=True)
+    return [Label(place, name, color=color) for place, (name, color) in sides]
 
 
 ROW, LEAST = 26.0, 50.0  # height of a class, and of all of them at least, in points
@@ -579,10 +569,8 @@ def _log_robots(recording: rr.RecordingStream, pair: Pair) -> tuple[Robot | None
     runs = {side: each.run for side, each in pair.sides}
     drawn, cameras = zip(*robot.log_robots(recording, runs, aspect=ASPECT), strict=True)
     panels.log_robot_levels(recording, list(zip(drawn, pair.links, strict=True)), KEY)
-    shown = [
-        (views.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0)
-        for side, camera in zip(SIDES, cameras, strict=True)
-    ]
+    seen = zip(SIDES, cameras, strict=True)
+    shown = [(views.robot(f"Robot {side}", f"/robot_{side}", each), 29.0) for side, each in seen]
     return drawn[1].robot, [*shown, (views.drawing(f"/axis/{KEY.name}/right"), 8.0)]
 
 

@@ -97,12 +97,10 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         begin = min(float(side.run.time[0]) for side in several.sides)
         end = max(float(side.run.time[-1]) for side in several.sides)
         views.log_span(recording, begin, end)
-        failing = sum(bool(side.findings) for side in several.sides)
-        unknown = sum(side.status is Status.CANNOT_TELL for side in several.sides)
         count, told = len(several.names), (Status.OK, "PASS   no finding")
-        if failing or unknown:
+        if unknown := sum(side.status is Status.CANNOT_TELL for side in several.sides):
             told = (Status.CANNOT_TELL, f"CANNOT TELL   {unknown} of {count} runs")
-        if failing:
+        if failing := sum(bool(side.findings) for side in several.sides):
             told = (Status.FINDINGS, f"FAIL   {failing} of {count} runs")
         verdict = views.log_verdict(recording, *told)
         room = WHOLE - TABLE - CURVE

@@ -288,10 +288,8 @@ def _log_level(
 
 def level_axis(title: str = "above 10 Hz\n[dB re\n1 rad/s]", shift: float = -22.0) -> list[Label]:
     """The title and the ticks of the axis of levels."""
-    marks = [
-        Label((tick - LOW_DB) / (HIGH_DB - LOW_DB), views.written(tick), 44.0)
-        for tick in (-60.0, -40.0, -20.0, 0.0)
-    ]
+    ticks, span = (-60.0, -40.0, -20.0, 0.0), HIGH_DB - LOW_DB
+    marks = [Label((tick - LOW_DB) / span, views.written(tick), 44.0) for tick in ticks]
     return [Label(0.62, title, shift), *marks]
 
 
@@ -374,12 +372,9 @@ def log_plots(
     for title, signals in plots.items():
         paths: dict[str, list[str]] = {limb: [] for limb in limbs}
         for path, signal, mask, suffix, dim in signals:
-            whole = bool(mask.all())  # then a signal can stay in its file
-            shown, values = extremes(
-                time if whole else time[mask],
-                signal.values if whole else signal.values[mask],
-                points=points,
-            )
+            drawn = (time, signal.values)  # a signal without gaps can stay in its file
+            drawn = drawn if mask.all() else (time[mask], signal.values[mask])
+            shown, values = extremes(*drawn, points=points)
             for number, (limb, joints) in enumerate(limbs.items()):
                 colours = dict(zip(joints, colors.of_series(len(joints), dim=dim), strict=True))
                 if own := [name for name in joints if name in signal.joints]:

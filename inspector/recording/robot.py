@@ -112,15 +112,17 @@ def log_robot(
     """Log the links of a robot; `side` tells one of two apart, colours may follow."""
     robot = Robot.load(name, floating_base=moves or None)
     known = [joint.name for joint in robot.joints if joint.nv == 1]
-    for joint in joint_names:
-        if joint not in known:
-            raise UnknownJointError(joint, robot.name, known)
+    if lacking := [joint for joint in joint_names if joint not in known]:
+        raise UnknownJointError(lacking[0], robot.name, known)
     mimics = robot.mjcf.mimics if robot.mjcf else urdf.mimics(robot.path, urdf.checked(robot.path))
     try:
         surfaces = triangles(robot, "auto", world=True)
     except GeometryError as error:
         raise InspectorError(f"{error}; `--robot none` shows the run without the robot") from error
-    carried = _carried(robot)
+    carried = [1 if robot.floating_base else 0]  # where the base floats, not the rest of the world
+    for index, joint in enumerate(robot.joints, start=1):
+        if joint.parent in carried and joint.kind != "floating":
+            carried.append(index)
     meshes = {index: surfaces[index] for index in carried if len(surfaces[index])}
     outermost = {}
     for index, mesh in meshes.items():
@@ -135,15 +137,6 @@ def log_robot(
         shape = rr.Asset3D(contents=_stl(mesh), media_type=rr.MediaType.STL, albedo_factor=color)
         recording.log(drawn.path(link), shape, rr.CoordinateFrame(drawn.frame(link)), static=True)
     return drawn
-
-
-def _carried(robot: Robot) -> list[int]:
-    """The joints that belong to a robot: where its base floats, the rest of the world does not."""
-    found = [1 if robot.floating_base else 0]
-    for index, joint in enumerate(robot.joints, start=1):
-        if joint.parent in found and joint.kind != "floating":
-            found.append(index)
-    return found
 
 
 def _stl(triangles: Array) -> bytes:
@@ -230,12 +223,8 @@ def fitted(parts: Iterable[Array], *, aspect: float = 1.0, room: float = 1.0) ->
     across, height = (least[0] + most[1]) / 2, (least[2] + most[3]) / 2
     middle = (least[4] + most[4]) / 2
     size = float((most - least)[-3:].max())
-    return Camera(
-        eye=np.array([across, height, nearest]) @ sighted,
-        target=np.array([across, height, middle]) @ sighted,
-        floor=floor,
-        spacing=float(10.0 ** np.floor(np.log10(size))) / 2,
-    )
+    eye, target = (np.array([across, height, depth]) @ sighted for depth in (nearest, middle))
+    return Camera(eye, target, floor, spacing=float(10.0 ** np.floor(np.log10(size))) / 2)
 
 
 def sight() -> Array:
@@ -261,9 +250,8 @@ def log_floor(recording: rr.RecordingStream, drawn: Drawn, camera: Camera, pose:
     while (high - low).max() > MOST_LINES * spacing:
         spacing *= 2.0
     low, high = np.floor(low / spacing) * spacing, np.ceil(high / spacing) * spacing
-    across, along = (
-        np.arange(low[i], high[i] + spacing / 2, spacing, dtype=np.float64) for i in (0, 1)
-    )
+    ends = zip(low.tolist(), high.tolist(), strict=True)
+    across, along = (np.arange(first, last + spacing / 2, spacing) for first, last in ends)
     lines = [[(x, low[1], camera.floor), (x, high[1], camera.floor)] for x in across.tolist()]
     lines += [[(low[0], y, camera.floor), (high[0], y, camera.floor)] for y in along.tolist()]
     path = f"/{drawn.origin}/floor"

@@ -107,9 +107,8 @@ def write(
             (_log_spectra(recording, analysis), panels.HEIGHT + TITLES),
             _log_strips(recording, analysis, drawn, beside),
         ]
-        whole = views.beside(
-            (views.above(*left, (details, DETAILS)), 36.0), (views.above(*over_time), 64.0)
-        )
+        left.append((details, DETAILS))
+        whole = views.beside((views.above(*left), 36.0), (views.above(*over_time), 64.0))
         failures = ((each.start, each.stop) for each in moments if each.label != LOUDEST)
         loop = next(failures, None)
         recording.send_blueprint(views.blueprint(whole, loop))  # instead of an older run's

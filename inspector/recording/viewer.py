@@ -189,9 +189,8 @@ def how_to_open(recording: Path) -> str:
     """How a recording is opened, in the viewer and in a browser."""
     path = shlex.quote(str(recording))
     rerun = shlex.quote(str(Path(sys.executable).with_name("rerun")))
-    return (
-        f"open it in the viewer:  {rerun} {path}\nor in a browser:        inspector view RUN --web"
-    )
+    browser = "or in a browser:        inspector view RUN --web"
+    return f"open it in the viewer:  {rerun} {path}\n{browser}"
 
 
 SERVE_TIMEOUT = 30.0  # time within which a server has to respond, in [s]
@@ -289,9 +288,8 @@ def free_port(wanted: int = 0, *, other: int = 0) -> int:
             probe.bind((HOST, wanted))
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise ViewerError(
-                f"port {wanted} cannot be had ({reason}); name another, or none to take a free one"
-            ) from error
+            advice = "name another, or none to take a free one"
+            raise ViewerError(f"port {wanted} cannot be had ({reason}); {advice}") from error
         found: int = probe.getsockname()[1]
     return free_port(other=other) if found == other and not wanted else found
 
@@ -309,10 +307,9 @@ def has_driver() -> bool:
 def require_driver() -> None:
     """Refuse a picture before long work is done for it."""
     if not has_driver():
-        raise ViewerError(
-            "a picture takes a Vulkan driver; `apt-get install libvulkan1 mesa-vulkan-drivers`"
-            " brings one (Fedora: mesa-vulkan-drivers)"
-        )
+        command = "`apt-get install libvulkan1 mesa-vulkan-drivers`"
+        brings = f"{command} brings one (Fedora: mesa-vulkan-drivers)"
+        raise ViewerError(f"a picture takes a Vulkan driver; {brings}")
 
 
 def shoot(recording: Path, output: Path, seconds: float, *, overwrite: bool = False) -> None:

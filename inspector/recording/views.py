@@ -251,10 +251,8 @@ def at(time: Array) -> rr.TimeColumn:
 def log_span(recording: rr.RecordingStream, begin: float, end: float) -> None:
     """Log that plots reach from one time to another, in [s], whatever they show."""
     if not max(abs(begin), abs(end)) < FARTHEST:
-        raise InspectorError(
-            f"times from {begin:g} s to {end:g} s: a recording holds times within {FARTHEST:g} s;"
-            " let the log begin at 0"
-        )
+        most = f"a recording holds times within {FARTHEST:g} s; let the log begin at 0"
+        raise InspectorError(f"times from {begin:g} s to {end:g} s: {most}")
     log_lines(recording, SPAN, np.array([begin, end]), np.full((2, 1), np.nan), {"": INK})
 
 
