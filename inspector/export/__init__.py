@@ -22,6 +22,7 @@ import heapq
 import io
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from itertools import repeat
@@ -107,15 +108,15 @@ def arrow_table(content: Content) -> Any:
     found: dict[str, Any] = {"time": time, "simplified": content.simplified}
     if content.extended is not None:
         found["extended"] = content.extended
-    spans: dict[str, Sequence[Block | Event]] = {"annotated": content.analysis.run.blocks}
+    blocks = content.analysis.run.blocks
+    spans: dict[str, Sequence[Block | Event]] = {"annotated": blocks} if blocks else {}
     spans |= {} if labels is None else {"finding": content.analysis.findings}
     for name, each in spans.items():
         words: list[str | None] = [None] * len(time)
         for span in each:
             first, last = np.searchsorted(time, (span.start, span.stop))
             words[first:last] = [span.label] * int(last - first)
-        if each or name == "finding":
-            found[name] = pa.array(words, pa.string())
+        found[name] = pa.array(words, pa.string())
     if labels is not None:
         middles = (labels.start + labels.stop) / 2
         steps = np.diff(middles) if len(middles) > 1 else labels.stop - labels.start
@@ -175,15 +176,16 @@ def write_mcap(content: Content, path: Path) -> None:
         from mcap.writer import Writer
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
-        raise InspectorError(
-            f"MCAP needs the extra `mcap` ({error}); pip install 'noise-inspector[mcap]'"
-        ) from error
+        advice = "pip install 'noise-inspector[mcap]'"
+        raise InspectorError(f"MCAP needs the extra `mcap` ({error}); {advice}") from error
     ros, zero = get_typestore(Stores.ROS2_HUMBLE), _start_stamp(content)
-    state, header, clock = (
-        ros.types[kind]
-        for kind in (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
-    )
-    joints, topics = _joint_states(content), _topics(content)
+    kinds = (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+    state, header, clock = (ros.types[kind] for kind in kinds)
+    run, topics = content.analysis.run, _topics(content)
+    desired = run.position_desired, run.velocity_desired, None
+    joints = {MEASURED: _states(content, run.joint_names, run.position, run.velocity, run.effort)}
+    if any(each is not None for each in desired):
+        joints[DESIRED] = _states(content, run.desired_joint_names, *desired)
 
     def stamp_of(sent: tuple[Row, str]) -> int:
         """Time in the file of a message with its topic, in [ns]."""
@@ -216,16 +218,6 @@ def write_mcap(content: Content, path: Path) -> None:
         writer.finish()
 
 
-def _joint_states(content: Content) -> dict[str, Iterator[Row]]:
-    """JointStates by topic."""
-    run = content.analysis.run
-    desired = run.position_desired, run.velocity_desired, None
-    topics = {MEASURED: _states(content, run.joint_names, run.position, run.velocity, run.effort)}
-    if any(each is not None for each in desired):
-        topics[DESIRED] = _states(content, run.desired_joint_names, *desired)
-    return topics
-
-
 def _states(content: Content, names: Sequence[str], *signals: Real | None) -> Iterator[Row]:
     """A JointState for each sample, of the positions, velocities and efforts that there are."""
     mask, none, joints = content.analysis.run.mask, np.zeros((len(content.time), 0)), list(names)
@@ -238,10 +230,9 @@ def _states(content: Content, names: Sequence[str], *signals: Real | None) -> It
 
 def _start_stamp(content: Content) -> int:
     """Time in the MCAP file of the run's time 0, in [ns]."""
-    try:
+    start = 0
+    with suppress(InvalidOperation, ValueError, OverflowError):
         start = int(Decimal(str(content.analysis.run.meta.get("start", 0))) * NANOSECONDS)
-    except (InvalidOperation, ValueError, OverflowError):
-        start = 0
     first = round(float(content.analysis.run.time[0]) * NANOSECONDS)
     return max(start if start < LATEST else 0, -first)
 
@@ -265,8 +256,7 @@ def _topics(content: Content) -> dict[str, tuple[dict[str, Any], Iterator[Row]]]
     if analysis.labels is not None:
         scores = dict.fromkeys(analysis.labels.classes, NUMBER)
         parts = {"failure": NUMBER, "scores": {"type": "object", "properties": scores}}
-        if analysis.alarm is not None:
-            parts["alarm"] = NUMBER
+        parts |= {} if analysis.alarm is None else {"alarm": NUMBER}
         topics["/labels"] = SPAN | parts, _frames(analysis.labels, analysis.alarm)
     if analysis.findings:
         topics["/findings"] = SPAN | {"score": NUMBER}, _spans(analysis.findings, "score")
@@ -356,30 +346,23 @@ def _checked(entries: Sequence[Entry], run: Run) -> tuple[Block, ...]:
         if not label or not label.isprintable():
             raise AnnotationError(f"{label!r} is empty or cannot be printed", where)
         if not earliest <= block.start < block.stop <= latest:
-            raise AnnotationError(
-                f"{label!r} from {block.start:g} s to {block.stop:g} s is empty, or lies outside of"
-                f" the run, {earliest:g} s to {latest:g} s",
-                where,
-            )
+            of_run = f"is empty, or lies outside of the run, {earliest:g} s to {latest:g} s"
+            lasts = f"{label!r} from {block.start:g} s to {block.stop:g} s"
+            raise AnnotationError(f"{lasts} {of_run}", where)
         if blocks and block.start < blocks[-1].stop - step:
-            raise AnnotationError(
-                f"blocks overlap: {label!r} starts at {block.start:g} s, before"
-                f" {blocks[-1].label!r} stops at {blocks[-1].stop:g} s",
-                where,
-            )
+            stops = f"{blocks[-1].label!r} stops at {blocks[-1].stop:g} s"
+            problem = f"blocks overlap: {label!r} starts at {block.start:g} s, before {stops}"
+            raise AnnotationError(problem, where)
         blocks.append(block)
     return tuple(sorted(blocks))
 
 
 def _time(text: str, where: str) -> float:
     """A finite time parsed from text, in [s]."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = inf
-    if not isfinite(value):
-        raise AnnotationError(f"{text!r} is not a time in seconds", where)
-    return value
+    with suppress(ValueError):
+        if isfinite(value := float(text)):
+            return value
+    raise AnnotationError(f"{text!r} is not a time in seconds", where)
 
 
 def _render_audacity(spans: Sequence[Span], _path: Path) -> str:
@@ -431,10 +414,8 @@ def _parse_csv(text: str) -> Iterator[Entry]:
 def _render_noisytest(spans: Sequence[Span], path: Path) -> str:
     for span in spans:
         if span.stop == END:
-            raise InspectorError(
-                f"{path}: label {span.label!r} stops at -1 s, the end of the recording in"
-                " NoisyTest; use another format"
-            )
+            means = "the end of the recording in NoisyTest; use another format"
+            raise InspectorError(f"{path}: label {span.label!r} stops at -1 s, {means}")
     # Both numbers of a range have a decimal point: NoisyTest's TOML reader takes no mixed ones.
     ranges = "".join(f"    [{float(each.start)!r}, {float(each.stop)!r}],\n" for each in spans)
     labels = "".join(f"    {json.dumps(each.label, ensure_ascii=False)},\n" for each in spans)

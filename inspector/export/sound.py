@@ -140,8 +140,7 @@ def output_paths(path: Path, count: int, *, overwrite: bool = False) -> tuple[Pa
 
 def worst_time(analysis: Analysis) -> float:
     """Time of the worst moment of a run, in [s]; 0 if the run has no valid samples."""
-    moments = worst(analysis)
-    return moments[0].peak if moments else 0.0
+    return next((moment.peak for moment in worst(analysis)), 0.0)
 
 
 def clip(run: nm.Run, *, around: float = 0.0) -> Sound | None:
@@ -170,10 +169,9 @@ def mix(signals: Iterable[Array], *, valid: Mask, rate: float, lowest: float) ->
     """
     if rate <= 2.5 * lowest:
         speed = int(np.ceil(8 * lowest / rate))  # two octaves of the log are audible
-        raise InspectorError(
-            f"a log of {rate:g} Hz has no content above {rate / 2:g} Hz, and frequencies below"
-            f" {lowest:g} Hz are inaudible; play it faster (`--speed {speed}`)"
-        )
+        content = f"a log of {rate:g} Hz has no content above {rate / 2:g} Hz"
+        unheard = f"frequencies below {lowest:g} Hz are inaudible"
+        raise InspectorError(f"{content}, and {unheard}; play it faster (`--speed {speed}`)")
     hop = max(4, round(WINDOW * rate / 2))
     length, samples = 2 * hop, len(valid)
     count = -(-samples // hop) + 1
