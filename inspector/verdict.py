@@ -22,7 +22,7 @@ from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
 from types import NoneType
-from typing import IO, Any, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 import noiseclassifier as nc
 import noisemodel as nm
@@ -535,6 +535,15 @@ def resumed(
     """
     if path.exists() and not path.is_file():
         raise refused("is no regular file")
+
+    def append(content: Mapping[str, Any]) -> None:
+        try:
+            file.write(json.dumps(content).encode() + b"\n")
+            file.flush()
+            os.fsync(file.fileno())
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
     try:
         file = path.open("a+b")
     except OSError as error:
@@ -543,14 +552,12 @@ def resumed(
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise InspectorError(
-                f"{path}: is being written by another process; wait for it, or name another file"
-            ) from error
+            busy = "is being written by another process; wait for it, or name another file"
+            raise InspectorError(f"{path}: {busy}") from error
         if os.fstat(file.fileno()).st_size > MAX_BYTES:
             raise refused(f"is larger than {MAX_BYTES} bytes")
         file.seek(0)
         whole, end, torn = (b"" if afresh else file.read()).rpartition(b"\n")
-        append = partial(_append, path, file)
         first, *rows = whole.split(b"\n") if end else [torn]
         # A line without its end was being written when the process was killed.
         begun = not end and json.dumps(header).encode().startswith(torn)
@@ -590,12 +597,3 @@ def digest(path: Path) -> str:
         return hashlib.sha256(os.fsencode("\n".join(lines))).hexdigest()
     except OSError:
         return ""
-
-
-def _append(path: Path, file: IO[bytes], content: Mapping[str, Any]) -> None:
-    try:
-        file.write(json.dumps(content).encode() + b"\n")
-        file.flush()
-        os.fsync(file.fileno())
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
