@@ -36,6 +36,27 @@ def call(*arguments):
     return status, out.getvalue(), err.getvalue()
 
 
+def printed(*arguments, status=0):
+    """What the command line prints where it complains of nothing and ends so."""
+    found, out, err = call(*arguments)
+    assert (found, err) == (status, ""), out
+    return out
+
+
+def complaint(*arguments, status=3):
+    """What the command line complains of; it ends so."""
+    found, out, err = call(*arguments)
+    assert found == status, out + err
+    return err
+
+
+def refused(*arguments, status=3):
+    """The one line with which the command line refuses."""
+    found, out, err = call(*arguments)
+    assert (found, out, err.count("\n")) == (status, "", 1), err
+    return err
+
+
 def ran(*command, **options):
     """Run a program in a process of its own; its status, output and complaints, as text."""
     words = list(map(str, command))

@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import call, complaint, printed
 
 from inspector.library import demo_run
 
@@ -20,8 +20,7 @@ def episode(tmp_path):
 
 
 def test_the_audit_of_a_30_hz_episode_in_degrees_gives_its_limits(episode):
-    status, out, err = call("audit", episode)
-    assert (status, err) == (4, "")
+    out = printed("audit", episode, status=4)
     assert "30 Hz" in out
     assert "positions look like degrees (joint_2" in out
     assert "measured position of all joints is the desired one, 1 sample later" in out
@@ -30,9 +29,7 @@ def test_the_audit_of_a_30_hz_episode_in_degrees_gives_its_limits(episode):
 
 
 def test_audits_as_json(episode):
-    status, out, _ = call("audit", demo_run(), episode, "--format", "json")
-    assert status == 4
-    found = json.loads(out)
+    found = json.loads(printed("audit", demo_run(), episode, "--format", "json", status=4))
     assert found["format"] == "noise-audit/2"
     demo, slow = found["runs"]
     assert demo["warnings"] == []
@@ -59,15 +56,13 @@ def test_one_bad_file_does_not_stop_the_rest(tmp_path):
 def test_a_row_that_cannot_be_read_is_named_with_its_file_once(tmp_path, command):
     path = tmp_path / "log.csv"
     path.write_text("time,q1,dq1\n0,0,0\n0.01,0,none of it\n")
-    status, _, err = call(command, path)
-    assert status == 3
+    err = complaint(command, path)
     assert f"{path}: row 3: column 'dq1'" in err
     assert err.count(str(path)) == 1
 
 
 def test_view_prints_a_summary_of_the_audit(episode, tmp_path):
-    status, out, _ = call("view", episode, "-o", tmp_path / "run.rrd")
-    assert status == 0
+    out = printed("view", episode, "-o", tmp_path / "run.rrd")
     assert out.count("logged at 30 Hz") == 2  # in the headline, and why there are no labels
     assert "cannot be observed" not in out
     assert "Warnings: positions look like degrees" in out

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 import workers
-from commandline import call
+from commandline import call, complaint, printed
 from wholeverdict import WHOLE
 
 from inspector import verdict
@@ -59,8 +59,7 @@ def test_a_killed_batch_resumes_without_loss_or_repetition(runs, tmp_path, jobs)
     assert 0 < len(before) <= COUNT
     with state.open("ab") as file:
         file.write(b'{"run": "half a li')
-    status, out, err = call("classify", runs, "--resume", state, "-j", jobs)
-    assert status == 1, err
+    out = printed("classify", runs, "--resume", state, "-j", jobs, status=1)
     after = rows(state)
     assert after[: len(before)] == before
     assert sorted(row["run"] for row in after) == sorted(map(str, runs.glob("*.npz")))
@@ -97,9 +96,7 @@ def test_only_what_changed_is_done_again(runs, tmp_path):
     assert again == first
     assert len(rows(state)) == COUNT
     (runs / "03.npz").write_text("broken")
-    status, _, err = call("classify", runs, "--format", "json", "--resume", state)
-    assert status == 3
-    assert "03.npz" in err
+    assert "03.npz" in complaint("classify", runs, "--format", "json", "--resume", state)
     assert len(rows(state)) == COUNT + 1
     assert rows(state)[-1]["status"] == "bad-input"
 
@@ -228,11 +225,11 @@ def test_a_file_that_logs_are_read_with_is_one_of_the_settings(tmp_path, beside)
     path, other = tmp_path / "state", tmp_path / "other"
     desired = other if beside == "desired" else None
     options = ReadOptions(robot=str(other)) if beside == "robot" else ReadOptions()
-    for content, refused in ((b"one", False), (b"one", False), (b"other", True)):
+    for content, changed in ((b"one", False), (b"one", False), (b"other", True)):
         other.write_bytes(content)
         reading = Reading(options, desired)
         done = classify_files([], LIBRARY, resume=path, reading=reading)
-        if refused:
+        if changed:
             with pytest.raises(StateError, match="its reading of logs differs"):
                 list(done)
         else:

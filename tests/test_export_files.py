@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pyarrow.parquet
 import pytest
-from commandline import call
+from commandline import call, printed, refused
 from mcap.reader import make_reader
 
 from inspector.analysis import estimate
@@ -159,10 +159,7 @@ def test_mcap_has_a_summary_schemas_and_all_messages(exported, demo):
 @pytest.mark.slow
 def test_an_exported_run_is_imported_again_to_the_bit(exported, demo, tmp_path):
     folder, _ = exported
-    status, out, err = call(
-        "import", folder / "demo.mcap", "-o", tmp_path / "back.npz", "--robot", "panda"
-    )
-    assert (status, err) == (0, "")
+    out = printed("import", folder / "demo.mcap", "-o", tmp_path / "back.npz", "--robot", "panda")
     assert "damaged" not in out
     back = Run.load(tmp_path / "back.npz")
     assert back.joint_names == demo.joint_names
@@ -235,11 +232,9 @@ def test_what_cannot_be_exported_is_an_error_of_one_line(tmp_path):
 def test_a_missing_extra_is_an_error_and_other_formats_are_written(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     plain_run().save(tmp_path / "run.npz")
-    status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.mcap")
-    assert status == 3
+    err = refused("export", tmp_path / "run.npz", "-o", tmp_path / "run.mcap")
     assert "pip install 'noise-inspector[mcap]'" in err
     assert [path.name for path in tmp_path.iterdir()] == ["run.npz"]
-    status, out, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.parquet")
-    assert (status, err) == (0, "")
+    out = printed("export", tmp_path / "run.npz", "-o", tmp_path / "run.parquet")
     assert "No extended noise: that takes a robot and positions." in out
     assert "run.parquet: 2000 samples of noise, 17 frames" in out

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import call, printed, refused
 
 from inspector import training
 from noiseclassifier.recording import group_of
@@ -43,8 +43,7 @@ def folder(tmp_path_factory):
 
 def test_the_measures_of_a_model_are_printed(folder):
     command = "evaluate", folder / "model.npz", folder / "test"
-    status, out, err = call(*command)
-    assert (status, err) == (0, "")
+    out = printed(*command)
     assert "6 runs in 6 groups" in out
     assert "Faults found, of all injected         100.0%" in out
     assert "False alarms per hour of ok time      0 [0, " in out
@@ -65,14 +64,12 @@ def test_a_piece_of_a_run_has_no_fault_that_comes_after_it(folder, tmp_path):
 
 def test_runs_that_it_was_trained_on_are_refused_in_one_line(folder):
     calls = folder / "model.npz", folder / "test", folder / "known1.npz"
-    status, out, err = call("evaluate", *calls)
-    assert (status, out, err.count("\n")) == (3, "", 1)
+    err = refused("evaluate", *calls)
     assert "known1: the model was trained on the same recording as 'known1'" in err
     assert "(--seen-too)" in err
-    status, out, _ = call("evaluate", *calls, "--seen-too")
-    assert status == 0
+    out = printed("evaluate", *calls, "--seen-too")
     assert "NOT A TEST: 1 of these runs were trained on" in out
-    status, out, _ = call("evaluate", *calls, "--seen-too", "--json")
+    out = printed("evaluate", *calls, "--seen-too", "--json")
     assert list(json.loads(out)["seen"]) == ["known1"]
 
 
@@ -97,17 +94,14 @@ def test_runs_of_several_domains_have_a_row_each_with_all_their_injected_faults(
     simulated(tmp_path / "a.npz", 20, robot="panda", domain={"name": "soft"}, **known)
     simulated(tmp_path / "b.npz", 21, robot="ur5", simulator="drake", **known)
     simulated(tmp_path / "c.npz", 22, robot="ur5", source="field")
-    status, out, err = call("evaluate", folder / "model.npz", tmp_path, "--json")
-    assert (status, err) == (0, "")
-    found = json.loads(out)["protocol"]
+    found = json.loads(printed("evaluate", folder / "model.npz", tmp_path, "--json"))["protocol"]
     assert list(found["by_domain"]) == ["drake", "field", "soft"]
     assert list(found["by_robot"]) == ["panda", "ur5"]
     assert (found["counts"]["faults"], found["counts"]["felt"]) == (5, 3)
     assert found["robots_alike"]["recall_felt"]["value"] == 1.0
     assert found["robots_alike"]["recall_injected"]["value"] == pytest.approx((1 / 2 + 2 / 3) / 2)
     assert found["pooled"]["onset_within"]["value"] == 1.0
-    status, out, _ = call("evaluate", folder / "model.npz", tmp_path, "--by", "domain")
-    assert status == 0
+    out = printed("evaluate", folder / "model.npz", tmp_path, "--by", "domain")
     assert "of 2 robots (panda, ur5) in 3 domains (drake, field, soft)" in out
     assert "By domain" in out
     assert "By robot" not in out
@@ -148,13 +142,10 @@ def test_the_first_motion_after_standing_is_no_false_alarm_of_a_file(tmp_path):
 def test_runs_below_the_rate_of_the_model_are_listed_as_not_answered(folder, tmp_path):
     slow = simulated(tmp_path / "slow.npz", 40, robot="a1", rate=200)
     both = "evaluate", folder / "model.npz", folder / "test", slow
-    status, out, err = call(*both)
-    assert (status, err) == (0, "")
-    assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of 1 robot (a1)" in out
+    assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of 1 robot (a1)" in printed(*both)
     (listed,) = json.loads(call(*both, "--json")[1])["protocol"]["unanswered"]
     assert (listed["run"], listed["robot"]) == ("slow", "a1")
-    status, _, err = call("evaluate", folder / "model.npz", slow)
-    assert (status, err.count("\n")) == (3, 1)
+    err = refused("evaluate", folder / "model.npz", slow)
     assert "none of 1 recordings has a verdict; slow: rate 200 Hz < 1000 Hz" in err
 
 
@@ -184,9 +175,7 @@ def test_a_run_with_injected_faults_needs_no_blocks(folder, tmp_path):
 
 def test_damaged_events_and_unknown_models_are_refused_in_one_line(folder, tmp_path):
     path = simulated(tmp_path / "odd.npz", 70, events=[{"label": "impact"}])
-    status, _, err = call("evaluate", folder / "model.npz", path)
-    assert (status, err.count("\n")) == (3, 1)
+    err = refused("evaluate", folder / "model.npz", path)
     assert "odd.npz: an event of its meta lacks label, start or stop as numbers in s" in err
-    status, _, err = call("evaluate", "General", tmp_path)
-    assert (status, err.count("\n")) == (3, 1)
+    err = refused("evaluate", "General", tmp_path)
     assert "General: no such model; name a file, or one that ships: general" in err

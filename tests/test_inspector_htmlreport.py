@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import refused
 
 from inspector.analysis import analyse_file
 from inspector.library import demo_run, load_library, model_files
@@ -142,5 +142,4 @@ def test_findings_are_listed_with_their_scores(tmp_path):
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("inspector.report.picture.find_spec", lambda _: None)
-    status, _, err = call("view", "-o", tmp_path / "out.html")
-    assert (status, 'pip install "noise-inspector[report]"' in err) == (3, True)
+    assert 'pip install "noise-inspector[report]"' in refused("view", "-o", tmp_path / "out.html")

@@ -7,7 +7,7 @@ from typing import get_args
 
 import pytest
 import typer
-from commandline import call
+from commandline import call, printed, refused
 from typer.testing import CliRunner
 
 import inspector
@@ -60,8 +60,7 @@ def help_of(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
 
     def lines(*path):
-        status, out, err = call(*path, "--help")
-        assert (status, err) == (0, "")
+        out = printed(*path, "--help")
         return [line.strip() for line in out.splitlines()]
 
     return lines
@@ -73,8 +72,7 @@ def test_the_help_has_a_line_for_each_command_and_imports_none(option):
     assert len(alone.splitlines()) == 10
     assert "inspector classify log.csv" in alone
     before = set(sys.modules)
-    status, out, err = call(option)
-    assert (status, err) == (0, "")
+    out = printed(option)
     assert not {name for name in set(sys.modules) - before if name.startswith("inspector")}
     for own in cli.PANELS.values():
         for name, summary in own.items():
@@ -91,8 +89,7 @@ def test_there_are_at_most_twenty_commands_and_two_hundred_options_shown():
 
 @pytest.mark.parametrize("name", cli.RENAMED)
 def test_an_old_name_answers_with_the_new_one(name):
-    status, out, err = call(name, "run.npz", "--any", "thing")
-    assert (status, out, err.count("\n")) == (2, "", 1)
+    err = refused(name, "run.npz", "--any", "thing", status=2)
     assert err.startswith(f"inspector: `inspector {name}` is now `inspector ")
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import call, printed
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -175,13 +175,11 @@ def test_nothing_is_overwritten_or_written_in_part(tmp_path):
 
 def test_annotated_blocks_are_written_and_read_by_the_command(tmp_path):
     labels = tmp_path / "labels.txt"
-    status, out, err = call("export", demo_run(), "--labels", "annotated", "-o", labels)
-    assert (status, err) == (0, "")
+    out = printed("export", demo_run(), "--labels", "annotated", "-o", labels)
     assert "labels.txt: 4 labels" in out
     demo, bare = Run.load(demo_run()), tmp_path / "bare.npz"
     Run(time=demo.time, velocity=demo.velocity, joint_names=demo.joint_names).save(bare)
-    status, _, err = call("export", bare, "--annotate", labels, "-o", tmp_path / "n.npz")
-    assert (status, err) == (0, "")
+    printed("export", bare, "--annotate", labels, "-o", tmp_path / "n.npz")
     assert Run.load(tmp_path / "n.npz").blocks == demo.blocks
 
 

@@ -1,6 +1,7 @@
 import mujoco
 import numpy as np
 import pytest
+from checks import holds
 from samplelogs import JOINTS, numbers
 
 from inspector import read_log
@@ -21,8 +22,7 @@ def test_a_run_file_is_loaded_unchanged(tmp_path):
     run = Run(time=TIME, velocity=VELOCITY, joint_names=JOINTS, blocks=blocks, meta={"seed": 3})
     run.save(tmp_path / "run.npz")
     imported = read_log(tmp_path / "run.npz")
-    assert imported.run.blocks == blocks
-    assert imported.run.meta == {"seed": 3}
+    assert (imported.run.blocks, imported.run.meta) == (blocks, {"seed": 3})
     assert imported.remarks == ("a run file, unchanged",)
 
 
@@ -30,8 +30,7 @@ def test_a_run_file_whose_time_is_not_uniform_is_resampled(tmp_path):
     time = TIME + np.random.default_rng(0).uniform(-0.002, 0.002, 400)
     path = save(tmp_path, time=time, velocity=np.sin(time)[:, None], joint_names=["a"])
     run = read_log(path).run
-    assert run.rate == 100.0
-    assert run.joint_names == ("a",)
+    holds(run, rate=100.0, joint_names=("a",))
     since = run.time + float(run.meta["start"])
     assert np.allclose(run.velocity[:, 0], np.sin(since), atol=1e-4)
 
@@ -69,8 +68,7 @@ def test_mujocos_state_becomes_a_base_in_body_axes_and_joints(tmp_path):
     assert np.allclose(run.base_velocity, local, atol=1e-9)
     assert np.array_equal(run.base_pose[:, :3], np.array(qpos)[:, :3])
     assert np.array_equal(run.base_pose[:, 3:], np.array(qpos)[:, [4, 5, 6, 3]])
-    assert np.array_equal(run.position, np.array(qpos)[:, 7:])
-    assert np.array_equal(run.velocity, np.array(qvel)[:, 6:])
+    holds(run, position=np.array(qpos)[:, 7:], velocity=np.array(qvel)[:, 6:])
 
 
 def test_isaacs_arrays_are_recognised_and_its_root_is_mapped(tmp_path):

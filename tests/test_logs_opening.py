@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from commandline import TAKING_RUNS, call
+from commandline import TAKING_RUNS, call, complaint
 from csvlogs import TIME, log, swing, write
 
 import inspector
@@ -196,8 +196,8 @@ def test_every_command_that_takes_a_run_takes_a_log(tmp_path, monkeypatch, comma
 
 def test_names_and_folders_that_are_too_long_are_one_line(tmp_path, monkeypatch):
     for command in (["classify"], ["audit"], ["import", "-o", "run.npz"]):
-        status, _, err = call(command[0], tmp_path / ("a" * 300), *command[1:])
-        assert (status, err.count("\n")) == (3, 1)
+        err = complaint(command[0], tmp_path / ("a" * 300), *command[1:])
+        assert err.count("\n") == 1
         assert "cannot be read (File name too long)" in err
     top = tempfile.mkdtemp()  # not in pytest's folder, which it cannot remove so deep
     try:

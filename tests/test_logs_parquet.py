@@ -2,6 +2,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from checks import holds
 from samplelogs import JOINTS, TIMES, cut, motion, numbers, write_lerobot
 
 from inspector import read_log, read_logs
@@ -23,9 +24,7 @@ def wide(tmp_path, **columns):
 def test_columns_are_read_bit_for_bit(tmp_path, stamps):
     columns = {f"{joint}.velocity": VELOCITY[:, n] for n, joint in enumerate(JOINTS)}
     imported = read_log(wide(tmp_path, time=stamps, note=["fine"] * 400, **columns))
-    assert imported.run.joint_names == JOINTS
-    assert np.array_equal(imported.run.velocity, VELOCITY)
-    assert imported.run.rate == 100.0
+    holds(imported.run, joint_names=JOINTS, velocity=VELOCITY, rate=100.0)
     assert "log.parquet: 1 column not read: note" in imported.remarks
 
 
@@ -39,9 +38,7 @@ def test_units_in_the_names_of_columns_are_converted(tmp_path):
 def test_columns_of_lists_are_arrays_of_joints(tmp_path):
     path = wide(tmp_path, time=TIMES, joint_pos=list(POSITION), qd_logged=list(VELOCITY))
     run = read_log(path, mapping=["velocity=qd_logged"], joints=JOINTS).run
-    assert run.joint_names == JOINTS
-    assert np.array_equal(run.position, POSITION)
-    assert np.array_equal(run.velocity, VELOCITY)
+    holds(run, joint_names=JOINTS, position=POSITION, velocity=VELOCITY)
 
 
 def test_what_does_not_fit_is_an_error_of_one_line(tmp_path):
@@ -73,10 +70,9 @@ def test_a_lerobot_data_set_is_a_run_per_episode(tmp_path, v3):
     runs = {imported.name: imported.run for imported in read_logs(folder)}
     assert list(runs) == ["set-0", "set-1", "set-2"]
     for run, state in zip(runs.values(), states, strict=True):
-        assert run.joint_names == JOINTS
-        assert np.array_equal(run.position, state.astype(np.float32))
-        assert np.array_equal(run.position_desired, np.roll(state, -1, axis=0).astype(np.float32))
-        assert run.rate == 30.0
+        state = state.astype(np.float32)
+        holds(run, position=state, position_desired=np.roll(state, -1, axis=0))
+        holds(run, joint_names=JOINTS, rate=30.0)
         assert set(run.meta["differentiated"]) == {"velocity", "velocity_desired"}
         assert run.meta["robot_type"] == "so101"
     assert not any("timestamp" in remark for remark in next(read_logs(folder)).remarks)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import printed
 from rerun.chunk import RrdReader
 
 import inspector
@@ -20,40 +20,33 @@ pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data/
 def test_a_real_robots_log_is_imported_audited_viewed_and_classified(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     logs = [DATA / "measured.csv", "--desired", DATA / "desired.csv"]
-    status, out, err = call("import", *logs, "--robot", "panda", "-o", "run.npz")
-    assert status == 0, err
+    out = printed("import", *logs, "--robot", "panda", "-o", "run.npz")
     assert "resampled to 1000 Hz" in out
     assert "4 gaps" in out
     run = Run.load(tmp_path / "run.npz")
     assert (run.rate, len(run.joint_names), run.robot) == (1000.0, 7, "panda")
     assert run.duration == pytest.approx(21.0, abs=0.01)
 
-    status, out, _ = call("audit", "run.npz")
-    assert status == 0
+    out = printed("audit", "run.npz")
     assert "stamps were off by 0.165 ms rms" in out
     assert "missing: 4 gaps" in out
     assert "impact: observable" in out
     assert "oscillations: partly, 20 to 440 Hz" in out
     assert "warning" not in out
 
-    status, _, err = call("view", "run.npz", "-o", "run.rrd")
-    assert status == 0, err
+    printed("view", "run.npz", "-o", "run.rrd")
     found = set(RrdReader(tmp_path / "run.rrd").store().schema().entity_paths())
     assert {"/class/found/ok", "/noise/simplified", "/robot/motion"} <= found
     assert {"/joints/velocity_desired/0", "/joints/effort/0", "/spectrogram/bands/00"} <= found
 
-    status, out, _ = call("classify", "run.npz", "--format", "json")
-    assert status == 0, out
-    (verdict,) = json.loads(out)["runs"]
+    (verdict,) = json.loads(printed("classify", "run.npz", "--format", "json"))["runs"]
     assert (verdict["status"], verdict["model"]) == ("ok", "general")
 
 
 def test_legs_in_the_air_are_ok_though_their_desired_positions_come_in_coarse_steps(tmp_path):
     log = DATA.parent / "go2" / "positions.csv"
-    status, _, err = call("import", log, "--robot", "go2", "-o", tmp_path / "run.npz")
-    assert status == 0, err
-    status, out, _ = call("classify", tmp_path / "run.npz")
-    assert status == 0, out
+    printed("import", log, "--robot", "go2", "-o", tmp_path / "run.npz")
+    out = printed("classify", tmp_path / "run.npz")
     assert "differentiated from positions in steps of 0.026 rad" in out
     assert "it was left out." in out
 

@@ -2,6 +2,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from checks import holds
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, numbers, write_bag, write_mcap
 
@@ -35,11 +36,8 @@ def test_every_value_of_a_bag_is_read_bit_for_bit(tmp_path, talk, how):
     path = bag(tmp_path, {"/joint_states": states(talk)}, talk=talk, **how)
     for each in (path, *path.glob("*.mcap*"), *path.glob("*.db3*")):  # a single file is enough
         run = read_log(each).run
-        assert run.joint_names == JOINTS
-        assert np.array_equal(run.position, POSITION)
-        assert np.array_equal(run.velocity, VELOCITY)
-        assert np.array_equal(run.effort, EFFORT)
-        assert run.rate == 100.0
+        holds(run, joint_names=JOINTS, rate=100.0)
+        holds(run, position=POSITION, velocity=VELOCITY, effort=EFFORT)
         assert run.meta["start"] == "1700000000"
         assert run.meta["topics"] == ["/joint_states"]
 
@@ -110,18 +108,14 @@ def test_of_two_robots_one_is_chosen_by_its_topic(tmp_path):
 def test_joint_states_that_are_commands_are_desired_motion(tmp_path):
     commands = joint_states(TALK, position=VELOCITY, velocity=POSITION)
     run = read_log(bag(tmp_path, {"/joint_states": states(), "/joint_commands": commands})).run
-    assert np.array_equal(run.position, POSITION)
-    assert np.array_equal(run.velocity_desired, POSITION)
-    assert np.array_equal(run.position_desired, VELOCITY)
+    holds(run, position=POSITION, velocity_desired=POSITION, position_desired=VELOCITY)
 
 
 def test_the_signal_of_a_topic_can_be_mapped(tmp_path):
     targets = joint_states(TALK, position=VELOCITY, velocity=POSITION)
     path = bag(tmp_path, {"/joint_states": states(), "/mpc": targets})
     mapping = ["position_desired=/mpc/position", "velocity_desired=/mpc/velocity"]
-    run = read_log(path, mapping=mapping).run
-    assert np.array_equal(run.position_desired, VELOCITY)
-    assert np.array_equal(run.position, POSITION)
+    holds(read_log(path, mapping=mapping).run, position_desired=VELOCITY, position=POSITION)
 
 
 MEASURED, WANTED = ("feedback", "actual"), ("reference", "desired")
@@ -159,11 +153,8 @@ def test_every_version_of_a_controllers_state_has_measured_and_desired_motion(
 ):
     talk = Talk(ros1=ros1)
     run = read_log(bag(tmp_path, {"/arm/state": controller_states(talk, version)}, talk=talk)).run
-    assert np.array_equal(run.position, POSITION)
-    assert np.array_equal(run.velocity, VELOCITY)
-    assert np.array_equal(run.effort, EFFORT)
-    assert np.array_equal(run.position_desired, VELOCITY)
-    assert np.array_equal(run.velocity_desired, POSITION)
+    holds(run, position=POSITION, velocity=VELOCITY, effort=EFFORT)
+    holds(run, position_desired=VELOCITY, velocity_desired=POSITION)
 
 
 @pytest.mark.parametrize(
@@ -209,9 +200,7 @@ def test_a_side_topic_that_is_late_early_or_interrupted_cuts_no_motion_away(tmp_
         "/joint_commands": joint_states(TALK, TIMES[part], velocity=VELOCITY[part]),
     }
     run = read_log(bag(tmp_path, {"/joint_states": states()} | sides)).run
-    assert run.velocity_desired is None
-    assert run.joint_names == JOINTS
-    assert np.array_equal(run.velocity, VELOCITY)
+    holds(run, velocity_desired=None, joint_names=JOINTS, velocity=VELOCITY)
     assert run.mask.all()
     named = ("position of finger", "velocity desired of shoulder, elbow, wrist")
     why = f"left out, there for {share}% of the time"

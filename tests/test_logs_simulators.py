@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from checks import holds
 from csvlogs import write
 from samplelogs import EPOCH, Talk, joint_states, motion, write_bag
 
@@ -81,12 +82,9 @@ def test_isaac_labs_episodes_are_runs_with_their_targets(tmp_path):
     runs = list(read_logs(path))
     assert [each.name for each in runs] == ["dataset-demo_0", "dataset-demo_1"]
     run, remarks = said(path, episode="demo_0")
-    assert run.rate == 50.0
-    assert np.array_equal(run.position, np.float32(position))
-    assert np.array_equal(run.velocity, np.float32(velocity))
-    assert run.desired_joint_names == tuple(f"joint_{number}" for number in range(7))
+    holds(run, rate=50.0, position=np.float32(position), velocity=np.float32(velocity))
+    holds(run, desired_joint_names=tuple(f"joint_{n}" for n in range(7)), base_pose=None)
     assert np.allclose(run.position_desired, target[:, :7], atol=1e-6)
-    assert run.base_pose is None
     home = "states/articulation/robot"
     assert remarks[:2] == [
         f"there are no stamps: 50 Hz, {FITS}",
@@ -117,9 +115,7 @@ def robomimic(path):
 def test_robomimics_actions_are_not_taken_for_joint_targets(tmp_path):
     path, position = robomimic(tmp_path / "low_dim.hdf5")
     run, remarks = said(path)
-    assert np.array_equal(run.position, position)
-    assert run.rate == 20.0
-    assert run.position_desired is None
+    holds(run, position=position, rate=20.0, position_desired=None)
     assert remarks[:3] == [
         f"there are no stamps: 20 Hz, {FITS}",
         "taken: position = obs/robot0_joint_pos, velocity = obs/robot0_joint_vel",
@@ -195,9 +191,8 @@ def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_tables(tmp_path):
         taken += " (position follows it)"
         assert remarks.count(taken) == 1
     mapping = ["effort.joint_0=ctrl_0", "effort.joint_1=ctrl_1"]
-    run = read_log(path, mapping=mapping).run  # columns that are mapped are no array
-    assert run.velocity_desired is None
-    assert np.array_equal(run.effort, log["ctrl"])
+    mapped = read_log(path, mapping=mapping).run  # columns that are mapped are no array
+    holds(mapped, velocity_desired=None, effort=log["ctrl"])
 
 
 def test_wheels_that_turn_to_and_fro_are_in_the_unit_that_their_format_defines(tmp_path):
@@ -216,11 +211,9 @@ def test_wheels_that_turn_to_and_fro_are_in_the_unit_that_their_format_defines(t
 def test_a_single_joint_and_velocities_alone_are_read(tmp_path):
     time, position, velocity = moved(500, 1)
     path = savez(tmp_path / "one.npz", time=time, qpos=position[:, 0], qvel=velocity[:, 0])
-    run = read_log(path).run
-    assert np.array_equal(run.position, position)
-    assert np.array_equal(run.velocity, velocity)
-    run = read_log(savez(tmp_path / "speed.npz", time=time, qvel=velocity)).run
-    assert np.array_equal(run.velocity, velocity)
+    holds(read_log(path).run, position=position, velocity=velocity)
+    alone = savez(tmp_path / "speed.npz", time=time, qvel=velocity)
+    holds(read_log(alone).run, velocity=velocity)
 
 
 def test_torques_are_not_taken_for_targets(tmp_path):
@@ -258,12 +251,8 @@ def test_pybullets_joint_states_are_read_by_the_names_of_its_documentation(tmp_p
     effort = np.cos(position)
     arrays = {"jointPosition": position, "jointVelocity": velocity, "targetPositions": position}
     path = savez(tmp_path / "apart.npz", appliedJointMotorTorque=effort, **arrays)
-    run = read_log(path).run
-    assert run.rate == 240.0
-    assert np.array_equal(run.position, position)
-    assert np.array_equal(run.velocity, velocity)
-    assert np.array_equal(run.effort, effort)
-    assert np.array_equal(run.position_desired, position)
+    signals = {"position": position, "velocity": velocity, "position_desired": position}
+    holds(read_log(path).run, rate=240.0, effort=effort, **signals)
     stacked = savez(tmp_path / "stacked.npz", joint_states=np.dstack((position, velocity)))
     with pytest.raises(LogError, match=r"it has joint_states \(400, 7, 2\)"):
         read_log(stacked)
@@ -292,9 +281,7 @@ def test_minaris_episodes_have_one_state_more_than_actions(tmp_path):
         f"main_data-episode_{number}" for number in (0, 2, 10)
     ]
     run, remarks = said(path, episode="episode_10")
-    assert run.rate == 25.0
-    assert np.array_equal(run.position, position[:-1])
-    assert np.array_equal(run.position_desired, position[:-1])
+    holds(run, rate=25.0, position=position[:-1], position_desired=position[:-1])
     assert "position_desired = actions (position follows it)" in remarks[1]
 
 
@@ -351,9 +338,7 @@ def test_alohas_actions_are_targets(tmp_path):
     }
     arrays["action"][-1] = position[-1]
     run, remarks = said(hdf5(tmp_path / "episode_3.hdf5", arrays, _root={"sim": True}))
-    assert run.rate == 50.0
-    assert np.array_equal(run.position_desired, arrays["action"])
-    assert np.array_equal(run.effort, np.sin(position))
+    holds(run, rate=50.0, position_desired=arrays["action"], effort=np.sin(position))
     assert "position_desired = action (position follows it)" in remarks[1]
 
 
@@ -365,9 +350,8 @@ def test_maniskills_trajectories_are_runs(tmp_path):
         "traj_0/actions": np.sin(np.arange(STEPS * 8)).reshape(STEPS, 8),
         "traj_0/env_states/articulations/panda": np.zeros((STEPS + 1, 31)),
     }
-    run = read_log(hdf5(tmp_path / "trajectory.h5", arrays)).run
-    assert run.rate == 20.0
-    assert np.array_equal(run.velocity, velocity[:-1])
+    path = hdf5(tmp_path / "trajectory.h5", arrays)
+    holds(read_log(path).run, rate=20.0, velocity=velocity[:-1])
 
 
 def test_observations_without_names_are_an_error_with_the_line_to_type(tmp_path):
@@ -400,9 +384,7 @@ def test_a_single_array_is_read_by_mapping(tmp_path):
     _, position, velocity = moved(100)
     np.save(tmp_path / "log.npy", np.hstack((position, velocity)))
     mapping = ["position=array[0:7]", "velocity=array[7:14]"]
-    run = read_log(tmp_path / "log.npy", mapping=mapping).run
-    assert run.rate == 100.0
-    assert np.array_equal(run.position, position)
+    holds(read_log(tmp_path / "log.npy", mapping=mapping).run, rate=100.0, position=position)
 
 
 def test_lerobots_velocities_and_efforts_are_read_where_a_set_has_them(tmp_path):
@@ -422,9 +404,8 @@ def test_lerobots_velocities_and_efforts_are_read_where_a_set_has_them(tmp_path)
         "taken: position = observation.state, velocity = observation.velocity,"
         " effort = observation.effort, position_desired = action"
     )
-    signals = (run.velocity, run.effort, run.position_desired)
-    wanted = (velocity, np.sin(position), position)
-    assert all(map(np.array_equal, signals, map(np.float32, wanted)))
+    wanted = {"velocity": velocity, "effort": np.sin(position), "position_desired": position}
+    holds(run, **{name: np.float32(each) for name, each in wanted.items()})
 
 
 def test_any_file_is_read_by_mapping(tmp_path):

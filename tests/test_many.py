@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import call, complaint
 from recordings import entities, read
 
 from inspector.compare.many import Several, lay, report, write
@@ -133,12 +133,9 @@ def test_runs_that_cannot_be_read_are_named_and_the_others_are_shown(tmp_path):
     assert f"{good[0]}: " in out
     assert "→" not in out
     assert alone.exists()
-    status, _, err = call("view", "x.npz", "y.npz", "-o", tmp_path / "none.rrd")
-    assert status == 3
-    assert "none of 2 runs can be read" in err
-    status, _, err = call("view", "x.npz", "y.npz", "z.npz", "-o", tmp_path / "none.rrd")
-    assert status == 3
-    assert "none of 3 runs can be read" in err
+    for runs in (["x.npz", "y.npz"], ["x.npz", "y.npz", "z.npz"]):
+        told = complaint("view", *runs, "-o", tmp_path / "none.rrd")
+        assert f"none of {len(runs)} runs can be read" in told
     assert not (tmp_path / "none.rrd").exists()
 
 
@@ -151,6 +148,5 @@ def test_runs_that_cannot_be_read_are_named_and_the_others_are_shown(tmp_path):
 )
 def test_options_that_do_not_fit_the_number_of_runs_are_wrong_usage(tmp_path, runs, options, text):
     path = run_file(tmp_path, "a")
-    status, _, err = call("view", *[path] * runs, *options, "-o", tmp_path / "out.rrd")
-    assert status == 2
+    err = complaint("view", *[path] * runs, *options, "-o", tmp_path / "out.rrd", status=2)
     assert text in " ".join(err.split())

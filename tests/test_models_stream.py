@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checks import holds
 from commandline import python
 from generalmodel import relative
 from hypothesis import given, settings
@@ -81,10 +82,7 @@ def joined(parts):
 
 
 def assert_equal(ours, batch):
-    assert ours.classes == batch.classes
-    assert np.array_equal(ours.start, batch.start)
-    assert np.array_equal(ours.stop, batch.stop)
-    assert np.array_equal(ours.label, batch.label)
+    holds(ours, classes=batch.classes, start=batch.start, stop=batch.stop, label=batch.label)
     np.testing.assert_allclose(ours.scores, batch.scores, atol=1e-9)
 
 
@@ -174,9 +172,7 @@ def test_the_shipped_model_decides_the_same_whole_and_in_chunks_bit_for_bit(
         ]
         labels = joined([*parts, stream.finish()])
         assert np.array_equal(np.concatenate(decided), expected)
-        assert np.array_equal(labels.start, whole.start)
-        assert np.array_equal(labels.label, whole.label)
-        assert np.array_equal(labels.scores, whole.scores)
+        holds(labels, start=whole.start, label=whole.label, scores=whole.scores)
         decided.clear()
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from commandline import call
+from commandline import printed
 from rerun.chunk import RrdReader
 from test_noisemodel_mjcf import ARM, write_stl, written
 from typer.testing import CliRunner
@@ -28,9 +28,7 @@ def run_file(tmp_path):
 
 
 def inspector(*arguments):
-    status, out, err = call(*arguments)
-    assert status == 0, err
-    return out
+    return printed(*arguments)
 
 
 def drawn(recording):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import call, complaint, printed, refused
 from wholeverdict import WHOLE
 
 from inspector.errors import InspectorError, Status
@@ -58,8 +58,7 @@ def test_settings_hold_for_commands_and_the_command_line_wins(project):
 )
 def test_settings_that_are_not_known_are_one_line(project, text, problem):
     (project / "inspector.toml").write_text(text)
-    status, out, err = call("view" if "[view]" in text else "audit", "../log.csv")
-    assert (status, out, err.count("\n")) == (2, "", 1)
+    err = refused("view" if "[view]" in text else "audit", "../log.csv", status=2)
     assert err.startswith(f"inspector: {project}/inspector.toml:")
     assert problem in err
 
@@ -69,8 +68,7 @@ def test_settings_beyond_the_repository_do_not_hold_and_of_a_wrong_type_are_wron
     status, _, err = call("audit", "../log.csv")
     assert (status, "setting" in err) == (3, False)
     (project / "inspector.toml").write_text('rate = "fast"')
-    status, _, err = call("audit", "../log.csv")
-    assert (status, "Invalid value for '--rate'" in err) == (2, True)
+    assert "Invalid value for '--rate'" in complaint("audit", "../log.csv", status=2)
 
 
 def results(path, *verdicts):
@@ -84,8 +82,7 @@ def test_results_of_jobs_are_joined_into_one_table_page_and_exit_status(tmp_path
     quiet = [Verdict(Path(f"reach-{each}.npz"), Status.OK, "general") for each in range(3)]
     results(tmp_path / "b.json", *quiet)
     page = tmp_path / "page"
-    status, out, err = call("merge", tmp_path / "a.json", tmp_path / "b.json", "--report", page)
-    assert (status, err) == (1, "")
+    out = printed("merge", tmp_path / "a.json", tmp_path / "b.json", "--report", page, status=1)
     first, second, *_, last = out.splitlines()
     assert first.startswith(f"{demo_run()}   FAIL   ")
     assert second.split() == ["reach", "ok", "3", "runs"]
@@ -96,8 +93,7 @@ def test_results_of_jobs_are_joined_into_one_table_page_and_exit_status(tmp_path
     before = json.loads((tmp_path / "a.json").read_text())["runs"]
     assert json.loads(call("merge", tmp_path / "a.json", "--format", "json")[1])["runs"] == before
     output = ("--write", f"json={tmp_path / 'b.json'}", "--overwrite")
-    status, _, err = call("merge", tmp_path / "b.json", *output)
-    assert (status, "is read, too" in err) == (3, True)
+    assert "is read, too" in complaint("merge", tmp_path / "b.json", *output)
 
 
 @pytest.mark.parametrize(
@@ -114,8 +110,7 @@ def test_results_of_jobs_are_joined_into_one_table_page_and_exit_status(tmp_path
 )
 def test_what_is_no_result_is_one_line(tmp_path, content, problem):
     (tmp_path / "a.json").write_text(content)
-    status, out, err = call("merge", tmp_path / "a.json")
-    assert (status, out, err.count("\n")) == (3, "", 1)
+    err = refused("merge", tmp_path / "a.json")
     assert err.startswith(f"inspector: {tmp_path}/a.json: ")
     assert problem in err
     (tmp_path / "a.json").unlink()
@@ -168,8 +163,7 @@ def test_scenarios_lack_only_what_no_job_has(tmp_path, least, status):
 
 def test_a_run_of_two_jobs_is_refused(tmp_path):
     one, two = (results(tmp_path / n, Verdict(Path("r"), Status.OK)) for n in ("a.json", "b.json"))
-    status, _, err = call("merge", one, two)
-    assert (status, err) == (3, f"inspector: {two}: the run r is in {one}, too\n")
+    assert refused("merge", one, two) == f"inspector: {two}: the run r is in {one}, too\n"
 
 
 def test_a_history_of_200_commits_names_its_steps(tmp_path):
@@ -220,8 +214,7 @@ def test_results_that_a_rebase_replaced_are_left_out_and_told(tmp_path):
     for name, time in (("1-old", 1), ("2-old", 2), ("1-new", 3)):
         path = results(tmp_path / f"{name}.json", Verdict(Path("a.npz"), Status.OK))
         os.utime(path, (time, time))
-    status, out, err = call("history", tmp_path)
-    assert (status, err) == (0, "")
+    out = printed("history", tmp_path)
     told = ["2 commits, new to old", "1-old.json: replaced by 1-new.json"]
     assert out.splitlines()[:2] == told
 

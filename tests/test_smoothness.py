@@ -6,7 +6,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import call, complaint, printed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from samplelogs import JOINTS, write_lerobot
@@ -279,8 +279,7 @@ def folder(tmp_path):
 
 
 def test_a_folder_is_ranked_in_one_table(folder):
-    status, out, err = call("smoothness", folder)
-    assert (status, err) == (0, "")
+    out = printed("smoothness", folder)
     lines = out.splitlines()
     assert lines[0] == "3 episodes, the smoothest first by level of the velocities above 10 Hz"
     assert [line.split()[1] for line in lines[4:7]] == ["smooth.npz", "middle.npz", "rough.npz"]
@@ -319,12 +318,8 @@ def test_a_lerobot_data_set_is_ranked_by_episode(tmp_path):
     states = [rollout(chatter).position[:, [0, 1, 1]] for chatter in (0.1, 0.0)]
     names = [f"{joint}.pos" for joint in JOINTS]
     data = write_lerobot(tmp_path / "set", states, names=names, fps=50)
-    status, _, err = call("smoothness", data)
-    assert status == 3
-    assert "LeRobot does not log the unit" in err
-    status, out, err = call("smoothness", data, "--units", "radians")
-    assert (status, err) == (0, "")
-    lines = out.splitlines()
+    assert "LeRobot does not log the unit" in complaint("smoothness", data)
+    lines = printed("smoothness", data, "--units", "radians").splitlines()
     assert [line.split()[1:4] for line in lines[4:6]] == [["set", "episode", n] for n in "10"]
     command = f"inspector import {data} --episode 0 -o roughest.npz"
     assert lines[-1] == f"The roughest by 2nd diff.: {command}"
