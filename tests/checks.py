@@ -14,7 +14,7 @@ def holds(found, **expected):
 
 
 @contextlib.contextmanager
-def one_line(error, match="", begin=""):
+def one_line(error, match=None, begin=""):
     """Expect an error of one line that begins so."""
     with pytest.raises(error, match=match) as caught:
         yield

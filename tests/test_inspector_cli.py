@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import call as inspector
-from commandline import python
+from commandline import call, complaint, printed, python, refused
 from generalmodel import fixed
 
 from inspector.library import demo_run, model_files
@@ -30,8 +29,7 @@ def run_without_robot(path: Path, *, rate: float = 10_000.0, seconds: float = 1.
 def test_the_demo_is_shown_without_a_display(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     for _ in range(2):  # the second time it replaces its own recording
-        status, out, err = inspector("view")
-        assert (status, err) == (0, "")
+        out = printed("view")
     (recording,) = tmp_path.rglob("demo-*.rrd")
     assert f"recording: {recording}" in out
     assert f"rerun {recording}" in out
@@ -66,7 +64,7 @@ def viewers(monkeypatch, tmp_path):
 
 
 def test_the_viewer_is_started_on_loopback_and_not_waited_for(viewers, tmp_path):
-    status, out, _ = inspector("view", run_without_robot(tmp_path / "run.npz"))
+    status, out, _ = call("view", run_without_robot(tmp_path / "run.npz"))
     assert (status, "recording:" in out) == (0, False)
     (command,) = viewers[1]
     assert command[command.index("--bind") + 1] == "127.0.0.1"
@@ -74,7 +72,7 @@ def test_the_viewer_is_started_on_loopback_and_not_waited_for(viewers, tmp_path)
 
 def test_a_viewer_that_ends_is_reported_and_the_recording_stays(viewers, tmp_path):
     viewers[0].ended = 101
-    status, out, err = inspector("view", run_without_robot(tmp_path / "run.npz"))
+    status, out, err = call("view", run_without_robot(tmp_path / "run.npz"))
     assert (status, "recording:" in out) == (5, True)
     assert err == (
         "inspector: the viewer ended with status 101;"
@@ -87,7 +85,7 @@ def test_a_display_that_cannot_be_opened_ends_with_5_and_what_to_do(monkeypatch,
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setenv("DISPLAY", ":4099")
-    status, out, err = inspector("view", run_without_robot(tmp_path / "run.npz"))
+    status, out, err = call("view", run_without_robot(tmp_path / "run.npz"))
     assert status == 5
     assert err.count("\n") == 1
     assert "(no window can be opened on this display: Failed to open connection to X server)" in err
@@ -98,12 +96,11 @@ def test_a_display_that_cannot_be_opened_ends_with_5_and_what_to_do(monkeypatch,
 
 def test_a_rate_below_every_model_shows_everything_but_the_lanes(tmp_path):
     run = run_without_robot(tmp_path / "slow.npz", rate=50.0, seconds=20.0)
-    status, out, _ = inspector("view", run, "-o", tmp_path / "slow.rrd")
-    assert status == 0
+    out = printed("view", run, "-o", tmp_path / "slow.rrd")
     assert "cannot-tell: logged at 50 Hz" in out
     assert "No labels: logged at 50 Hz" in out
     assert (tmp_path / "slow.rrd").exists()
-    assert inspector("classify", run)[0] == 4
+    assert call("classify", run)[0] == 4
 
 
 def test_a_run_between_two_rates_is_decimated_never_upsampled(tmp_path):
@@ -112,7 +109,7 @@ def test_a_run_between_two_rates_is_decimated_never_upsampled(tmp_path):
     for rate in (1000.0, 10_000.0):
         own += ["--model", tmp_path / f"{rate:g}.npz"]
         fixed(rate=rate).save(own[-1])
-    status, out, _ = inspector("classify", run, *own)
+    status, out, _ = call("classify", run, *own)
     assert status in (0, 1)
     assert "Labelled at 1000 Hz" in out
 
@@ -121,7 +118,7 @@ def test_one_bad_file_never_stops_the_rest(tmp_path):
     (tmp_path / "text.npz").write_text("not an archive")
     good = run_without_robot(tmp_path / "good.npz")
     runs = (good, tmp_path / "text.npz", tmp_path / "gone.npz")
-    status, out, err = inspector("classify", *runs, "-j", "2", "--format", "json")
+    status, out, err = call("classify", *runs, "-j", "2", "--format", "json")
     assert status == 3
     states = [run["status"] for run in json.loads(out)["runs"]]
     assert states[0] in ("ok", "findings")
@@ -134,7 +131,7 @@ def test_one_bad_file_never_stops_the_rest(tmp_path):
 
 def test_wrong_usage_exits_with_2():
     for wrong in (["classify"], ["classify", "x", "--format", "yaml"], ["fly"], ["view", "--fast"]):
-        status, out, _ = inspector(*wrong)
+        status, out, _ = call(*wrong)
         assert status == 2
         assert out == ""
 
@@ -143,24 +140,18 @@ def test_a_model_that_is_damaged_is_one_line(tmp_path):
     model = tmp_path / "model.npz"
     model.write_bytes(model_files()[0].read_bytes()[:1000])
     run = run_without_robot(tmp_path / "run.npz")
-    status, _, err = inspector("classify", run, "--model", model)
-    assert status == 3
-    assert err.count("\n") == 1
-    assert "model.npz" in err
+    assert "model.npz" in refused("classify", run, "--model", model)
 
 
 def test_long_work_is_not_begun_for_an_output_that_exists(tmp_path):
     (tmp_path / "out.npz").write_text("precious")
     for long in (["simulate", "panda"], ["train", tmp_path / "gone.npz"]):
-        status, _, err = inspector(*long, "-o", tmp_path / "out.npz")
-        assert (status, err.count("\n")) == (3, 1)
-        assert "exists already" in err
+        assert "exists already" in refused(*long, "-o", tmp_path / "out.npz")
 
 
 def test_the_noise_is_printed_and_written(tmp_path):
     run = run_without_robot(tmp_path / "run.npz")
-    status, out, _ = inspector("noise", run, "--csv", tmp_path / "noise.csv")
-    assert status == 0
+    out = printed("noise", run, "--csv", tmp_path / "noise.csv")
     assert "peak 1 rad/s at 0.000 s" in out
     assert "100.0%  joint_0" in out
     lines = (tmp_path / "noise.csv").read_text().splitlines()
@@ -169,8 +160,7 @@ def test_the_noise_is_printed_and_written(tmp_path):
 
 
 def test_simplified_and_extended_noise_are_printed_side_by_side(tmp_path):
-    status, out, _ = inspector("noise", demo_run(), "--csv", tmp_path / "noise.csv")
-    assert status == 0
+    out = printed("noise", demo_run(), "--csv", tmp_path / "noise.csv")
     simplified, _, paper = out.partition("paper: rms")
     assert "simplified: rms" in simplified
     assert "panda_joint2, desired" in simplified
@@ -178,28 +168,26 @@ def test_simplified_and_extended_noise_are_printed_side_by_side(tmp_path):
     head, first, *_ = (tmp_path / "noise.csv").read_text(encoding="utf-8").splitlines()
     assert head == "time [s],simplified [rad/s],paper [√W]"
     assert len(first.split(",")) == 3
-    status, out, _ = inspector("noise", demo_run(), "--kind", "normal", "--kind", "A")
+    out = printed("noise", demo_run(), "--kind", "normal", "--kind", "A")
     assert [line.split(":")[0] for line in out.splitlines() if "rms" in line] == ["normal", "A"]
 
 
 def test_a_kind_that_does_not_exist_or_cannot_be_had_is_one_line(tmp_path):
-    status, _, err = inspector("noise", demo_run(), "--kind", "loud")
-    assert (status, err.count("\n")) == (2, 1)
+    err = refused("noise", demo_run(), "--kind", "loud", status=2)
     assert "no kind 'loud' of noise; there are simplified, paper" in err
-    status, _, err = inspector("noise", run_without_robot(tmp_path / "run.npz"), "--kind", "paper")
-    assert (status, err.count("\n")) == (3, 1)
+    err = refused("noise", run_without_robot(tmp_path / "run.npz"), "--kind", "paper")
     assert "kind 'paper' needs a robot, the run names none" in err
 
 
 def test_a_profile_that_does_not_exist_at_a_rate_is_one_line(tmp_path):
     run = run_without_robot(tmp_path / "run.npz")
     arguments = ["train", run, "-o", tmp_path / "m.npz", "--profile"]
-    status, _, err = inspector(*arguments, "noisytest-rbf", "--rate", 1000)
+    status, _, err = call(*arguments, "noisytest-rbf", "--rate", 1000)
     assert (status, "exists at 10000 Hz only" in err) == (2, True)
-    status, _, err = inspector(*arguments, "best")
+    status, _, err = call(*arguments, "best")
     told = "no profile 'best' of one rate; there are logbands, noisytest-rbf"
     assert (status, told in err) == (2, True)
-    status, _, err = inspector("train", run, "-o", tmp_path / "m.npz")
+    status, _, err = call("train", run, "-o", tmp_path / "m.npz")
     assert (status, "left out: 1 run without annotated blocks" in err) == (3, True)
 
 
@@ -228,7 +216,6 @@ def test_classifying_imports_no_library_that_takes_long():
 
 
 def test_a_score_that_no_finding_can_have_is_refused():
-    status, _, err = inspector("classify", demo_run(), "--min-score", "1.5")
-    assert (status, "'--min-score'" in err) == (2, True)
-    assert inspector("classify", demo_run(), "--min-score", "0.999")[0] == 0
-    assert inspector("classify", demo_run(), "--min-score", "0.9")[0] == 1
+    assert "'--min-score'" in complaint("classify", demo_run(), "--min-score", "1.5", status=2)
+    assert call("classify", demo_run(), "--min-score", "0.999")[0] == 0
+    assert call("classify", demo_run(), "--min-score", "0.9")[0] == 1

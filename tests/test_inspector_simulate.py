@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import call as inspector
+from commandline import call, printed, refused
 from simulated import nothing, stub
 
 from inspector.training import classified
@@ -28,9 +28,7 @@ def many(*arguments):
 
 
 def test_scenarios_are_listed_with_numbers_and_families():
-    status, out, _ = inspector("simulate", "--list")
-    assert status == 0
-    *lines, robots = out.splitlines()
+    *lines, robots = printed("simulate", "--list").splitlines()
     assert [line.split()[:2] for line in lines] == [
         [str(line.number), name] for name, line in scenarios.SCENARIOS.items()
     ]
@@ -42,10 +40,7 @@ def test_scenarios_are_listed_with_numbers_and_families():
 @pytest.mark.parametrize("scenario", ["7", "obstacle-toe"])
 def test_one_run_is_made_by_name_or_number(simulated, tmp_path, command, scenario):
     output = tmp_path / "run.npz"
-    status, out, err = inspector(
-        *command, "panda", "--scenario", scenario, "--seed", 3, "-o", output
-    )
-    assert (status, err) == (0, "")
+    out = printed(*command, "panda", "--scenario", scenario, "--seed", 3, "-o", output)
     assert "oscillations from 1.00 s to 2.00 s" in out
     assert simulated.calls == [Task("panda", "obstacle-toe", 3)]
     assert Run.load(output).meta["seed"] == 3
@@ -53,15 +48,14 @@ def test_one_run_is_made_by_name_or_number(simulated, tmp_path, command, scenari
 
 def test_a_data_set_is_made_once_and_its_statistics_are_printed(simulated, tmp_path):
     simulated.falls.add(Task("panda", "obstacle-toe", 5))
-    call = many("--seeds", 2, "--first-seed", 4, "--scenarios", "1,7", "-o", tmp_path)
-    status, out, err = inspector(*call)
-    assert (status, err) == (0, "")
+    command = many("--seeds", 2, "--first-seed", 4, "--scenarios", "1,7", "-o", tmp_path)
+    out = printed(*command)
     assert "3/4   obstacle-toe (1)" in out
     assert "4 runs, 1 of which fell" in out
-    assert inspector(*call)[1] == out
+    assert call(*command)[1] == out
     assert len(simulated.calls) == 4
-    status, out, _ = inspector(*call, "--json")
-    assert json.loads(out)["upright"]["panda"]["obstacle-toe"] == {"upright": 1, "runs": 2}
+    found = json.loads(printed(*command, "--json"))
+    assert found["upright"]["panda"]["obstacle-toe"] == {"upright": 1, "runs": 2}
     assert len(simulated.calls) == 4
 
 
@@ -77,7 +71,7 @@ def test_a_data_set_is_made_once_and_its_statistics_are_printed(simulated, tmp_p
     ],
 )
 def test_wrong_settings_simulate_nothing(simulated, tmp_path, arguments, status, problem):
-    found, out, err = inspector(*many(*arguments, "-o", tmp_path / "data"))
+    found, out, err = call(*many(*arguments, "-o", tmp_path / "data"))
     assert (found, out) == (status, "")
     assert problem in " ".join(err.split())
     assert not (tmp_path / "data").exists()
@@ -87,24 +81,20 @@ def test_wrong_settings_simulate_nothing(simulated, tmp_path, arguments, status,
 def test_wrong_outputs_and_damaged_runs_are_one_line(simulated, tmp_path):
     (tmp_path / "file").write_text("precious")
     data = tmp_path / "data"
-    inspector(*many("--seeds", 1, "--scenarios", 1, "-o", data))
+    call(*many("--seeds", 1, "--scenarios", 1, "-o", data))
     (data / "panda/straight-000.npz").write_bytes(b"PK")
     for path, problem in (
         (tmp_path / "file", "file: no folder of a data set"),
         (data, "straight-000.npz: not a run file"),
     ):
-        status, _, err = inspector(*many("--seeds", 1, "--scenarios", 1, "-o", path))
-        assert (status, err.count("\n")) == (3, 1)
-        assert problem in err
+        assert problem in refused(*many("--seeds", 1, "--scenarios", 1, "-o", path))
     assert (tmp_path / "file").read_text() == "precious"
 
 
 def test_without_the_simulator_one_line_names_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    for call in (("simulate", "panda", "-o", tmp_path / "r.npz"), many("-o", tmp_path / "data")):
-        status, _, err = inspector(*call)
-        assert (status, err.count("\n")) == (3, 1)
-        assert "pip install 'noise-inspector[sim]'" in err
+    for command in (("simulate", "panda", "-o", tmp_path / "r.npz"), many("-o", tmp_path / "data")):
+        assert "pip install 'noise-inspector[sim]'" in refused(*command)
     assert not (tmp_path / "r.npz").exists()
 
 
@@ -112,7 +102,7 @@ def test_a_data_set_keeps_the_signals_of_its_runs_at_its_rate(simulated, tmp_pat
     run = stub("panda", "straight", 0)
     for rate in (10_000, 1000):
         data = tmp_path / str(rate)
-        inspector(*many("--seeds", 1, "--scenarios", "1", "--rate", rate, "-o", data))
+        call(*many("--seeds", 1, "--scenarios", "1", "--rate", rate, "-o", data))
         kept = Run.load(data / "panda/straight-000.npz")
         wanted = decimated(run, rate) if rate < run.rate else run
         np.testing.assert_allclose(kept.velocity, wanted.velocity, rtol=1e-6)

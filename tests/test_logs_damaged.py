@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from checks import one_line
 from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag, write_mcap
 
 from inspector import read_log
@@ -92,7 +93,5 @@ def test_a_bag_without_metadata_is_read(whole, tmp_path):
 @pytest.mark.parametrize("share", [0.0, 1e-4, 2e-3])
 def test_a_bag_without_intact_messages_is_an_error_of_one_line(whole, tmp_path, kind, share):
     path = cut(copied(whole[kind], tmp_path), share)
-    with pytest.raises(LogError) as caught:
+    with one_line(LogError, begin=path):
         read_log(path)
-    assert str(caught.value).startswith(str(path))
-    assert "\n" not in str(caught.value)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import recordings
-from commandline import call as inspector
+from commandline import call, printed
 from recordings import (
     BAND,
     LABELS,
@@ -254,10 +254,9 @@ def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(tmp_path):
     panda(2.0, robot=None).save(tmp_path / "b.npz")
     save = ("-o", tmp_path / "ab.rrd")
     runs = (tmp_path / "a.npz", tmp_path / "b.npz")
-    status, out, _ = inspector("view", *runs, *save)
-    assert status == 0
+    out = printed("view", *runs, *save)
     assert "vibration +6.0 dB" in out
     assert "aligned by the motion: after starts +0.0000 s from before (correlation 1.00" in out
     assert "/class/after/annotated/oscillations" in entities(tmp_path / "ab.rrd")
-    status, out, _ = inspector("view", *runs, *save, "--align", "start", "--overwrite")
+    status, out, _ = call("view", *runs, *save, "--align", "start", "--overwrite")
     assert (status, "aligned from the start, as requested" in out) == (0, True)

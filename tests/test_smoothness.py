@@ -279,12 +279,11 @@ def folder(tmp_path):
 
 
 def test_a_folder_is_ranked_in_one_table(folder):
-    out = printed("smoothness", folder)
-    lines = out.splitlines()
+    lines = printed("smoothness", folder).splitlines()
     assert lines[0] == "3 episodes, the smoothest first by level of the velocities above 10 Hz"
     assert [line.split()[1] for line in lines[4:7]] == ["smooth.npz", "middle.npz", "rough.npz"]
     assert lines[-1] == f"The roughest by >10 Hz: inspector view {folder / 'rough.npz'}"
-    assert "empty" not in out
+    assert not any("empty" in line for line in lines)
 
 
 def test_json_has_the_numbers_of_each_episode(folder):

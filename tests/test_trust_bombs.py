@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checks import one_line
 from test_noisemodel_runfile import headed, packed
 
 import noiseclassifier as nc
@@ -20,6 +21,15 @@ from noisemodel.types import MeshError
 
 READERS = ((Run.load, RunFileError), (read_log, LogError))
 MODELS = (lambda path: load_library([path]), nc.FileError)
+
+
+def refused(path, problem, readers=READERS):
+    """Check that each way to read a file says in one line why it does not."""
+    for read, error in readers:
+        with one_line(error, problem):
+            read(path)
+
+
 LAUGHS = "".join(f'<!ENTITY l{n + 1} "{f"&l{n};" * 10}">' for n in range(9))
 
 
@@ -88,9 +98,8 @@ def attached(folder, count):
 
 def test_models_that_attach_each_other_twice_are_one_line(tmp_path, apart):
     assert len(Robot.load(attached(tmp_path, 3)).joints) == 0
-    with pytest.raises(RobotError, match="a0.xml: MuJoCo ") as caught:
+    with one_line(RobotError, "a0.xml: MuJoCo "):
         Robot.load(attached(tmp_path, 40))
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -105,9 +114,8 @@ def test_models_that_attach_each_other_twice_are_one_line(tmp_path, apart):
 def test_an_mjcf_of_more_than_any_robot_has_is_one_line(tmp_path, apart, element):
     path = tmp_path / "r.xml"
     path.write_text(f'<mujoco><worldbody><body name="b">{element}</body></worldbody></mujoco>')
-    with pytest.raises(RobotError, match="r.xml: (MuJoCo |30002 bodies)") as caught:
+    with one_line(RobotError, "r.xml: (MuJoCo |30002 bodies)"):
         Robot.load(path)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", ["gmsh", "mesh"])
@@ -150,9 +158,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):
             for _ in range(600):
                 member.write(zeros)
         archive.writestr("time.npy", b"")
-    for read, error in READERS:
-        with pytest.raises(error, match=r"unpacks to 0.629 GB from 0.6\d+ MB, .*--max-unpacked"):
-            read(path)
+    refused(path, r"unpacks to 0.629 GB from 0.6\d+ MB, .*--max-unpacked")
 
 
 @pytest.mark.parametrize(
@@ -175,10 +181,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):
 def test_a_broken_header_of_an_array_is_one_line(tmp_path, header):
     array = headed(header)
     path = packed(tmp_path / "run.npz", zipfile.ZIP_DEFLATED, time=array, velocity=array)
-    for read, error in READERS:
-        with pytest.raises(error, match="time") as caught:
-            read(path)
-        assert "\n" not in str(caught.value)
+    refused(path, "time")
 
 
 def test_a_second_member_of_one_name_is_refused(tmp_path):
@@ -188,9 +191,7 @@ def test_a_second_member_of_one_name_is_refused(tmp_path):
         again = archive.read("velocity.npy")
     with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(path, "a") as archive:
         archive.writestr("velocity.npy", again)
-    for read, error in READERS:
-        with pytest.raises(error, match="two arrays named 'velocity'"):
-            read(path)
+    refused(path, "two arrays named 'velocity'")
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_LZMA])
@@ -198,9 +199,7 @@ def test_an_array_whose_name_has_control_characters_is_refused(tmp_path, method)
     path = tmp_path / "run.npz"
     with zipfile.ZipFile(path, "w", method) as archive:
         archive.writestr("a\n\x1b[31m.npy", b"")
-    for read, error in READERS:
-        with pytest.raises(error, match=r"has an array named 'a\\n\\x1b\[31m'"):
-            read(path)
+    refused(path, r"has an array named 'a\\n\\x1b\[31m'")
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
@@ -215,15 +214,12 @@ def test_methods_that_unpack_gigabytes_at_once_are_not_read(tmp_path, method):
 def test_a_hostile_manifest_of_a_model_is_one_line(tmp_path, text):
     with np.load(model_files()[0]) as shipped:
         np.savez(tmp_path / "m.npz", **{**shipped, "manifest": np.array(text)})
-    with pytest.raises(nc.FileError, match="m.npz: manifest is no JSON") as caught:
+    with one_line(nc.FileError, "m.npz: manifest is no JSON"):
         load_library([tmp_path / "m.npz"])
-    assert "\n" not in str(caught.value)
 
 
 def test_a_device_is_no_file():
-    for read, error in (*READERS, MODELS):
-        with pytest.raises(error, match="is no regular file"):
-            read(Path("/dev/zero"))
+    refused(Path("/dev/zero"), "is no regular file", (*READERS, MODELS))
 
 
 def test_an_archive_whose_names_are_no_text_is_one_line(tmp_path):
@@ -231,7 +227,4 @@ def test_an_archive_whose_names_are_no_text_is_one_line(tmp_path):
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("é\n.npy", b"")
     path.write_bytes(path.read_bytes().replace("é".encode(), b"\xff\xfe"))
-    for read, error in (*READERS, MODELS):
-        with pytest.raises(error) as caught:
-            read(path)
-        assert "\n" not in str(caught.value)
+    refused(path, None, (*READERS, MODELS))
