@@ -9,15 +9,9 @@ from unittest import mock
 from inspector.cli import main
 
 # Commands that take a run or a log, with the options that they need.
-TAKING_RUNS = [
-    ["classify"],
-    ["audit"],
-    ["noise"],
-    ["view", "-o", "out.rrd"],
-    ["view", "-o", "out.html"],
-    ["listen", "-o", "out.wav"],
-    ["export", "-o", "out.csv"],
-]
+WRITING = {"view": ("out.rrd", "out.html"), "listen": ("out.wav",), "export": ("out.csv",)}
+TAKING_RUNS = [["classify"], ["audit"], ["noise"]]
+TAKING_RUNS += [[name, "-o", file] for name, files in WRITING.items() for file in files]
 
 
 def call(*arguments):
@@ -57,10 +51,12 @@ def refused(*arguments, status=3):
     return err
 
 
-def ran(*command, **options):
+def ran(*command, status=None, **options):
     """Run a program in a process of its own; its status, output and complaints, as text."""
     words = list(map(str, command))
-    return subprocess.run(words, capture_output=True, text=True, check=False, **options)
+    done = subprocess.run(words, capture_output=True, text=True, check=False, **options)
+    assert status in (None, done.returncode), done.stdout + done.stderr
+    return done
 
 
 def python(*arguments, **options):

@@ -52,16 +52,10 @@ def stub(robot: str, scenario: str, seed: int, duration: float | None = None) ->
     speed = 1 + 0.01 * generator.normal(size=(20_000, len(joints)))
     speed[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:, None])
     speed = speed.astype(np.float32)
-    return Run(
-        time=time,
-        joint_names=joints,
-        velocity=speed,
-        position=speed,
-        velocity_desired=np.ones_like(speed),
-        robot=robot,
-        blocks=(Block(0.0, 1.0, "ok"), Block(1.0, 2.0, "oscillations")),
-        meta={"scenario": scenario, "seed": seed, "duration": duration or 7.0, "events": []},
-    )
+    signals = {"velocity": speed, "position": speed, "velocity_desired": np.ones_like(speed)}
+    blocks = (Block(0.0, 1.0, "ok"), Block(1.0, 2.0, "oscillations"))
+    meta = {"scenario": scenario, "seed": seed, "duration": duration or 7.0, "events": []}
+    return Run(time=time, joint_names=joints, robot=robot, blocks=blocks, meta=meta, **signals)
 
 
 def nothing(monkeypatch) -> SimpleNamespace:

@@ -37,16 +37,12 @@ def run_with(fault=0.0, frequency=60.0, joints=2):
     velocity[:, 0] += fault * inside * np.sin(2 * np.pi * frequency * time)
     events = [{"label": "oscillations", "start": FAULT[0], "stop": FAULT[1], "labelled": 1.0}]
     blocks = (Block(0.0, 1.9, "ok"), Block(*FAULT, "oscillations"), Block(3.2, 5.0, "ok"))
-    return Run(
-        time=time,
-        joint_names=tuple("ab"[:joints]),
-        velocity=velocity.astype(np.float32),
-        position=position.astype(np.float32),
-        velocity_desired=smooth.astype(np.float32),
-        stages={"planned": smooth.astype(np.float32)},
-        blocks=blocks if fault else (Block(0.0, 5.0, "ok"),),
-        meta={"events": events if fault else []},
-    )
+    smooth, velocity, position = map(np.float32, (smooth, velocity, position))
+    signals = {"velocity": velocity, "position": position, "velocity_desired": smooth}
+    signals |= {"joint_names": tuple("ab"[:joints]), "stages": {"planned": smooth}}
+    if not fault:
+        events, blocks = [], (Block(0.0, 5.0, "ok"),)
+    return Run(time=time, blocks=blocks, meta={"events": events}, **signals)
 
 
 TWIN = run_with()
@@ -90,14 +86,8 @@ def test_ripple_has_its_share_of_the_speed_at_its_order():
     speed, gear, share = 0.5, 100.0, 0.02
     time = np.arange(round(8 * RATE)) / RATE
     steady = np.full((len(time), 1), speed)
-    run = Run(
-        time=time,
-        joint_names=("a",),
-        velocity=steady,
-        position=speed * time[:, None],
-        velocity_desired=steady,
-        stages={"planned": steady},
-    )
+    signals = {"velocity": steady, "velocity_desired": steady, "stages": {"planned": steady}}
+    run = Run(time=time, joint_names=("a",), position=speed * time[:, None], **signals)
     found = logged(run, run, replace(QUICK, ripple=share, gear=gear), seed=3)
     spectrum = np.abs(np.fft.rfft(found.velocity[:, 0] - speed)) / len(time) * 2
     frequencies = np.fft.rfftfreq(len(time), 1 / RATE)

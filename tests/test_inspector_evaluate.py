@@ -15,14 +15,8 @@ def run(path, seed, *, label="oscillations"):
     time = np.arange(20_000) / 10_000
     signal = 1 + 0.01 * np.random.default_rng(seed).normal(size=20_000)
     signal[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:])
-    np.savez(
-        path,
-        time=time,
-        velocity=signal[:, None],
-        block_start=[0.0, 1.0],
-        block_stop=[1.0, 2.0],
-        block_label=["ok", label],
-    )
+    blocks = {"block_start": [0.0, 1.0], "block_stop": [1.0, 2.0], "block_label": ["ok", label]}
+    np.savez(path, time=time, velocity=signal[:, None], **blocks)
     return path
 
 

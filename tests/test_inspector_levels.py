@@ -34,16 +34,9 @@ def tone(amplitude, seconds=2.0, hertz=100.0):
 
 
 def links(vibration, width=0.01):
-    count = len(vibration)
-    return LinkNoise(
-        kind="normal",
-        links=tuple("abc"[: vibration.shape[1]]),
-        movers=tuple(frozenset() for _ in range(vibration.shape[1])),
-        time=width * (np.arange(count) + 0.5),
-        power=vibration,
-        vibration=vibration,
-        remarks=(),
-    )
+    time, names = width * (np.arange(len(vibration)) + 0.5), tuple("abc"[: vibration.shape[1]])
+    signals = {"time": time, "power": vibration, "vibration": vibration}
+    return LinkNoise("normal", names, (frozenset(),) * len(names), remarks=(), **signals)
 
 
 def test_a_tone_of_one_rad_per_second_effective_is_at_zero_decibels():

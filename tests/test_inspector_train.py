@@ -18,15 +18,8 @@ def log(path, *, rate=1000.0, desired="planned", seed=0):
     velocity[len(time) // 2 :, 0] += 0.5 * np.sin(2 * np.pi * 60 * time[len(time) // 2 :])
     columns = {"planned": planned, "zero": np.zeros_like(planned), "measured": velocity}
     given = {} if desired == "missing" else {"velocity_desired": columns[desired]}
-    np.savez(
-        path,
-        time=time,
-        velocity=velocity,
-        **given,
-        block_start=[0.0, 2.0],
-        block_stop=[2.0, 4.0],
-        block_label=["ok", "oscillations"],
-    )
+    given |= {"block_start": [0, 2], "block_stop": [2, 4], "block_label": ["ok", "oscillations"]}
+    np.savez(path, time=time, velocity=velocity, **given)
     return path
 
 

@@ -84,18 +84,9 @@ def panda(tmp_path_factory, library):
 def test_a_session_shows_everything(panda):
     path, warned, summary = panda
     assert warned == []
-    assert {
-        "/noise/simplified",
-        "/spectrogram/bands",
-        "/class/found",
-        "/score",
-        "/events",
-        "/joints/velocity/0",
-        "/joints/velocity/0_desired",
-        "/joints/position/0",
-        "/robot/motion",
-        "/robot/panda_link3",
-    } <= entities(path)
+    plots = {"/noise/simplified", "/spectrogram/bands", "/class/found", "/score", "/events"}
+    joints = {f"/joints/{each}" for each in ("velocity/0", "velocity/0_desired", "position/0")}
+    assert plots | joints | {"/robot/motion", "/robot/panda_link3"} <= entities(path)
     assert len(RrdReader(path).blueprints()) == 1
     assert summary.samples == 3000
     assert summary.model == "general"
@@ -220,13 +211,8 @@ def test_missing_samples_end_the_lane_and_labels_resume_after_them(tmp_path, lib
     assert [state for _, _, state in shown_as] == ["ok", "ok"]
     times = [time for start, stop, _ in shown_as for time in (start, stop)]
     np.testing.assert_allclose(times, [0.15, 0.85, 2.65, 3.85], atol=0.051)
-    valid = nm.Run(
-        time=signals["time"],
-        velocity=signals["velocity"] * kept[:, None],
-        velocity_desired=signals["velocity_desired"] * kept[:, None],
-        joint_names=("a", "b", "c"),
-        valid=kept,
-    )
+    whole = {name: signals[name] * kept[:, None] for name in ("velocity", "velocity_desired")}
+    valid = nm.Run(time=signals["time"], joint_names=("a", "b", "c"), valid=kept, **whole)
     batch = label_run(valid, library).labels
     time, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(time, (batch.start + batch.stop) / 2, atol=1e-6)

@@ -301,14 +301,8 @@ def arm_run(rattling=None, *, rate=1000.0, seconds=4.0, **changes):
     if rattling is not None:
         during = (time >= 2.0) & (time < 2.5)
         velocity[during, rattling] += 0.2 * np.sin(2 * np.pi * 100 * time[during])
-    fields = {
-        "time": time,
-        "velocity": velocity,
-        "position": position,
-        "joint_names": names,
-        "robot": "ur5",
-    }
-    return Run(**(fields | changes))
+    fields = {"velocity": velocity, "position": position, "joint_names": names, "robot": "ur5"}
+    return Run(**({"time": time} | fields | changes))
 
 
 def test_desired_velocities_without_positions_are_taken_where_the_robot_is():
@@ -348,14 +342,8 @@ def test_what_is_missing_is_said_in_a_sentence_each(tmp_path):
     robot = chain(tmp_path, "revolute", "revolute", shapes=[BAR, ""], floating_base=True)
     time = np.arange(200) / 1000
     pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (200, 1))
-    run = Run(
-        time=time,
-        velocity=np.ones((200, 1)),
-        position=time[:, None],
-        joint_names=("joint2",),
-        robot=str(robot.path),
-        base_pose=pose,
-    )
+    joints = {"joint_names": ("joint2",), "velocity": np.ones((200, 1)), "position": time[:, None]}
+    run = Run(time=time, robot=str(robot.path), base_pose=pose, **joints)
     said = (
         "Not in the log, assumed stationary: joint1.",
         "Links without geometry make no noise: link0, link2.",

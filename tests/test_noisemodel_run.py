@@ -92,18 +92,12 @@ def filled():
     valid[40:45] = False
     signals = {name: random.standard_normal((100, 2)) * valid[:, None] for name in names}
     pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (100, 1))
-    return run(
-        velocity=random.standard_normal((100, 2)) * valid[:, None],
-        stages={"motor": random.standard_normal((100, 2))},
-        valid=valid,
-        base_pose=pose,
-        base_velocity=random.standard_normal((100, 6)),
-        desired_joint_names=("c", "d"),
-        robot="panda",
-        blocks=(Block(0.0, 0.0205, "ok"), Block(0.0205, 0.08, "impact")),
-        meta={"seed": 1},
-        **signals,
-    )
+    signals["velocity"] = random.standard_normal((100, 2)) * valid[:, None]
+    signals["stages"] = {"motor": random.standard_normal((100, 2))}
+    base = {"base_pose": pose, "base_velocity": random.standard_normal((100, 6))}
+    blocks = (Block(0.0, 0.0205, "ok"), Block(0.0205, 0.08, "impact"))
+    about = {"robot": "panda", "blocks": blocks, "meta": {"seed": 1}}
+    return run(valid=valid, desired_joint_names=("c", "d"), **signals, **base, **about)
 
 
 def same(one, other):
@@ -394,19 +388,12 @@ def test_a_constant_velocity_stays_constant_to_the_edges():
 
 
 def test_all_velocities_are_decimated_and_nothing_else_is_kept():
-    run = run_of(20.0)
-    run = run_of(
-        20.0,
-        velocity_desired=run.velocity,
-        stages={"planned": run.velocity},
-        position=run.velocity,
-        effort=run.velocity,
-        base_velocity=np.tile(run.velocity, 6),
-        base_pose=np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(run.time), 1)),
-        blocks=(Block(5.0, 6.0, "ok"),),
-        meta={"seed": 1},
-        robot="panda",
-    )
+    velocity = run_of(20.0).velocity
+    signals = dict.fromkeys(("velocity_desired", "position", "effort"), velocity)
+    pose = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(velocity), 1))
+    signals |= {"base_velocity": np.tile(velocity, 6), "base_pose": pose}
+    about = {"blocks": (Block(5.0, 6.0, "ok"),), "meta": {"seed": 1}, "robot": "panda"}
+    run = run_of(20.0, stages={"planned": velocity}, **signals, **about)
     slow = decimated(run, 1000.0)
     np.testing.assert_array_equal(slow.velocity, slow.velocity_desired)
     np.testing.assert_array_equal(slow.velocity, slow.stages["planned"])

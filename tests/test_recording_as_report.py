@@ -40,14 +40,9 @@ def listed(page, title):
 def test_class_time_and_localisation_of_findings_are_the_same(page, recording):
     ((line,), lines) = listed(page, "Findings"), text(recording).splitlines()
     assert f"- {line}" in lines
-    for part in (
-        "impact, ",
-        " score ",
-        "; joints panda_",
-        "; loudest links panda_",
-        " Hz; first in",
-    ):
-        assert part in f"; {line}".replace(": joints", "; joints")
+    told = f"; {line}".replace(": joints", "; joints")
+    parts = ("impact, ", " score ", "; joints panda_", "; loudest links panda_", " Hz; first in")
+    assert all(part in told for part in parts), told
 
 
 def test_an_annotated_failure_that_was_found_is_localised_as_it_was_found(page, recording):

@@ -19,13 +19,8 @@ def run_of(robot, name, seconds=1.0):
     names = robot.joint_names
     phase = 2 * np.pi * (np.linspace(0.3, 0.9, len(names)) * time[:, None] + np.arange(len(names)))
     reach = np.array([0.1 if j.kind == "prismatic" else 0.6 for j in robot.joints if j.nv == 1])
-    fields = {
-        "time": time,
-        "velocity": reach * np.cos(phase),
-        "position": reach * np.sin(phase),
-        "joint_names": names,
-        "robot": name,
-    }
+    fields = {"velocity": reach * np.cos(phase), "position": reach * np.sin(phase)}
+    fields |= {"time": time, "joint_names": names, "robot": name}
     if robot.floating_base:
         yaw = time
         pose = np.zeros((len(time), 7))

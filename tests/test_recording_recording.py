@@ -50,15 +50,8 @@ def inspected(run, tmp_path, labels=None, **options) -> Analysis:
     events = (Event("impact", 0.5, 1.0, 0.9),) if labels else ()
     found = analyse_file(path, {}, **options)
     status = Status.FINDINGS if events else found.status
-    return dataclasses.replace(
-        found,
-        status=status,
-        labels=labels,
-        findings=events,
-        spans=events,
-        model="a model",
-        alarm=None if labels is None else 0.25,
-    )
+    known = {"labels": labels, "alarm": None if labels is None else 0.25, "model": "a model"}
+    return dataclasses.replace(found, status=status, findings=events, spans=events, **known)
 
 
 LABELLED = some_labels(slice(5, 8))
@@ -378,15 +371,10 @@ def one_legged(folder, shape='<box size="0.1 0.1 0.4"/>'):
     time = np.arange(4000) / 1000
     pose = np.zeros((4000, 7))
     pose[:, 0], pose[:, 6] = 0.1 * time, 1.0
-    return Run(
-        time=time,
-        velocity=(np.sin(2 * np.pi * 50 * time) * (time > 2))[:, None],
-        position=np.zeros((4000, 1)),
-        joint_names=("HAA",),
-        base_pose=pose,
-        base_velocity=np.zeros((4000, 6)),
-        robot=str(path),
-    )
+    velocity = (np.sin(2 * np.pi * 50 * time) * (time > 2))[:, None]
+    base = {"base_pose": pose, "base_velocity": np.zeros((4000, 6))}
+    joints = {"joint_names": ("HAA",), "velocity": velocity, "position": np.zeros((4000, 1))}
+    return Run(time=time, robot=str(path), **joints, **base)
 
 
 def test_the_report_states_what_was_found(whole):

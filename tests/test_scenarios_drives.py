@@ -19,14 +19,8 @@ TWO = Drivetrain(
     armature=(0.1, 0.1), friction=(0.5, 0.5), viscous=(0.1, 0.1),
 )  # fmt: skip
 START = np.array([0.1, -0.2])
-ROBOT = Arm(
-    name="two",
-    drives=TWO,
-    effectors=PANDA.effectors,
-    rest=(0.1, -0.2),
-    payload=0.0,
-    force_noise=1.0,
-)
+LOADS = {"effectors": PANDA.effectors, "payload": 0.0, "force_noise": 1.0}
+ROBOT = Arm(name="two", drives=TWO, rest=(0.1, -0.2), **LOADS)
 HEALTHY = replace(Imperfections.draw(np.random.default_rng(1), ROBOT, bodies=2), encoder_noise=0.0)
 PERFECT = replace(
     HEALTHY, stiffness=1.0, damping=1.0, encoder_bits=22, encoder_bandwidth=500.0, torque_delay=3

@@ -106,13 +106,8 @@ def test_a_robot_whose_file_is_gone_is_said_and_the_run_is_classified(tmp_path):
 
 def test_joints_that_a_run_file_does_not_name_are_those_of_its_robot_in_order(tmp_path):
     run = panda()
-    np.savez(
-        tmp_path / "run.npz",
-        time=run.time,
-        velocity=run.velocity,
-        position=run.position,
-        robot="panda",
-    )
+    signals = {"velocity": run.velocity, "position": run.position}
+    np.savez(tmp_path / "run.npz", time=run.time, robot="panda", **signals)
     out = printed("view", tmp_path / "run.npz", "-o", tmp_path / "run.rrd")
     assert "Joints are not named: taken for panda_joint1 to panda_joint7." in out
     assert "assumed stationary: panda_finger_joint1, panda_finger_joint2" in out
