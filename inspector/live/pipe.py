@@ -5,6 +5,7 @@ Rows are CSV with a header, or a JSON object per line.
 
 import csv
 import json
+import re
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -85,12 +86,14 @@ def follow(
 def _begun(incoming: Iterator[tuple[bytes, int]]) -> tuple[bytes, bytes, int]:
     """First line that is neither blank nor a comment, what came after it, and its number."""
     for lines, number in incoming:
-        while lines:
-            head, _, lines = lines.partition(b"\n")
-            names = any(map(column_signal, _header(head)[0]))
-            if head.strip() and (names or not head.lstrip().startswith(b"#")):
-                return head, lines, number
-            number += 1
+        first = 0
+        while found := re.compile(rb"\S").search(lines, first):
+            start = lines.rfind(b"\n", 0, found.start()) + 1
+            stop = lines.index(b"\n", start)
+            number, head = number + lines.count(b"\n", first, start), lines[start:stop]
+            if not head.lstrip().startswith(b"#") or any(map(column_signal, _header(head)[0])):
+                return head, lines[stop + 1 :], number
+            first, number = stop + 1, number + 1
     raise LiveError(f"the input is empty; {EXPECTED}")
 
 
