@@ -37,8 +37,7 @@ from noisemodel.run import part
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
 
-# The paper's band of oscillations (table of scenarios, 11 to 19), in [Hz].
-OSCILLATIONS = (20.0, 1000.0)
+OSCILLATIONS = (20.0, 1000.0)  # the paper's band of them (scenarios 11 to 19), in [Hz]
 # What the reason begins with where a class is observable in all of its band, if it is loud.
 MASKED = "quantisation masks amplitudes"
 
@@ -182,8 +181,7 @@ class Audit:
     jitter: tuple[float, float] | None
     gaps: Gaps
     bandwidth: Bandwidth
-    # Signs of wrong units, copies, zero-order hold or filters; a clause each.
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...]  # signs of wrong units, copies, holds or filters; a clause each
     notes: tuple[str, ...]  # differentiation, quantisation, missing signals; a clause each
     classes: tuple[ClassObservability, ...]
 

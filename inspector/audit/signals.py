@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from inspector.logs.motion import contradictions
+from inspector.logs.motion import LARGEST, NORMALISED, TURN, contradictions
 from noiseclassifier import LogBands
 from noisemodel import Run
 from noisemodel.hold import FEWEST, hold_length
@@ -30,8 +30,7 @@ def ends(signal: Real) -> tuple[Real, Real]:
 
 # Spectrum
 
-# Shortest segment that is transformed: the paper's frame (Sec. III-A), in [s].
-SEGMENT = 0.4
+SEGMENT = 0.4  # shortest that is transformed: the paper's frame (Sec. III-A), in [s]
 FEWEST_SAMPLES = 128  # fewest samples of a segment, so that slow logs have a spectrum too
 MOST = 256  # most segments that are averaged, evenly spread, which limits the cost of long logs
 BATCH = 16  # segments that are transformed at once, which bounds the memory that they take
@@ -201,8 +200,7 @@ def floor_frequency(spectrum: Spectrum, floor: Array) -> float | None:
 
 # Bandwidth
 
-# Least amplitude in one window of the shipped models: no encoder has less noise, in [rad/s].
-ENCODER_NOISE = LogBands().floor
+ENCODER_NOISE = LogBands().floor  # amplitude in a window that any encoder exceeds, in [rad/s]
 RESOLUTION = 1.0 / LogBands().window  # frequency resolution of one window of those models, in [Hz]
 
 
@@ -212,8 +210,7 @@ class Bandwidth:
 
     nyquist: float  # half the sample rate, in [Hz]
     hold: float = 1.0  # length of the zero-order hold of measured values, in samples; 1 without one
-    # How velocities were computed from positions; None if they were measured.
-    differentiator: Differentiator | None = None
+    differentiator: Differentiator | None = None  # of positions; None of measured velocities
     corner: float | None = None  # -3 dB frequency of a filter, in [Hz]; None without a sign of one
     # Largest quantisation step, in [rad/s], or in [rad] of the positions that were differentiated;
     # 0 without one.
@@ -221,10 +218,8 @@ class Bandwidth:
     # Frequency above which the spectrum is at the quantisation floor, in [Hz]; None if it stays
     # above, or the run is too short for a spectrum.
     floor_from: float | None = None
-    # Largest oscillation that quantisation masks at ``floor_from``, in [rad/s].
-    floor_amplitude: float = 0.0
-    # Frequency above which the level is below any encoder's noise, in [Hz]; None if it stays above.
-    quiet_from: float | None = None
+    floor_amplitude: float = 0.0  # largest oscillation that is masked there, in [rad/s]
+    quiet_from: float | None = None  # from where on any encoder has more noise, in [Hz]; or None
 
     @cached_property
     def limits(self) -> dict[str, float]:
@@ -234,8 +229,7 @@ class Bandwidth:
         if self.hold > 1:
             limits[f"zero-order hold of {self.hold:.3g} samples"] = self.nyquist / self.hold
         if self.differentiator:
-            corner = self.differentiator.corner(rate / self.hold)
-            limits["velocities were differentiated"] = corner
+            limits["velocities were differentiated"] = self.differentiator.corner(rate / self.hold)
         if self.corner:
             limits["the log looks filtered"] = self.corner
         return limits
@@ -289,8 +283,7 @@ FLAT = 4.5  # most variation in a flat octave, less than the 6 of a first-order 
 # Least slope of a filter: below second order's 12, above the 6 with which encoders and drives
 # attenuate white noise, in [dB] an octave.
 STEEP = 9.0
-# Least attenuation of a filter within two octaves or up to the Nyquist frequency, in [dB].
-DROP = 15.0
+DROP = 15.0  # least attenuation of one in two octaves or up to the Nyquist frequency, in [dB]
 # Root mean square from which an octave is vibration, not background noise: no filter ends it. The
 # threshold of the scenarios' labels, in [rad/s].
 LOUD = 0.03
@@ -334,10 +327,7 @@ def _median(values: Array) -> float:
 FARTHEST = 10  # largest lag of a copy, before or after, in samples
 EXAMINED = 1000  # samples in motion that are compared, evenly spread, or a few more
 SAME = 0.99  # least share of equal samples, bit for bit, among those in motion
-
-
-# Samples by which a lag is looked at first, and the share of equal ones from which it is again.
-PROBED, LIKELY = 50, 0.9
+PROBED, LIKELY = 50, 0.9  # samples at which a lag is tried first, and least share of equal ones
 
 
 @dataclass(frozen=True)
@@ -383,11 +373,6 @@ def _lag(measured: Real, desired: Real) -> int | None:
     return None
 
 
-TURNS = 4 * np.pi  # largest plausible position of a joint that is not continuous, in [rad]
-FAST = 100.0  # largest plausible velocity of a joint, in [rad/s]
-NORMALISED = 100.0  # largest position that may be a share of a joint's range as well
-
-
 def unit_warnings(run: Run) -> Iterator[str]:
     """Warnings about values that look like another unit, a clause each."""
     if not run.joint_names:
@@ -398,30 +383,27 @@ def unit_warnings(run: Run) -> Iterator[str]:
     if run.position is not None:
         farthest = np.abs(ends(valid(run, run.position))).max(axis=0)
         moving = high > low
-        far = (farthest > TURNS / 2) & moving
-        enough = np.sum(far) > 1 or (farthest[far] > TURNS).any()
-        if enough and 2 * int(np.sum(far)) >= max(1, int(np.sum(moving))):
+        far = (farthest > TURN) & moving
+        enough = far.sum() > 1 or (farthest[far] > LARGEST["position"]).any()
+        if enough and 2 * far.sum() >= moving.sum():
             joint, largest = run.joint_names[int(np.argmax(farthest))], float(farthest.max())
             other = " or normalised" if largest <= NORMALISED else ""
             yield f"positions look like degrees{other} ({joint} reaches {largest:.4g})"
     fast = int(np.argmax(speeds))
-    if speeds[fast] > FAST:
+    if speeds[fast] > LARGEST["velocity"]:
         yield (
             f"velocities look like degrees or turns per minute"
             f" ({run.joint_names[fast]} reaches {speeds[fast]:.4g})"
         )
 
 
-# Speed from which a joint moves, in [rad/s] or [m/s]: pushes on a standing arm peak below.
-MOVES = 0.1
+MOVES = 0.1  # least speed of a moving joint, in SI units: pushes on a standing arm peak below
 MOVING_TIME = 2.0  # stretch of time in which it has to move, in [s]
 MOVING_SHARE = 0.75  # share of that time: a motion reverses now and then, a push is over sooner
 CHANGE = 1e-6  # least change of a desired position, and least desired speed, in SI units
 COUNTED = 1_000_000  # samples that are counted at once
-# Samples of a pulse at most: two of a central difference. Every second sample is chatter.
-PULSE = 2
-# Most quantisation noise of a differentiated velocity, RMS in [rad/s]: faults begin there.
-FAINTEST = 0.05
+PULSE = 2  # most samples of a pulse, of a central difference; each second one is chatter
+FAINTEST = 0.05  # most quantisation noise of a velocity, RMS in [rad/s]: faults begin there
 
 
 def placeholder(run: Run) -> str:

@@ -52,7 +52,7 @@ from inspector.logs.names import (
 )
 from noisemodel import Run, RunError, runfile
 from noisemodel.run import check_time
-from noisemodel.runfile import PIECE, ArchiveError, check_unpacked
+from noisemodel.runfile import PIECE, ArchiveError, ObjectArrayError, check_unpacked
 from noisemodel.types import Real
 
 COPY = "copy"
@@ -387,7 +387,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
             array = np.asarray(runfile.read_array(stream, "it", path.stat().st_size))
         except ArchiveError as error:
             what = str(error)
-            if isinstance(error, runfile.ObjectArrayError):
+            if isinstance(error, ObjectArrayError):
                 what = f"{error.name!r} holds {OBJECTS}"
             raise LogError(path, f"not an archive of plain arrays: {what}") from error
     names = array.dtype.names or ()
@@ -414,18 +414,8 @@ HEADER = 128  # bytes before the first variable
 # Types of elements: a variable, one that is packed, and what a variable begins with.
 MATRIX, COMPRESSED, FLAGS, DIMENSIONS = 14, 15, 6, 5
 # Numbers by the type of their element, whatever the class of the variable is.
-STORED = {
-    1: "i1",
-    2: "u1",
-    3: "i2",
-    4: "u2",
-    5: "i4",
-    6: "u4",
-    7: "f4",
-    9: "f8",
-    12: "i8",
-    13: "u8",
-}
+STORED = dict(enumerate(("i1", "u1", "i2", "u2", "i4", "u4", "f4"), start=1))
+STORED |= {9: "f8", 12: "i8", 13: "u8"}
 STRUCT, TEXT = 2, 4  # classes of variables
 NO_NUMBERS = (1, 3, 5, 16, 17, 18)  # classes of cells, objects, sparse matrices and functions
 COMPLEX = 0x800  # the flag of a variable with imaginary parts

@@ -226,8 +226,7 @@ class Topic:
 # Bags
 
 LATEST = 2**62  # stamps lie before, in [ns]; differences of later ones are no 64-bit integers
-# Topic, time of reception in [ns], and the serialised message.
-Message: TypeAlias = tuple[str, int, bytes]
+Message: TypeAlias = tuple[str, int, bytes]  # topic, time of reception in [ns], serialised
 
 
 # What opens a compressed stream, by the name that bags have for it.
@@ -490,8 +489,7 @@ def _ros1(path: Path, bag: Bag) -> Iterator[Topic | Message]:
                 yield names[number], seconds * 10**9 + fraction, data
 
 
-# Kinds of records of ROS 1.
-MESSAGE, BEGIN, CHUNK, CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
+MESSAGE, BEGIN, CHUNK, CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"  # kinds of ROS 1's records
 
 
 def _ros1_records(

@@ -39,23 +39,18 @@ UNITS = {"seconds": "1", "milliseconds": "1e-3", "microseconds": "1e-6", "nanose
 SLOWEST_SECONDS = 0.5  # median step up to which stamps are in seconds, in [s]
 RATES = (20.0, 20e3)  # rates of logs, from which the unit of larger steps follows, in [Hz]
 NEARLY = 4.0  # two units are ambiguous if a rate is within this factor of the ends of ``RATES``
-# Time since 1970, from 1998 to 2128, by which absolute stamps tell their unit, in [s].
-EPOCH = (9e8, 5e9)
+EPOCH = (9e8, 5e9)  # since 1970, of 1998 to 2128: absolute stamps tell their unit by it, in [s]
 COMMON_RATES = (
     *(10, 15, 20, 24, 25, 30, 40, 50, 60, 80, 90, 100, 120, 125, 150, 200, 240, 250, 300, 333),
     *(400, 480, 500, 600, 800, 1000, 1200, 1500, 2000, 2400, 4000, 5000, 10_000),
 )
-# A rate found from the values is one of these, in [Hz], if it differs by no more than that.
-NEAR_RATE = 0.02
+NEAR_RATE = 0.02  # relative difference up to which a rate found from the values is one of these
 LARGEST_STEP = 1.0  # larger steps of a position are a turn or a reset, in [rad] or [m]
-# Least correlation of velocities with the steps of positions from which the rate is found.
-FITS = 0.98
-# Relative difference from which a rate found from the values contradicts a stated one.
-DISAGREE = 0.1
+FITS = 0.98  # least correlation of velocities with the steps of positions that tell the rate
+DISAGREE = 0.1  # relative difference from which a rate of the values contradicts a stated one
 LONGEST_DATES = 60.0  # longest step of stamps that are dates, in [s]
 SLOW = 0.02  # median step from which stamps in seconds may be in milliseconds, in [s]
-# Share of samples out of order above which a log is refused: it is several, or has no stamps.
-MOST_UNORDERED = 0.1
+MOST_UNORDERED = 0.1  # share of samples out of order from which a log is several, or has no stamps
 BLOCK = 500_000  # values that are interpolated at once, which takes about ten times their memory
 
 
@@ -300,8 +295,8 @@ def common_time(tracks: Sequence[Track], main: Stamps) -> tuple[Array, Mask]:
             for stretch in stamps.clock.stretches:
                 inside = stamps.time[stretch]
                 if len(inside) > 1:
-                    edges = np.searchsorted(time, [inside[0] - slack, inside[-1] + slack])
-                    reached[edges[0] : edges[1]] = True
+                    edges = np.searchsorted(time, (inside[0] - slack, inside[-1] + slack))
+                    reached[slice(*edges)] = True
             valid &= reached
     for track in tracks:
         if (missing := track.missing) is not None:  # at an instant, or next to one between samples
@@ -357,8 +352,7 @@ def _places(instants: Array, stamps: Stamps, slack: float) -> Indices | None:
 CORRELATION = 0.6  # least normalised correlation of an accepted offset
 NEXT_BEST = 0.95  # largest correlation of the next best offset, as a share of the best
 SHARE = 0.5  # least share of the shorter log that overlaps the longer one
-# Largest delay of measured behind desired motion that is attributed to a controller, in [s].
-LAG = 0.1
+LAG = 0.1  # largest delay of measured behind desired motion that is a controller's, in [s]
 DRIFT = 1e-3  # least change of the offset between the halves of a log that is said, in [s]
 HIGHEST_RATE = 250.0  # highest rate at which motions are compared, in [Hz]
 

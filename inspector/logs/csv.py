@@ -3,7 +3,7 @@
 import csv
 import re
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -36,8 +36,7 @@ from noisemodel.files import beyond, limit
 from noisemodel.types import Array
 
 DELIMITERS = (";", "\t", ",", " ")  # marks between cells
-# Beginnings of lines that are comments, or of a header that NumPy or rostopic wrote.
-COMMENTS = ("#", "%", "//")
+COMMENTS = ("#", "%", "//")  # of lines, or of a header that NumPy or rostopic wrote
 # Cells without a number, in any case.
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
 FLAGS = {"true": "1", "false": "0"}
@@ -69,8 +68,8 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     with _opened(path) as stream:
         layout = _layout(path, stream, options)
         episodes = _episodes(path, stream, layout)
-    listing = partial(_listing, path, options)
-    return LogReader("CSV", (*episodes,), lambda n: _read(path, options, episodes[n]), listing)
+    read = partial(_read, path, layout, options, episodes)
+    return LogReader("CSV", (*episodes,), read, partial(_listing, path, layout, options))
 
 
 def _episodes(path: Path, stream: TextIO, layout: Layout) -> dict[str, slice]:
@@ -83,9 +82,8 @@ def _episodes(path: Path, stream: TextIO, layout: Layout) -> dict[str, slice]:
     return {"": slice(None)}
 
 
-def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
+def _listing(path: Path, layout: Layout, options: ReadOptions) -> tuple[str, ...]:
     with _opened(path) as stream:
-        layout = _layout(path, stream, options)
         rows = sum(1 for _ in islice(_lines(path, stream), layout.skip, None))
     time = options.stamps_in(layout.header)
     naming = Naming.of(layout.header, options.known_joints)
@@ -113,17 +111,18 @@ def _opened(path: Path) -> Iterator[TextIO]:
             raise LogError(path, "not a CSV log: not text in UTF-8") from error
 
 
-def _read(path: Path, options: ReadOptions, part: slice) -> Log:
-    """Log of a part of the rows, with the columns whose signal is known."""
+def _read(
+    path: Path, layout: Layout, options: ReadOptions, episodes: Mapping[str, slice], episode: str
+) -> Log:
+    """Log of an episode, with the columns whose signal is known."""
+    header, times = layout.header, _times(layout.header, options)
+    names = [name for place, name in enumerate(header) if name and place not in times]
+    options = options.for_columns(path, names)
+    wanted = _wanted(path, layout, times, options)
     with _opened(path) as stream:
-        layout = _layout(path, stream, options)
-        header = layout.header
-        times = _times(header, options)
-        names = [name for place, name in enumerate(header) if name and place not in times]
-        options = options.for_columns(path, names)
-        wanted = _wanted(path, layout, times, options)
         rows, values, cells = _table(path, stream, layout, wanted, times)
-        rows, values, cells = rows[part], values[part], cells[part]
+    part = episodes[episode]
+    rows, values, cells = rows[part], values[part], cells[part]
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
     stamps = replace(Stamps.counted(len(rows)), rows=rows)
@@ -133,13 +132,8 @@ def _read(path: Path, options: ReadOptions, part: slice) -> Log:
         since = np.array([float(stamp - exact[0]) for stamp in exact])
         unit = "" if _date(cells[0]) is None else "seconds"
         stamps = stamps_since(path, time, exact[0], since, options.rate, rows, unit)
-    read = {*times, *wanted}
-    not_read = [
-        name
-        for place, name in enumerate(header)
-        if name and place not in read and name.lower() not in EPISODES
-    ]
     arrays = {header[place]: values[:, at] for at, place in enumerate(wanted)}
+    not_read = [n for n in names if n not in arrays and n.lower() not in EPISODES]
     log = log_of(path, arrays, options, stamps=stamps, not_read=not_read)
     return replace(log, remarks=layout.remarks)
 
@@ -202,9 +196,10 @@ def _first_data(lines: Sequence[str]) -> tuple[str, int | None]:
 
     def share_of_numbers(line: str, mark: str) -> float:
         cells = _split(line, mark)
-        if len(cells) < 2 or not (_is_number(cells[0]) or _date(cells[0]) is not None):
+        numbers = [_number(each) for each in cells]
+        if len(cells) < 2 or (numbers[0] in (None, np.nan) and _date(cells[0]) is None):
             return 0.0
-        return sum(_is_number(each) or _is_missing(each) for each in cells) / len(cells)
+        return 1 - numbers.count(None) / len(cells)
 
     for place, line in enumerate(lines):
         shares = {mark: share_of_numbers(line, mark) for mark in DELIMITERS}
@@ -372,23 +367,20 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
 
 def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -> list[float]:
     """Numbers of cells of which some are empty, have a decimal comma, or are no numbers."""
-    pairs = [*zip(names, cells, strict=True)]
-    cells = [FLAGS.get(cell.lower(), cell) if n.lower() in EPISODES else cell for n, cell in pairs]
+    found = []
     for name, cell in zip(names, cells, strict=True):
-        if not (_is_missing(cell) or _is_number(cell)):
+        number = _number(FLAGS.get(cell.lower(), cell) if name.lower() in EPISODES else cell)
+        if number is None:
             raise LogError(path, f"column {name!r} holds {cell[:40]!r}, which is not a number", row)
-    return [np.nan if _is_missing(cell) else float(cell.replace(",", ".")) for cell in cells]
+        found.append(number)
+    return found
 
 
-def _is_missing(cell: str) -> bool:
-    return cell.strip().lower() in MISSING
-
-
-def _is_number(cell: str) -> bool:
+def _number(cell: str) -> float | None:
+    """Number in a cell, `np.nan` itself in one without, None in one with other text."""
     with suppress(ValueError):
-        float(cell.replace(",", "."))
-        return not _is_missing(cell)
-    return False
+        return np.nan if cell.strip().lower() in MISSING else float(cell.replace(",", "."))
+    return None
 
 
 # Stamps

@@ -62,11 +62,9 @@ def errors_of(
 
 SAMPLES = "samples"  # the unit of stamps that count samples, of a log whose rate is not known yet
 
-# Round rates are these, times a power of ten, in [Hz].
-ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # rates, times a power of ten
 NEAR = 0.05  # largest relative difference of a nominal rate to the round one that replaces it
-# Rates between these, and how near a nominal one has to be to them.
-BETWEEN, VERY_NEAR = (1.2, 1.5, 2.4, 4.8, 9.6), 0.01
+BETWEEN, VERY_NEAR = (1.2, 1.5, 2.4, 4.8, 9.6), 0.01  # the same for rates between these
 SAME_RATE = 1.01  # ratio of two rates up to which no band is lost from one to the other
 COVERS = 0.9  # least share of a signal's time for which another one is to be there
 UNIFORM = 1e-3  # largest relative deviation of a uniform clock's steps from their median
@@ -307,10 +305,8 @@ def _named(joints: Sequence[str], known: Mapping[str, Limits]) -> tuple[str, ...
 
 FORMAT = "noise-mapping/1"
 COMMAND = "command"  # the signal of fields that may be desired positions: their values decide
-# Least correlation of a position with its target, and the range of its slope.
-FOLLOWS, SLOPES = 0.9, (0.5, 2.0)
-# What moves less does not move; largest mean distance of its target, both in [rad] or [m].
-STILL, NEARBY = 1e-3, 0.1
+FOLLOWS, SLOPES = 0.9, (0.5, 2.0)  # correlation and slopes of a position with its target
+STILL, NEARBY = 1e-3, 0.1  # what moves less rests; largest mean distance of its target, in SI units
 UNITS = ("radians", "degrees")  # of angles
 RATES = (1e-3, 1e9)  # rates that a log may be said to have, in [Hz]
 LISTS = {"joints", "topics", "columns"}  # options with any number of names
@@ -359,7 +355,7 @@ class ReadOptions:
     @property
     def mapped(self) -> set[str]:
         """Names of the columns and arrays that are mapped, but for the stamps."""
-        known = [entry for entry in self.entries if entry.signal != "time"]
+        known = (entry for entry in self.entries if entry.signal != "time")
         return {name for entry in known for name in (entry.source, entry.part()[0])}
 
     def stamps_in(self, names: Sequence[str]) -> str:
@@ -406,9 +402,8 @@ class ReadOptions:
             if unknown := sorted(set(saved) - known):
                 names = ", ".join(sorted(known))
                 raise OptionError(f"unknown setting {unknown[0]!r}; there are {names}, map")
-            parsed = parse_mapping(
-                [f"{name}={_setting(name, each)}" for name, each in entries.items()]
-            )
+            texts = [f"{name}={_setting(name, each)}" for name, each in entries.items()]
+            parsed = parse_mapping(texts)
             settings = {name: _setting(name, value) for name, value in saved.items()}
             return cls(**settings, entries=parsed)
         except OSError as error:
@@ -744,10 +739,9 @@ def followed(command: Real, position: Real) -> int:
         if abs(float(np.mean(wanted) - np.mean(actual))) > max(extent, NEARBY):
             break
         if moves:
-            deviation = float(np.std(wanted)), float(np.std(actual))
-            common = float(np.mean((wanted - wanted.mean()) * (actual - actual.mean())))
-            correlation, slope = common / (deviation[0] * deviation[1]), common / deviation[0] ** 2
-            if correlation < FOLLOWS or not SLOPES[0] <= slope <= SLOPES[1]:
+            (own, common), (_, other) = np.cov(wanted, actual)
+            follows = common >= FOLLOWS * (own * other) ** 0.5
+            if not (follows and SLOPES[0] <= common / own <= SLOPES[1]):
                 break
         count, moving = count + 1, moving + moves
     return count if moving and 2 * count >= position.shape[1] else 0

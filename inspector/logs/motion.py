@@ -33,6 +33,7 @@ from inspector.logs.names import BASE_SIGNALS, listed, tells_unit
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
 from noisemodel.hold import hold_length
+from noisemodel.noise import in_both
 from noisemodel.robot import Limits
 from noisemodel.run import METHOD, base_velocity, derived, joint_velocity
 from noisemodel.runfile import pieces
@@ -70,12 +71,11 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None, beside: Log | 
     if once := [label for track in timed if len(track.values) < 2 for label in track.labels]:
         remarks.append(f"logged once only, left out: {listed(once)}")
     tracks = [t for each in tracks if (t := _finite(path, each, remarks)) is not None]
-    tracks, in_degrees = _in_si(log, tracks, options.units, robot, remarks, beside)
+    tracks, in_degrees, converted = _in_si(log, tracks, options.units, robot, beside)
+    remarks += converted
     tracks, order = clocks.ordered(path, tracks)
-    tracks = clocks.on_clocks(
-        tracks, {each: clocks.even(each) for each in clocks.clocks_of(tracks)}
-    )
-    tracks = _without_frozen(tracks, remarks)
+    even = {stamps: clocks.even(stamps) for stamps in clocks.clocks_of(tracks)}
+    tracks = _without_frozen(clocks.on_clocks(tracks, even), remarks)
     return replace(
         log,
         fields=(),
@@ -124,9 +124,9 @@ def _finite(path: Path, track: Track, remarks: list[str]) -> Track | None:
         if empty.all() or not track.joints:
             return None
         track, lacking = _columns(track, ~empty), lacking[:, ~empty]
-    if not lacking.any():
-        return track
     missing = np.atleast_1d(lacking.any(axis=1))
+    if not missing.any():
+        return track
     labels = [*dict.fromkeys(compress(track.labels, np.atleast_1d(lacking.any(axis=0))))]
     first = track.stamps.time[np.argmax(missing)] - track.stamps.time[0]
     remarks.append(
@@ -178,44 +178,29 @@ def _without_frozen(tracks: list[Track], remarks: list[str]) -> list[Track]:
             continue
         rows = [(track.values[1:] == track.values[:-1]).all(axis=1) for track in measured]
         rows += [~t.missing[1:] for t in measured if t.missing is not None]  # filled, not logged
-        frozen = np.zeros(len(stamps.time), dtype=bool)
-        for first, last, speed in _repeats(stamps.time, np.logical_and.reduce(rows), ours):
-            frozen[first + 1 : last + 1] = True
-            at = stamps.time[first] - stamps.time[0]
-            remarks.append(
-                f"{last - first} samples from {at:.6g} s on repeat one, while joints should move"
-                f" at {speed:.2g} rad/s: the log froze, marked as not valid"
-            )
-        if frozen.any():
-            tracks = [
-                replace(t, missing=frozen if t.missing is None else t.missing | frozen)
-                if t.stamps is stamps
-                else t
-                for t in tracks
-            ]
+        same, time = np.logical_and.reduce(rows), stamps.time
+        edges = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
+        usual = np.diff(time[np.append(True, ~same)]) if len(edges) else ()
+        shortest = max(FROZEN, FROZEN_HOLDS * float(np.median(usual)) if len(usual) else 0.0)
+        frozen = np.zeros(len(time), dtype=bool)
+        for first, last in edges[time[edges[:, 1]] - time[edges[:, 0]] >= shortest].tolist():
+            length, speed = float(time[last] - time[first]), 0.0
+            for track in ours:
+                if track.signal == "velocity":
+                    speed = max(speed, float(np.abs(track.values[first]).max()))
+                elif track.signal == "position_desired":
+                    way = np.ptp(track.values[first : last + 1], axis=0).max()
+                    speed = max(speed, float(way) / length)
+            if speed * length > FROZEN_WAY:
+                frozen[first + 1 : last + 1] = True
+                where = f"{last - first} samples from {time[first] - time[0]:.6g} s on"
+                why = f"repeat one, while joints should move at {speed:.2g} rad/s: the log froze"
+                remarks.append(f"{where} {why}, marked as not valid")
+        for place, track in enumerate(tracks):
+            if track.stamps is stamps and frozen.any():
+                missing = frozen if track.missing is None else frozen | track.missing
+                tracks[place] = replace(track, missing=missing)
     return tracks
-
-
-def _repeats(time: Array, same: Mask, tracks: Sequence[Track]) -> Iterator[tuple[int, int, float]]:
-    """First and last sample of each stretch that repeats a moving row, and its speed."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], same, [False]))))
-    if not len(edges):
-        return
-    changes = time[np.concatenate(([True], ~same))]
-    usual = float(np.median(np.diff(changes))) if len(changes) > 1 else 0.0
-    for first, last in edges.reshape(-1, 2).tolist():
-        length = float(time[last] - time[first])
-        if length < max(FROZEN, FROZEN_HOLDS * usual):
-            continue
-        speed = 0.0
-        for track in tracks:
-            if track.signal == "velocity":
-                speed = max(speed, float(np.abs(track.values[first]).max()))
-            elif track.signal == "position_desired":
-                way = np.ptp(track.values[first : last + 1], axis=0).max()
-                speed = max(speed, float(way) / length)
-        if speed * length > FROZEN_WAY:
-            yield first, last, speed
 
 
 # Angles
@@ -241,24 +226,19 @@ HINT = (
 
 
 def _in_si(
-    log: Log,
-    tracks: Sequence[Track],
-    units: str,
-    robot: Robot | None,
-    remarks: list[str],
-    beside: Log | None,
-) -> tuple[list[Track], tuple[str, ...]]:
-    """Tracks in radians that know which columns are angles, and what was found to be in degrees."""
+    log: Log, tracks: Sequence[Track], units: str, robot: Robot | None, beside: Log | None
+) -> tuple[list[Track], tuple[str, ...], list[str]]:
+    """Tracks in radians that know which columns are angles, what was in degrees, and remarks."""
     kinds = {joint.name: joint.kind for joint in robot.joints} if robot else {}
     in_degrees = () if units else _in_degrees(tracks, kinds, guess=not log.in_radians)
+    found, remarks = list[Track](), list[str]()
     if in_degrees:
         plural = {"position": "positions", "velocity": "velocities"}
-        remarks.append(
-            f"{' and '.join(plural[each] for each in in_degrees)} look like degrees: converted to"
-            " radians (if they are not, --units radians)"
-        )
-    found: list[Track] = []
+        what = " and ".join(plural[each] for each in in_degrees)
+        how = "converted to radians (if they are not, --units radians)"
+        remarks.append(f"{what} look like degrees: {how}")
     measured = {each.signal: each for each in beside.tracks} if beside else {}
+    also = beside.in_degrees if beside else ()
     for track in sorted(tracks, key=lambda each: each.is_desired):
         # A gripper is logged by LeRobot as a share of its way.
         gripper = [bool(log.units and re.search("gripper|finger", joint)) for joint in track.joints]
@@ -275,13 +255,11 @@ def _in_si(
         open_, degrees = angular & ~told, units == "degrees" or track.quantity in in_degrees
         other = measured.get(track.quantity, measured.get("position", measured.get("velocity")))
         if other and not units and (beside or track.is_desired) and open_.any():
-            if unit := _unit_by_way(_columns(track, open_), other):
-                if degrees != (unit == "degrees"):
-                    name = track.signal.replace("_", " ")
-                    remarks.append(f"{name}: in {unit}, as it goes as far as the measured motion")
-                degrees = unit == "degrees"
-            elif beside:
-                degrees = degrees or track.quantity in beside.in_degrees
+            unit = _unit_by_way(_columns(track, open_), other)
+            if unit and degrees != (unit == "degrees"):
+                name = track.signal.replace("_", " ")
+                remarks.append(f"{name}: in {unit}, as it goes as far as the measured motion")
+            degrees = unit == "degrees" if unit else degrees or track.quantity in also
         if degrees and open_.any():
             values = np.where(open_, np.deg2rad(track.values), track.values)
             track = replace(track, values=values)
@@ -290,7 +268,7 @@ def _in_si(
         if not beside:
             measured.setdefault(track.signal, track)
         found.append(replace(track, angles=(angular & is_position).tolist()))
-    return found, in_degrees
+    return found, in_degrees, remarks
 
 
 def _unit_by_way(desired: Track, measured: Track) -> str:
@@ -604,8 +582,7 @@ def _signals_of(
 
 FAR_POSITION = 0.25  # share of a joint's range by which positions may be beyond its ends
 FAR_VELOCITY = 1.5  # multiple of a joint's velocity limit that velocities may reach
-# Time for which limits have to be exceeded, in [s]; of short runs, a tenth of their duration.
-LONG = 1.0
+LONG = 1.0  # time for which limits have to be exceeded, or a tenth of a shorter run, in [s]
 
 
 def limit_warnings(run: Run) -> Iterator[str]:
@@ -676,15 +653,11 @@ FACTORS: Mapping[float, str] = {
     np.pi / 180: "positions look like degrees beside velocities in radians per second",
     30 / np.pi: "velocities look like turns per minute beside positions in radians",
 }
-# Largest relative deviation from a factor, less than half the distance of two of them.
-NEAR_FACTOR = 0.02
+NEAR_FACTOR = 0.02  # largest relative deviation, less than half the distance of two of them
 STRETCH = 0.2  # time over which velocities are integrated and compared with positions, in [s]
-# Largest relative deviation of a velocity from the slope of its position: filters attenuate.
-AGREE = 0.2
-# Correlation of the two from which a factor is one, and below which they have no relation.
-RELATED, UNRELATED = 0.9, 0.3
-# Root mean square of the way in a stretch from which a joint is compared, in [rad] or [m].
-WAY = 0.02
+AGREE = 0.2  # largest relative deviation of velocities from slopes: filters attenuate
+RELATED, UNRELATED = 0.9, 0.3  # correlation from which a factor is one, and below which none is
+WAY = 0.02  # least RMS of the way in a stretch of a joint that is compared, in [rad] or [m]
 ENOUGH = 5  # fewest stretches
 
 
@@ -728,12 +701,10 @@ def _of_desired(run: Run) -> Iterator[str]:
     """A clause on desired velocities that are measured ones in another unit."""
     if run.velocity_desired is None:
         return
-    shared = [joint for joint in run.desired_joint_names if joint in run.joint_names]
-    desired = run.velocity_desired[:, [run.desired_joint_names.index(each) for each in shared]]
-    measured = run.velocity[:, [run.joint_names.index(each) for each in shared]]
+    own, other = in_both(run)
     step = run.mask[:, None] / run.rate
-    ways = (np.ptp(np.cumsum(each * step, axis=0), axis=0) for each in (desired, measured))
-    times = _times_as_far(*ways)
+    speeds = run.velocity_desired[:, other], run.velocity[:, own]
+    times = _times_as_far(*(np.ptp(np.cumsum(each * step, axis=0), axis=0) for each in speeds))
     if any(abs(times / known - 1) <= CLOSE for known in FACTORS):
         yield f"desired velocities go {times:.3g} times as far as measured ones: another unit?"
 

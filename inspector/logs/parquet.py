@@ -165,8 +165,7 @@ TRUE, FALSE, BYTE, DOUBLE, BINARY, LIST, SET, STRUCT = 1, 2, 3, 7, 8, 9, 10, 12
 NUMBERS = (4, 5, 6)
 DEPTH = 13  # structs and lists within each other; the end of a file has eight
 MAGIC = b"PAR1"
-# Most bytes of the end of a file, which has some hundred for each column of a row group.
-LARGEST_END = 32 * 2**20
+LARGEST_END = 32 * 2**20  # most bytes of a file's end: a column of a row group takes hundreds
 
 # Fields of structs, by the names of parquet.thrift
 ROW_GROUPS, COLUMNS, ROWS, META_DATA = 4, 1, 3, 3
