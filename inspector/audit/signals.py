@@ -159,11 +159,10 @@ def differentiator_of(run: Run) -> Differentiator | None:
     # A simulator makes positions of velocities: their difference is these but for its rounding.
     first, way = (inner - 1, here - before) if method is BACKWARD else (inner, after - here)
     step = (run.time[first + 1] - run.time[first])[:, None]
-    exact = max(
-        np.mean(each == velocity) for each in (way * run.rate, way / step, way * (1 / step))
-    )
+    slopes = way * run.rate, way / step, way * (1 / step)
+    exact = max(np.mean(slope == velocity) for slope in slopes)
     rounding = 4.0 * grain * farthest * run.rate
-    integrated = exact < 0.5 and np.abs(way * run.rate - velocity).max() <= rounding
+    integrated = exact < 0.5 and np.abs(slopes[0] - velocity).max() <= rounding
     return None if integrated else method
 
 

@@ -84,9 +84,7 @@ TABLE: tuple[tuple[str, str], ...] = (
 # What Isaac Lab records of a scene, in which several things may have joints.
 STATES = re.compile(r"states/articulation/(?P<robot>[^/]+)/(?P<what>.+)")
 # Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``.
-CELLS = re.compile(
-    r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?", re.IGNORECASE
-)
+CELLS = re.compile(r"(?i)(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?")
 RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate", "fs")
 # Names of the number that is the rate in [Hz], or the step in [s].
 STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
@@ -230,9 +228,7 @@ def part_of(arrays: Arrays, episode: str) -> dict[str, NDArray[Any]]:
     """Arrays of which those that have as many samples as the longest are cut to an episode."""
     part = episodes_of(arrays)[episode]
     samples = max((len(each) for each in arrays.values() if each.ndim), default=0)
-    return {
-        n: each[part] if each.ndim and len(each) == samples else each for n, each in arrays.items()
-    }
+    return {n: e[part] if e.ndim and len(e) == samples else e for n, e in arrays.items()}
 
 
 def stated_rate(items: Mapping[str, Any]) -> tuple[str, float | None]:
@@ -454,7 +450,7 @@ def _variables(path: Path) -> dict[str, NDArray[Any]]:
             texts = (bytes(content) for kind, content in _elements(data) if kind in (1, 2))
             name = next(texts, b"").decode("latin1")
             if name and not name.startswith("__"):
-                found |= _numbers_in(data, name)
+                found |= _numbers(data, name)
     return found
 
 
@@ -499,9 +495,7 @@ def _elements(data: memoryview) -> Iterator[tuple[int, memoryview]]:
         place = following
 
 
-def _numbers_in(
-    data: memoryview, name: str, depth: int = DEPTH
-) -> Iterator[tuple[str, NDArray[Any]]]:
+def _numbers(data: memoryview, name: str, depth: int = DEPTH) -> Iterator[tuple[str, NDArray[Any]]]:
     """Arrays of numbers in a variable, of the sizes that it states."""
     parts = [*_elements(data)]
     kinds = [kind for kind, _ in parts[:2]]
@@ -518,7 +512,7 @@ def _numbers_in(
         fields = (names[at : at + length] for at in range(0, len(names), max(1, length)))
         for field, (_, content) in zip(fields, parts[5:], strict=False):
             text = field.partition(bytes(1))[0].decode("latin1")
-            yield from _numbers_in(content, f"{name}/{text}", depth - 1)
+            yield from _numbers(content, f"{name}/{text}", depth - 1)
     elif kind != STRUCT:
         size = sum(len(content) for _, content in parts[3:])
         stored, content = (*parts, (1, data[:0]))[3]

@@ -255,13 +255,11 @@ def ordered(path: Path, tracks: Sequence[Track]) -> tuple[list[Track], str]:
         if not len(wrong):
             continue
         if len(wrong) >= MOST_UNORDERED * len(time):
-            first = int(wrong[0])
-            after, before = (
-                stamps.start + Decimal(str(t)) for t in (time[first], latest[first - 1])
-            )
+            at = int(wrong[0])
+            after, before = (stamps.start + Decimal(str(t)) for t in (time[at], latest[at - 1]))
             how = "stands still" if after == before else "runs backwards"
             track = next(track for track in tracks if track.stamps is stamps)
-            raise track.fault(path, f"time {how}: {after} comes after {before}", first)
+            raise track.fault(path, f"time {how}: {after} comes after {before}", at)
         places += latest[wrong - 1].tolist()
         rows = None if stamps.rows is None else np.asarray(stamps.rows)[keep].tolist()
         own = replace(stamps, time=time[keep], rows=rows)
@@ -489,9 +487,7 @@ def _correlation(one: Array, other: Array) -> Array:
     lags = np.arange(1 - width, count)
     crossed = fft.irfft(product.sum(axis=0), length)[lags]
     start, stop = np.maximum(lags, 0), np.minimum(lags + width, count)
-    of_one, of_other = (
-        np.append(0.0, np.cumsum(np.square(each).sum(axis=0))) for each in (one, other)
-    )
+    of_one, of_other = (np.append(0.0, np.cumsum((each**2).sum(axis=0))) for each in (one, other))
     energy = (of_one[stop] - of_one[start]) * (of_other[stop - lags] - of_other[start - lags])
     tiny = np.finfo(np.float64).tiny
     found = crossed / np.sqrt(np.maximum(energy, max(1e-9 * energy.max(), tiny)))

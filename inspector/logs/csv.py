@@ -319,16 +319,14 @@ def numbers_in(
         lines = lines.replace(b"\r\n", b"\n")
     content = np.frombuffer(lines, dtype=np.uint8)
     ends = content == ord("\n")
-    places = np.flatnonzero(ends | (content == ord(delimiter)))
+    marks = np.flatnonzero(ends | (content == ord(delimiter)))
     rows = np.count_nonzero(ends)
-    if len(places) != rows * width or not ends[places[width - 1 :: width]].all():
+    if len(marks) != rows * width or not ends[marks[width - 1 :: width]].all():
         return None
-    edges = np.zeros(len(places) + 1, dtype=np.int32)  # of cells, once the marks are gone
-    edges[1:] = places - np.arange(len(places))
+    edges = np.zeros(len(marks) + 1, dtype=np.int32)  # of cells, once the marks are gone
+    edges[1:] = marks - np.arange(len(marks))
     written = lines.translate(None, b"\n" + delimiter.encode())
-    cells: Any = pa.StringArray.from_buffers(
-        len(places), pa.py_buffer(edges), pa.py_buffer(written)
-    )
+    cells: Any = pa.StringArray.from_buffers(len(marks), pa.py_buffer(edges), pa.py_buffer(written))
     firsts = np.arange(rows) * width
     some = cells
     if list(wanted) != list(range(width)):
@@ -343,12 +341,10 @@ def numbers_in(
 
 def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[int, list[str]]]:
     """Line number and cells of each row, without comments, blank lines and trailing separators."""
-    lines = csv.reader(
-        StringIO(text, newline=""), delimiter=layout.delimiter, skipinitialspace=True
-    )
+    rows = csv.reader(StringIO(text, newline=""), delimiter=layout.delimiter, skipinitialspace=True)
     width = len(layout.header)
     try:
-        for cells in lines:
+        for cells in rows:
             if len(cells) != width:
                 if cells in ([], [""]) or cells[0].lstrip().startswith(COMMENTS):
                     continue
@@ -357,12 +353,12 @@ def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[i
                 if len(cells) != width:
                     names = "the header names" if layout.row else "--columns names"
                     problem = f"{len(cells)} cells where {names} {width} columns"
-                    raise LogError(path, problem, first + lines.line_num)
+                    raise LogError(path, problem, first + rows.line_num)
             elif cells[0][:1] in ("#", "%", "/") and cells[0].startswith(COMMENTS):
                 continue
-            yield first + lines.line_num, cells
+            yield first + rows.line_num, cells
     except csv.Error as error:
-        raise LogError(path, f"not a CSV log ({error})", first + lines.line_num) from error
+        raise LogError(path, f"not a CSV log ({error})", first + rows.line_num) from error
 
 
 def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -> list[float]:
@@ -386,9 +382,7 @@ def _number(cell: str) -> float | None:
 # Stamps
 
 
-def _decimals(
-    path: Path, name: str, cells: Sequence[str], rows: Sequence[int]
-) -> Sequence[Decimal]:
+def _decimals(path: Path, name: str, cells: Sequence[str], rows: Sequence[int]) -> list[Decimal]:
     """Stamps, of dates in [s] since 1970."""
     dated = _date(cells[0]) is not None
     found = []

@@ -541,9 +541,10 @@ def tracks_of(
     remarks = [*_taken(log, kept), *problem]
     read = {choice.field for choice in kept}
     not_read = tuple(each.name for each in log.fields if each not in read)
-    for unit in dict.fromkeys(unit for name, unit in converted.items() if name not in not_read):
-        taken = [n for n, other in converted.items() if other == unit and n not in not_read]
-        remarks.append(f"{listed(taken)}: converted from {unit}, as their names say")
+    taken = {name: unit for name, unit in converted.items() if name not in not_read}
+    for unit in dict.fromkeys(taken.values()):
+        columns = listed([name for name, other in taken.items() if other == unit])
+        remarks.append(f"{columns}: converted from {unit}, as their names say")
     if naming.qd_is_desired:
         remarks.append("qd is the desired position, since dq is the velocity (else --map)")
     if naming.remark and any(c.by == "name" and c.field.name in naming.bare for c in kept):
@@ -570,11 +571,7 @@ def _choices(
     by_name = {each.name: each for each in log.fields}
     signals = {entry.signal for entry in options.entries if not entry.joint}
     sources = {entry.part()[0] for entry in options.entries}
-    suggested = [
-        entry
-        for entry in log.suggested
-        if entry.signal not in signals and entry.part()[0] not in sources
-    ]
+    suggested = [e for e in log.suggested if e.signal not in signals and e.part()[0] not in sources]
     mapped = set()
     for entry in (*options.entries, *suggested):
         name, part = entry.part(by_name)
@@ -618,17 +615,15 @@ def _by_name(
             yield _Choice(each, 0, signal, joint, each.name)
 
 
-def _joint_of(
-    path: Path, column: str, number: int, first: int, joints: Sequence[str]
-) -> str | None:
+def _joint_of(path: Path, name: str, number: int, first: int, joints: Sequence[str]) -> str | None:
     """Joint of a robot that a number stands for: in order from 0 or 1 on, else by its own name."""
     if first < 2:
         return joints[number - first] if 0 <= number - first < len(joints) else None
     for joint in joints[number - 1 : number + 1]:
         if re.search(rf"(?<!\d){number}$", joint):
             return joint
-    problem = f"the columns' numbers begin with {first}, so {column!r} may be any joint"
-    raise LogError(path, f"{problem}; name it: --map SIGNAL.JOINT={column}, of {listed(joints)}")
+    problem = f"the columns' numbers begin with {first}, so {name!r} may be any joint"
+    raise LogError(path, f"{problem}; name it: --map SIGNAL.JOINT={name}, of {listed(joints)}")
 
 
 def _columns(
@@ -721,11 +716,10 @@ def _targets(log: Log, choices: Sequence[_Choice]) -> tuple[list[_Choice], list[
                 _Choice(each, column, "position_desired", joint, f"{each.name}{part}", "format")
                 for column, joint in enumerate(position.joints[:count])
             ], []
+    names = listed([each.name for each in commands])
     place = next(each.source for each in choices if each.signal == "position")
-    return [], [
-        f"{listed([each.name for each in commands])} not taken as desired positions: {place} does"
-        f" not follow; --map position_desired={commands[0].name} takes it"
-    ]
+    why = f"{place} does not follow; --map position_desired={commands[0].name} takes it"
+    return [], [f"{names} not taken as desired positions: {why}"]
 
 
 def followed(command: Real, position: Real) -> int:

@@ -16,20 +16,9 @@ from typing import Any
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs import clocks
-from inspector.logs.mapping import (
-    COVERS,
-    SAME_RATE,
-    UNIFORM,
-    Log,
-    ReadOptions,
-    Stamps,
-    Track,
-    fastest,
-    known_limits,
-    tracks_of,
-)
-from inspector.logs.names import BASE_SIGNALS, listed, tells_unit
+from inspector.logs import clocks, mapping
+from inspector.logs.mapping import SAME_RATE, Log, ReadOptions, Stamps, Track, known_limits
+from inspector.logs.names import BASE_SIGNALS, first_to_last, listed, tells_unit
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
 from noisemodel.hold import hold_length
@@ -61,7 +50,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None, beside: Log | 
     path = log.path
     if log.units and not options.units:
         raise LogError(path, log.units)
-    found, not_read, told = tracks_of(log, options, robot)
+    found, not_read, told = mapping.tracks_of(log, options, robot)
     remarks = [*log.remarks, *told]
     _refuse_quaternion(path, found, options)
     timed = clocks.in_seconds(path, found, options)
@@ -297,9 +286,7 @@ def _angular(track: Track, kinds: Mapping[str, str]) -> Mask:
     return np.array(turning, dtype=bool)
 
 
-def _in_degrees(
-    tracks: Sequence[Track], kinds: Mapping[str, str], *, guess: bool
-) -> tuple[str, ...]:
+def _in_degrees(tracks: Sequence[Track], kinds: Mapping[str, str], guess: bool) -> tuple[str, ...]:
     """What is in degrees, as positions and velocities tell whose names do not.
 
     By a ``guess``, positions are if half of the joints that move reach beyond a turn, to and fro.
@@ -407,7 +394,7 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     parts: dict[str, Track] = {}
     while kept:
         track = kept.pop(0)
-        track = replace(track, values=clocks.resampled(time, valid, track, UNIFORM * step))
+        track = replace(track, values=clocks.resampled(time, valid, track, mapping.UNIFORM * step))
         _add(parts, track)
     signals, differentiated, told = _signals_of(parts, time - time[0], valid)
     meta |= {"differentiated": differentiated} if differentiated else {}
@@ -417,28 +404,24 @@ def run_of(logs: list[Log], options: ReadOptions, name: str) -> Imported:
     return Imported(run, (*remarks, *told), name)
 
 
-def _covering(
-    tracks: Sequence[Track], main: Stamps, optional: int
-) -> tuple[list[Track], list[str]]:
+def _covering(tracks: Sequence[Track], own: Stamps, optional: int) -> tuple[list[Track], list[str]]:
     """Tracks without those of the first few that would cut the motion short, and what they lack."""
-    moving = [t for t in tracks if t.stamps is main and t.signal in ("position", "velocity")]
-    whole = int(clocks.common_time(moving, main)[1].sum())
+    moving = [t for t in tracks if t.stamps is own and t.signal in ("position", "velocity")]
+    whole = int(clocks.common_time(moving, own)[1].sum())
     kept, told = list[Track](), dict[str, list[str]]()
     for place, track in enumerate(tracks):
         share, what = 1.0, ""
-        if track not in moving and (track.stamps is not main or track.missing is not None):
-            share = int(clocks.common_time([*moving, track], main)[1].sum()) / max(1, whole)
-        if share < COVERS and place < optional:
+        if track not in moving and (track.stamps is not own or track.missing is not None):
+            share = int(clocks.common_time([*moving, track], own)[1].sum()) / max(1, whole)
+        if share < mapping.COVERS and place < optional:
             what = f"left out, there for {share:.0%} of the time"
         else:
             kept.append(track)
             rate = track.stamps.clock.nominal
-            if not track.is_desired and (lost := _lost(main.clock.nominal, rate)):
+            if not track.is_desired and (lost := _lost(own.clock.nominal, rate)):
                 what = f"interpolated from {plain(rate, 4)} Hz{lost}" if track.joints else ""
         if what:
-            names = track.joints
-            of = ", ".join(names) if len(names) <= 3 else f"{names[0]} to {names[-1]}"
-            what = f"{' of ' * bool(names)}{of}: {what}"
+            what = f"{' of ' * bool(track.joints)}{first_to_last(track.joints)}: {what}"
             told.setdefault(what, []).append(track.signal.replace("_", " "))
     return kept, [f"{', '.join(signals)}{what}" for what, signals in told.items()]
 
@@ -484,7 +467,7 @@ def _main(log: Log, options: ReadOptions) -> Track:
     if not moving:
         only = ", only desired" if log.tracks else ""
         raise LogError(log.path, f"holds no measured motion{only}")
-    fast = fastest(track.stamps for track in moving)
+    fast = mapping.fastest(track.stamps for track in moving)
     track = max((t for t in moving if t.stamps in fast), key=lambda track: len(track.joints))
     time, nominal, rate = track.stamps.time, track.stamps.clock.nominal, options.rate
     if rate is not None and not 1 / LARGEST_RATE_RATIO <= rate / nominal <= LARGEST_RATE_RATIO:
@@ -492,10 +475,8 @@ def _main(log: Log, options: ReadOptions) -> Track:
         raise LogError(log.path, f"{problem} of it")
     if time[-1] * nominal > MOST_SAMPLES_PER_STAMP * len(time):
         jump = int(np.argmax(steps := np.diff(time)))
-        problem = (
-            f"time jumps by {steps[jump]:.6g} s; most of the log is gaps: remove what lies before"
-        )
-        raise track.fault(log.path, problem, jump + 1)
+        problem = f"time jumps by {steps[jump]:.6g} s; most of the log is gaps"
+        raise track.fault(log.path, f"{problem}: remove what lies before", jump + 1)
     return track
 
 

@@ -333,6 +333,11 @@ def listed(names: Sequence[str]) -> str:
     return shown + (f" and {len(names) - 10} more" if len(names) > 10 else "")
 
 
+def first_to_last(names: Sequence[str]) -> str:
+    """Up to three names, of more the first and the last."""
+    return ", ".join(names) if len(names) <= 3 else f"{names[0]} to {names[-1]}"
+
+
 def _match(name: str) -> re.Match[str] | None:
     """Match of the first pattern that fits a name, unless it tells of no joint's motion."""
     if not any(hint in name.lower() for hint in HINTS) or _fits(NOT_MOTION, name):

@@ -130,11 +130,7 @@ def _values(path: Path, table: Any, name: str) -> NDArray[Any] | None:
 def _arrays(path: Path, table: Any, names: Sequence[str]) -> dict[str, NDArray[Any]]:
     """Columns of numbers, as arrays."""
     values = {name: _values(path, table, name) for name in names}
-    return {
-        name: each[:, 0] if each.shape[1] == 1 else each
-        for name, each in values.items()
-        if each is not None
-    }
+    return {n: e[:, 0] if e.shape[1] == 1 else e for n, e in values.items() if e is not None}
 
 
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:

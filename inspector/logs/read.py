@@ -24,7 +24,7 @@ from inspector.logs.mapping import (
     read_options,
 )
 from inspector.logs.motion import Imported, prepared, run_of
-from inspector.logs.names import BASE_SIGNALS, EPISODES, JOINT_SIGNALS, listed
+from inspector.logs.names import EPISODES, SIGNALS, first_to_last, listed
 from inspector.text import counted, printable
 from noisemodel import NoiseModelError, Robot, Run, RunFileError, runfile
 from noisemodel.files import also_reading
@@ -261,7 +261,8 @@ def open_source(source: Source, reading: Reading | None = None) -> Opened:
     if robot or reading.without_robot:
         run = replace(run, robot=robot or None)
     by_robot = named(run)
-    told = "" if by_robot is run else f"joints are not named: taken for {_listed(by_robot)}"
+    taken = first_to_last(by_robot.joint_names)
+    told = "" if by_robot is run else f"joints are not named: taken for {taken}"
     return Opened(by_robot, told, source)
 
 
@@ -273,9 +274,7 @@ def sources(
     Hidden files are left out. What cannot be read is listed too: `open_source` says why.
     """
     reading = reading or Reading()
-    found: list[Source] = []
-    others: list[Path] = []
-    seen: set[str] = set()
+    found, others, seen = list[Source](), list[Path](), set[str]()
     for path in paths:
         logs, rest = logs_in(path)
         others += rest
@@ -300,9 +299,7 @@ def logs_in(path: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     """List the logs of a folder and of the folders in it, and its other files."""
     if not _is_folder(path) or _module_of_folder(path):
         return (path,), ()
-    logs: list[Path] = []
-    others: list[Path] = []
-    waiting = [path]
+    logs, others, waiting = list[Path](), list[Path](), [path]
     while waiting:  # not by recursion: folders may lie a thousand deep
         folder = waiting.pop()
         if os.path.lexists(folder / "reference.toml"):
@@ -341,9 +338,9 @@ def assumed(imported: Imported, path: Path) -> str:
     run, remarks = imported.run, imported.remarks
     lacking = check_joints(run.joint_names, run.robot)
     others = "other " if any(": converted from" in each for each in remarks) else ""
-    signals = [name for name in (*JOINT_SIGNALS, *BASE_SIGNALS) if getattr(run, name) is not None]
-    held = ", ".join(signals).replace("_", " ")
-    parts = [f"read as {counted(len(run.joint_names), 'joint')} ({_listed(run)}): {held}"]
+    signals = [name for name in SIGNALS if getattr(run, name) is not None]
+    held, joints = ", ".join(signals).replace("_", " "), run.joint_names
+    parts = [f"read as {counted(len(joints), 'joint')} ({first_to_last(joints)}): {held}"]
     if not any("degrees" in remark for remark in remarks):
         parts.append(f"{others}angles taken for {run.meta.get('units') or 'radians'}")
     parts.append(f"{run.rate:g} Hz")
@@ -353,11 +350,6 @@ def assumed(imported: Imported, path: Path) -> str:
     told = (each for each in remarks if not each.startswith("time starts at 0"))  # of `import`
     parts += [each.removeprefix(f"{path.name}: ") for each in told]
     return "; ".join(" ".join(part.split()) for part in parts)
-
-
-def _listed(run: Run) -> str:
-    names = run.joint_names
-    return ", ".join(names) if len(names) <= 3 else f"{names[0]} to {names[-1]}"
 
 
 def _run_file(path: Path, reading: Reading) -> Run | None:
