@@ -99,10 +99,8 @@ def observable_classes(
                 _observability(label, bandwidth, profile, library, general=general)
                 for label in labels
             )
-    return tuple(
-        ClassObservability(label, Observability.CANNOT_TELL, needed=lowest, reason=reason)
-        for label in labels
-    )
+    unseen = Observability.CANNOT_TELL
+    return tuple(ClassObservability(each, unseen, needed=lowest, reason=reason) for each in labels)
 
 
 def _observability(
@@ -226,38 +224,29 @@ def _warnings(run: Run, reach: Bandwidth) -> Iterator[str]:
         when = f", {samples} {'later' if copy.lag > 0 else 'earlier'}" if copy.lag else ""
         yield f"measured {copy.signal} of {whose} is the desired one{when}: one is a copy"
     if reach.hold > 1:
-        yield (
-            f"measured values have a zero-order hold of {reach.hold:.3g} samples:"
-            f" they come at {plain(run.rate / reach.hold, 4)} Hz"
-        )
+        held = f"measured values have a zero-order hold of {reach.hold:.3g} samples"
+        yield f"{held}: they come at {plain(run.rate / reach.hold, 4)} Hz"
     if reach.corner:
         yield f"velocities look filtered from {plain(reach.corner)} Hz on"
 
 
 def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
     if reach.differentiator:
-        yield (
-            f"velocities are differentiated positions ({reach.differentiator.name}),"
-            f" attenuated above {plain(reach.limits['velocities were differentiated'])} Hz"
-        )
+        corner = plain(reach.limits["velocities were differentiated"])
+        method = f"differentiated positions ({reach.differentiator.name})"
+        yield f"velocities are {method}, attenuated above {corner} Hz"
     if run.velocity_desired is None:
         yield "there is no desired motion"
     elif (hold := hold_length(run.velocity_desired, run.mask)) > 1:
-        yield (
-            f"desired velocities have a zero-order hold of {hold:.3g} samples"
-            f" ({plain(run.rate / hold, 4)} Hz)"
-        )
+        rate = plain(run.rate / hold, 4)
+        yield f"desired velocities have a zero-order hold of {hold:.3g} samples ({rate} Hz)"
     if reach.floor_from is not None:
-        unit = "rad" if reach.differentiator else "rad/s"
-        yield (
-            f"above {plain(reach.floor_from)} Hz the quantisation (step {reach.step:.2g} {unit})"
-            f" masks oscillations up to {reach.floor_amplitude:.2g} rad/s"
-        )
+        step = f"step {reach.step:.2g} {'rad' if reach.differentiator else 'rad/s'}"
+        masked = f"masks oscillations up to {reach.floor_amplitude:.2g} rad/s"
+        yield f"above {plain(reach.floor_from)} Hz the quantisation ({step}) {masked}"
     elif reach.quiet_from is not None:
-        yield (
-            f"above {plain(reach.quiet_from)} Hz the level is below any encoder's noise: filtered"
-            " or simulated"
-        )
+        quiet = "the level is below any encoder's noise: filtered or simulated"
+        yield f"above {plain(reach.quiet_from)} Hz {quiet}"
 
 
 LONGEST = 60_000  # samples of an excerpt: a minute at 1 kHz
@@ -342,15 +331,9 @@ def as_json(found: Mapping[str, tuple[Audit, str]], failed: Mapping[str, str]) -
         runs.append(
             {
                 "run": name,
-                "rate": audit.rate,
-                "duration": audit.duration,
-                "joints": audit.joints,
+                **asdict(audit),
                 "jitter": jitter and dict(zip(("rms", "max"), jitter, strict=True)),
-                "gaps": asdict(audit.gaps),
                 "bandwidth": bandwidth,
-                "warnings": list(audit.warnings),
-                "notes": list(audit.notes),
-                "classes": [asdict(each) for each in audit.classes],
                 "assumed": assumed,
             }
         )

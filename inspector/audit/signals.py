@@ -147,22 +147,17 @@ def differentiator_of(run: Run) -> Differentiator | None:
     tolerance = 4.0 * grain * max(farthest * run.rate, fastest) + EXACT * fastest
     if tolerance > COARSE * np.sqrt(np.mean(np.square(velocity))):
         return None
-    found = {
-        BACKWARD: (here - before) * run.rate,
-        FORWARD: (after - here) * run.rate,
-        CENTRAL: (after - before) * run.rate / 2,
-    }
-    close = (m for m, s in found.items() if np.mean(np.abs(s - velocity) <= tolerance) >= 0.99)
-    method = next(close, None)
+    ways = {BACKWARD: here - before, FORWARD: after - here, CENTRAL: (after - before) / 2}
+    off = {method: np.abs(way * run.rate - velocity) for method, way in ways.items()}
+    method = next((m for m, each in off.items() if np.mean(each <= tolerance) >= 0.99), None)
     if method not in (BACKWARD, FORWARD) or grain > np.finfo(np.float64).eps:
         return method
     # A simulator makes positions of velocities: their difference is these but for its rounding.
-    first, way = (inner - 1, here - before) if method is BACKWARD else (inner, after - here)
+    way, first = ways[method], inner - (method is BACKWARD)
     step = (run.time[first + 1] - run.time[first])[:, None]
     slopes = way * run.rate, way / step, way * (1 / step)
     exact = max(np.mean(slope == velocity) for slope in slopes)
-    rounding = 4.0 * grain * farthest * run.rate
-    integrated = exact < 0.5 and np.abs(slopes[0] - velocity).max() <= rounding
+    integrated = exact < 0.5 and off[method].max() <= 4.0 * grain * farthest * run.rate
     return None if integrated else method
 
 
@@ -390,10 +385,8 @@ def unit_warnings(run: Run) -> Iterator[str]:
             yield f"positions look like degrees{other} ({joint} reaches {largest:.4g})"
     fast = int(np.argmax(speeds))
     if speeds[fast] > LARGEST["velocity"]:
-        yield (
-            f"velocities look like degrees or turns per minute"
-            f" ({run.joint_names[fast]} reaches {speeds[fast]:.4g})"
-        )
+        reached = f"{run.joint_names[fast]} reaches {speeds[fast]:.4g}"
+        yield f"velocities look like degrees or turns per minute ({reached})"
 
 
 MOVES = 0.1  # least speed of a moving joint, in SI units: pushes on a standing arm peak below
@@ -419,18 +412,14 @@ def placeholder(run: Run) -> str:
         return ""
     if any(np.any(desired[rows]) for rows in pieces(desired)):
         return _pulses(run) or _coarse(run)
+    zero = "the desired velocity is zero throughout while"
     if target is not None:
         parts = (target[rows][run.mask[rows]] for rows in pieces(target))
         found = [(p.min(axis=0, initial=np.inf), p.max(axis=0, initial=-np.inf)) for p in parts]
         low, high = np.min([low for low, _ in found], 0), np.max([high for _, high in found], 0)
         if (high - low).max() > CHANGE:
-            return "the desired velocity is zero throughout while the desired position changes"
-    if _moves(run):
-        return (
-            "the desired velocity is zero throughout while joints move at more than"
-            f" {MOVES:g} rad/s for seconds"
-        )
-    return ""
+            return f"{zero} the desired position changes"
+    return f"{zero} joints move at more than {MOVES:g} rad/s for seconds" if _moves(run) else ""
 
 
 def without_placeholder(run: Run) -> tuple[Run, str]:
@@ -468,10 +457,8 @@ def _coarse(run: Run) -> str:
     noise = step / 12**0.5 * rate * float(np.linalg.norm(SMOOTH.weights))
     if noise <= FAINTEST:
         return ""
-    return (
-        f"the desired velocity, differentiated from positions in steps of {step:.2g} rad, has"
-        f" {noise:.2g} rad/s of noise"
-    )
+    steps = f"positions in steps of {step:.2g} rad"
+    return f"the desired velocity, differentiated from {steps}, has {noise:.2g} rad/s of noise"
 
 
 def _moves(run: Run) -> bool:

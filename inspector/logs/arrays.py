@@ -391,12 +391,9 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def _read(path: Path, arrays: Arrays, options: ReadOptions, episode: str) -> Log:
-    texts = {name: each for name, each in arrays.items() if each.dtype.kind == "U"}
-    measured, desired = (
-        tuple(map(str, texts[name].ravel())) if name in texts else ()
-        for name in ("joint_names", "desired_joint_names")
-    )
-    desired = desired or measured
+    texts = {n: tuple(map(str, e.ravel())) for n, e in arrays.items() if e.dtype.kind == "U"}
+    measured = texts.get("joint_names", ())
+    desired = texts.get("desired_joint_names") or measured
     part = part_of(arrays, episode)
     numbers = {n: each for n, each in part.items() if each.ndim and each.dtype.kind in "iufM"}
     joints = {n: desired if meaning(n).endswith("_desired") else measured for n in numbers}

@@ -227,8 +227,6 @@ class Topic:
 
 LATEST = 2**62  # stamps lie before, in [ns]; differences of later ones are no 64-bit integers
 Message: TypeAlias = tuple[str, int, bytes]  # topic, time of reception in [ns], serialised
-
-
 # What opens a compressed stream, by the name that bags have for it.
 METHODS: dict[str, Callable[[BinaryIO], Any]] = {
     "bz2": bz2.open,

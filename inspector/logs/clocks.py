@@ -105,24 +105,18 @@ def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -
         raise LogError(path, f"column {name!r} holds {values[sample]} (sample {sample + 1})")
     since = (values - values[0]).astype(np.float64)
     first = Decimal(str(values[0]))
-    return stamps_since(path, name, first, since, rate, unit="nanoseconds" if dated else "")
+    return stamps_since(path, name, first, since, rate, "nanoseconds" if dated else "")
 
 
 def stamps_since(
-    path: Path,
-    name: str,
-    first: Decimal,
-    since: Array,
-    rate: float | None,
-    rows: Sequence[int] | None = None,
-    unit: str = "",
+    path: Path, name: str, first: Decimal, since: Array, rate: float | None, unit: str
 ) -> Stamps:
     """Stamps from the first one, exact, and the differences to it, shape (samples,)."""
     unit = unit or _unit_of(path, name, float(first), np.diff(since), rate)
     if unit == SAMPLES:
-        return Stamps(Decimal(0), since, rows, unit, name=name)
+        return Stamps(Decimal(0), since, unit=unit, name=name)
     time = since if unit == "seconds" else since * float(UNITS[unit])
-    return Stamps(first * Decimal(UNITS[unit]), time, rows, unit, name=name)
+    return Stamps(first * Decimal(UNITS[unit]), time, unit=unit, name=name)
 
 
 def in_seconds(path: Path, tracks: Sequence[Track], options: ReadOptions) -> list[Track]:

@@ -125,15 +125,16 @@ def _read(
     rows, values, cells = rows[part], values[part], cells[part]
     if len(rows) < 2:
         raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
-    stamps = replace(Stamps.counted(len(rows)), rows=rows)
+    stamps = Stamps.counted(len(rows))
     if times:  # absolute stamps exceed the precision of a float
         time = header[times[0]]
         exact = _decimals(path, time, cells, rows)
         since = np.array([float(stamp - exact[0]) for stamp in exact])
         unit = "" if _date(cells[0]) is None else "seconds"
-        stamps = stamps_since(path, time, exact[0], since, options.rate, rows, unit)
+        stamps = stamps_since(path, time, exact[0], since, options.rate, unit)
     arrays = {header[place]: values[:, at] for at, place in enumerate(wanted)}
     not_read = [n for n in names if n not in arrays and n.lower() not in EPISODES]
+    stamps = replace(stamps, rows=rows)
     log = log_of(path, arrays, options, stamps=stamps, not_read=not_read)
     return replace(log, remarks=layout.remarks)
 

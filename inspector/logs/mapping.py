@@ -645,11 +645,9 @@ def _columns(
         other = options.joints and len(names) != width and not signal.endswith("_desired")
         if names and (len(names) < width or other):
             whose = "--joints names" if options.joints else f"robot {options.robot!r} has"
-            raise LogError(
-                log.path,
-                f"{what}, {whose} {len(names)}; take a part of it"
-                f" (--map {signal}={field.name}[0:{len(names)}]) or name all (--joints)",
-            )
+            part = f"--map {signal}={field.name}[0:{len(names)}]"
+            how = f"take a part of it ({part}) or name all (--joints)"
+            raise LogError(log.path, f"{what}, {whose} {len(names)}; {how}")
     names = names or unnamed(width)
     for column, name in enumerate(names[:width], start=first.column):
         yield first._replace(column=column, joint=name)

@@ -118,10 +118,8 @@ def _finite(path: Path, track: Track, remarks: list[str]) -> Track | None:
         return track
     labels = [*dict.fromkeys(compress(track.labels, np.atleast_1d(lacking.any(axis=0))))]
     first = track.stamps.time[np.argmax(missing)] - track.stamps.time[0]
-    remarks.append(
-        f"{counted(int(missing.sum()), 'sample')} without a number, marked as"
-        f" not valid: {listed(labels)}, the first at {first:.6g} s"
-    )
+    lost = f"{counted(int(missing.sum()), 'sample')} without a number"
+    remarks.append(f"{lost}, marked as not valid: {listed(labels)}, the first at {first:.6g} s")
     places, values = np.arange(len(missing)), np.array(track.values)
     for column, nan in zip(values.T, lacking.T, strict=True):  # lest they spoil others
         column[nan] = np.interp(places[nan], places[~nan], column[~nan])
@@ -532,11 +530,9 @@ def _signals_of(
             values = parts[position].of(missing)
             if (hold := hold_length(values, valid)) > 1:
                 rate, each = (len(time) - 1) / float(time[-1]), "target" if suffix else "value"
-                remarks.append(
-                    f"{position}: each {each} is held for {hold:.3g} samples"
-                    f" ({plain(rate / hold, 4)} Hz); interpolated from {each} to"
-                    f" {each}{_lost(rate, rate / hold)}"
-                )
+                held = f"each {each} is held for {hold:.3g} samples ({plain(rate / hold, 4)} Hz)"
+                how = f"interpolated from {each} to {each}{_lost(rate, rate / hold)}"
+                remarks.append(f"{position}: {held}; {how}")
             slopes = joint_velocity(time, values, valid)
             _add(parts, replace(parts[position], signal=velocity, joints=missing, values=slopes))
             of_joints = f" of {', '.join(missing)}" if logged else ""
@@ -665,17 +661,13 @@ def contradictions(run: Run) -> Iterator[str]:
     strange = moves & (correlation < UNRELATED)
     wrong = moves & (correlation >= RELATED) & (np.abs(factor - 1) > AGREE)
     if strange.any():
-        yield (
-            f"velocities of {_joints(run, strange)} have no relation to the slopes of their"
-            f" positions (correlation {float(correlation[strange].max()):.2g})"
-        )
+        related = f"the slopes of their positions (correlation {correlation[strange].max():.2g})"
+        yield f"velocities of {_joints(run, strange)} have no relation to {related}"
     if wrong.any():
         least, most = (f"{each:.3g}" for each in (factor[wrong].min(), factor[wrong].max()))
         size = least if least == most else f"{least} to {most}"
-        yield (
-            f"velocities of {_joints(run, wrong)} are {size} times the slopes of their positions:"
-            " another unit, or another rate?"
-        )
+        slopes = f"{size} times the slopes of their positions"
+        yield f"velocities of {_joints(run, wrong)} are {slopes}: another unit, or another rate?"
 
 
 def _of_desired(run: Run) -> Iterator[str]:

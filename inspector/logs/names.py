@@ -175,13 +175,8 @@ class Naming(NamedTuple):
         words = {match["quantity"].lower() for match in matches if not any(_sides(match))}
         moves = any(signal.startswith(("position", "velocity")) for signal, _ in known.values())
         is_pose = {"x", "y"} <= {column.lower() for column in columns}  # beside x, y, an angle
-        return cls(
-            first=min(numbers, default=0),
-            qd_is_desired={"dq", "qd"} <= words,
-            bare=bare,
-            remark=remark,
-            alone=not (moves or is_pose),
-        )
+        first, qd_is_desired = min(numbers, default=0), {"dq", "qd"} <= words
+        return cls(first, qd_is_desired, bare, remark, alone=not (moves or is_pose))
 
 
 def _bare(
@@ -222,10 +217,8 @@ def _bare(
         return bare, ""
     example = plain[0].replace(found[plain[0]][1], "{joint}")
     which = plain[0] if len(plain) == 1 else f"{plain[0]} to {plain[-1]}"
-    return bare, (
-        f"{which}: names of joints alone, taken for positions"
-        f" (if they are velocities: --map 'velocity.{{joint}}={example}')"
-    )
+    how = f"if they are velocities: --map 'velocity.{{joint}}={example}'"
+    return bare, f"{which}: names of joints alone, taken for positions ({how})"
 
 
 def _fits(pattern: str, name: str) -> re.Match[str] | None:

@@ -333,12 +333,11 @@ def _episode(
         fields += _fields(path.name, name, held, each, columns[name], stamps)
     meta = {"robot_type": info.get("robot_type"), "dataset": info.get("codebase_version")}
     ends = [column.rpartition(".")[1:] for name in arrays for column in columns[name]]
+    read = {*arrays, STAMP}
     return Log(
         path,
         tuple(fields),
-        not_read=tuple(
-            n for n in features if n not in {*arrays, STAMP} and not n.startswith(IMAGES)
-        ),
+        not_read=tuple(n for n in features if n not in read and not n.startswith(IMAGES)),
         remarks=tuple(remarks),
         units=UNKNOWN if any(dot and end in PARTS for dot, end in ends) else "",
         meta={key: value for key, value in meta.items() if value},
