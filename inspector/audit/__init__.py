@@ -58,9 +58,7 @@ class ClassObservability:
     observability: Observability
     low: float = 0.0  # lowest frequency at which it is observable, in [Hz]; 0 if there is none
     high: float = 0.0  # highest frequency at which it is observable, in [Hz]; 0 if there is none
-    # Sample rate that makes all of it observable, or any of it, in [Hz]; None where a higher one
-    # would not help.
-    needed: float | None = None
+    needed: float | None = None  # rate that shows all of it, or any, in [Hz]; None if none would
     reason: str = ""  # cause of the limit, a clause; empty for what is observable
 
     def __str__(self) -> str:
@@ -174,8 +172,7 @@ class Audit:
     rate: float  # sample rate, in [Hz]
     duration: float  # in [s]
     joints: int
-    # Deviation of the stamps' steps before they were made uniform, root mean square and largest, in
-    # [s]; None if the run's ``meta`` has none.
+    # Deviation of the logged stamps' steps, RMS and largest, in [s]; None if ``meta`` has none.
     jitter: tuple[float, float] | None
     gaps: Gaps
     bandwidth: Bandwidth
@@ -256,12 +253,9 @@ def excerpt(run: Run) -> Run:
     """Cut out the part of a run around its fastest motion, which limits the cost of long runs."""
     if len(run.time) <= LONGEST:
         return run
-    fastest, highest = 0, -1.0
-    for rows in pieces(run.velocity):
-        moving = run.velocity[rows]
-        speed = np.where(run.mask[rows], np.einsum("sj,sj->s", moving, moving), -1.0)
-        if speed.max() > highest:
-            fastest, highest = rows.start + int(speed.argmax()), float(speed.max())
+    velocities = (run.velocity[rows] for rows in pieces(run.velocity))
+    squares = np.concatenate([np.einsum("sj,sj->s", each, each) for each in velocities])
+    fastest = int(np.where(run.mask, squares, -1.0).argmax())
     start = min(max(0, fastest - LONGEST // 2), len(run.time) - LONGEST)
     nothing: dict[str, Any] = dict.fromkeys(("effort", "base_pose", "base_velocity"))
     return part(run, start, start + LONGEST, **nothing, stages={})
@@ -328,15 +322,9 @@ def as_json(found: Mapping[str, tuple[Audit, str]], failed: Mapping[str, str]) -
             "quantisation_floor_from": reach.floor_from,
             "quiet_from": reach.quiet_from,
         }
-        runs.append(
-            {
-                "run": name,
-                **asdict(audit),
-                "jitter": jitter and dict(zip(("rms", "max"), jitter, strict=True)),
-                "bandwidth": bandwidth,
-                "assumed": assumed,
-            }
-        )
+        off = jitter and dict(zip(("rms", "max"), jitter, strict=True))
+        told = asdict(audit) | {"jitter": off, "bandwidth": bandwidth}
+        runs.append({"run": name, **told, "assumed": assumed})
     runs += [{"run": name, "message": message} for name, message in failed.items()]
     return json.dumps({"format": "noise-audit/2", "runs": runs}, indent=2)
 

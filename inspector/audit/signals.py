@@ -48,11 +48,8 @@ class Spectrum:
 def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
     """Spectrum of velocities, (samples, joints), by Welch's method; None if gaps leave too few."""
     length = max(FEWEST_SAMPLES, round(SEGMENT * rate))
-    starts = [
-        start
-        for stretch in stretches(valid, len(valid))
-        for start in range(stretch.start, stretch.stop - length + 1, length // 2)
-    ]
+    every = stretches(valid, len(valid))
+    starts = [at for each in every for at in range(each.start, each.stop - length + 1, length // 2)]
     if not starts:
         return None
     chosen = np.unique(np.linspace(0, len(starts) - 1, min(MOST, len(starts))).round().astype(int))
@@ -98,8 +95,7 @@ class Differentiator:
     """Method by which velocities were computed from positions."""
 
     name: str
-    # Of the positions before and after, evenly about the middle, times the rate; shape (taps,).
-    weights: tuple[float, ...]
+    weights: tuple[float, ...]  # of positions evenly about the middle, times the rate; (taps,)
 
     def response(self, frequency: Array, rate: float) -> Array:
         """Amplitude of the velocity divided by the position's, at some frequencies, in [1/s]."""
@@ -206,11 +202,8 @@ class Bandwidth:
     hold: float = 1.0  # length of the zero-order hold of measured values, in samples; 1 without one
     differentiator: Differentiator | None = None  # of positions; None of measured velocities
     corner: float | None = None  # -3 dB frequency of a filter, in [Hz]; None without a sign of one
-    # Largest quantisation step, in [rad/s], or in [rad] of the positions that were differentiated;
-    # 0 without one.
-    step: float = 0.0
-    # Frequency above which the spectrum is at the quantisation floor, in [Hz]; None if it stays
-    # above, or the run is too short for a spectrum.
+    step: float = 0.0  # largest quantisation step, in [rad/s], or [rad] of differentiated positions
+    # Frequency from which on the spectrum is at the quantisation floor, in [Hz]; None if never.
     floor_from: float | None = None
     floor_amplitude: float = 0.0  # largest oscillation that is masked there, in [rad/s]
     quiet_from: float | None = None  # from where on any encoder has more noise, in [Hz]; or None
@@ -274,13 +267,9 @@ def bandwidth(run: Run) -> Bandwidth:
 
 
 FLAT = 4.5  # most variation in a flat octave, less than the 6 of a first-order filter, in [dB]
-# Least slope of a filter: below second order's 12, above the 6 with which encoders and drives
-# attenuate white noise, in [dB] an octave.
-STEEP = 9.0
+STEEP = 9.0  # least slope of a filter, in [dB] an octave: second order has 12, encoders have 6
 DROP = 15.0  # least attenuation of one in two octaves or up to the Nyquist frequency, in [dB]
-# Root mean square from which an octave is vibration, not background noise: no filter ends it. The
-# threshold of the scenarios' labels, in [rad/s].
-LOUD = 0.03
+LOUD = 0.03  # RMS of an octave that is vibration, which no filter ends, as in labels, in [rad/s]
 
 
 def corner(spectrum: Spectrum, floor: Array) -> float | None:
@@ -393,7 +382,6 @@ MOVES = 0.1  # least speed of a moving joint, in SI units: pushes on a standing 
 MOVING_TIME = 2.0  # stretch of time in which it has to move, in [s]
 MOVING_SHARE = 0.75  # share of that time: a motion reverses now and then, a push is over sooner
 CHANGE = 1e-6  # least change of a desired position, and least desired speed, in SI units
-COUNTED = 1_000_000  # samples that are counted at once
 PULSE = 2  # most samples of a pulse, of a central difference; each second one is chatter
 FAINTEST = 0.05  # most quantisation noise of a velocity, RMS in [rad/s]: faults begin there
 
@@ -469,8 +457,5 @@ def _moves(run: Run) -> bool:
     fast = run.mask.copy()
     for rows in pieces(run.velocity):
         fast[rows] &= np.abs(run.velocity[rows]).max(axis=1) > MOVES
-    for first in range(0, len(fast) - size + 1, COUNTED):
-        count = np.append(0, np.cumsum(fast[first : first + COUNTED + size]))
-        if (count[size:] - count[:-size]).max() >= MOVING_SHARE * size:
-            return True
-    return False
+    count = np.cumsum(np.append(False, fast), dtype=np.int32)
+    return bool((count[size:] - count[:-size]).max() >= MOVING_SHARE * size)

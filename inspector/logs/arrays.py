@@ -432,10 +432,8 @@ def log_of_variables(path: Path, variables: Arrays, options: ReadOptions) -> Log
     time = options.stamps_in([name for name, each in named.items() if each.ndim == 1])
     longest = max((max(each.shape) for each in named.values() if each.ndim), default=0)
     samples = len(named[time]) if time in named else longest
-    turned = {
-        name: each.T if each.ndim == 2 and each.shape[1] == samples != each.shape[0] else each
-        for name, each in named.items()
-    }
+    across = {n: e.T for n, e in named.items() if e.shape[1:] == (samples,) != e.shape[:1]}
+    turned = named | across
     return log_of(path, turned, options, stated=stated_rate(turned))
 
 

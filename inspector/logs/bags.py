@@ -205,22 +205,13 @@ class Topic:
             logged = np.frombuffer(group.logged, dtype=np.int64)
             chosen = (logged if logged.any() else received)[order]
             first = int(chosen[0])
-            stamps = Stamps(
-                Decimal(first).scaleb(-9),
-                np.multiply(chosen - first, 1e-9),
-                remark="" if logged.any() else RECORDER,
-            )
+            remark, since = "" if logged.any() else RECORDER, np.multiply(chosen - first, 1e-9)
+            stamps = Stamps(Decimal(first).scaleb(-9), since, remark=remark)
             for name, numbers in group.arrays.items():
                 signal, rank = signals.get(name, ("", 0))
-                yield Field(
-                    f"{self.name}/{name}",
-                    np.frombuffer(numbers).reshape(len(received), -1)[order],
-                    stamps,
-                    joints=group.joints,
-                    signal=signal,
-                    source=self.name,
-                    rank=rank,
-                )
+                values = np.frombuffer(numbers).reshape(len(received), -1)[order]
+                array_name = f"{self.name}/{name}"
+                yield Field(array_name, values, stamps, group.joints, signal, self.name, rank)
 
 
 # Bags

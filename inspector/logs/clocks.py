@@ -356,15 +356,9 @@ def synchronise(
 ) -> tuple[list[Track], str, float | None]:
     """Tracks on the measured motion's clock, which starts at 0; a remark; the offset, if any."""
     start = main.stamps.start
-    clocks = {
-        stamps: replace(
-            stamps,
-            start=start,
-            time=stamps.time + float(stamps.start - start),
-            rate=options.rate if stamps is main.stamps else None,
-        )
-        for stamps in clocks_of(tracks)
-    }
+    times = {each: each.time + float(each.start - start) for each in clocks_of(tracks)}
+    clocks = {each: replace(each, start=start, time=time) for each, time in times.items()}
+    clocks[main.stamps] = replace(clocks[main.stamps], rate=options.rate)
     measured = {track.stamps for track in tracks if not track.is_desired}
     own = {stamps: each for stamps, each in clocks.items() if stamps not in measured}
     time = clocks[main.stamps].time

@@ -160,11 +160,8 @@ def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
     if first is None and not options.columns:  # the first line names, rows tell what is wrong
         rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
         return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
-    before = {
-        number: _split(line, delimiter)
-        for number, line in enumerate(lines[: first or 0], start=1)
-        if line.strip()
-    }
+    above = {n: line for n, line in enumerate(lines[: first or 0], start=1) if line.strip()}
+    before = {number: _split(line, delimiter) for number, line in above.items()}
     header, used = tuple(name.strip() for name in options.columns), list[int]()
     if first is not None and not header:
         width = len(_split(lines[first], delimiter))
@@ -185,8 +182,8 @@ def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
         are_units = all(not unit or unit.lower() in {*SIGNAL_UNITS, *TIME_UNITS} for unit in units)
         if len(candidates) > 1 and any(units) and are_units:
             used = candidates[-2:]
-            above = zip(names[used[0]], units, strict=False)
-            header = tuple(f"{name} [{unit}]" if unit else name for name, unit in above)
+            pairs = zip(names[used[0]], units, strict=False)
+            header = tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
     others = len(before) - len(used)
     remarks = (f"{counted(others, 'line')} before the rows not read",) if others else ()
     return Layout(delimiter, header, used[-1] if used else 0, first or 0, remarks)
@@ -241,11 +238,8 @@ def _wanted(path: Path, layout: Layout, times: Sequence[int], options: ReadOptio
         raise LogError(path, problem, row)
     mapped = options.mapped
     naming = Naming.of(header, options.known_joints)
-    wanted = [
-        place
-        for place, name in enumerate(header)
-        if place not in times and (name in mapped or may_hold(name, naming))
-    ]
+    others = [place for place in range(len(header)) if place not in times]
+    wanted = [n for n in others if header[n] in mapped or may_hold(header[n], naming)]
     for place in (*wanted, *times[:1]):
         if header.count(header[place]) > 1:
             raise LogError(path, f"two columns are named {header[place]!r}", row)
