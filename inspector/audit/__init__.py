@@ -37,6 +37,7 @@ from noisemodel.run import part
 from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
 
+LONGEST = 60_000  # samples of an excerpt: a minute at 1 kHz
 OSCILLATIONS = (20.0, 1000.0)  # the paper's band of them (scenarios 11 to 19), in [Hz]
 # What the reason begins with where a class is observable in all of its band, if it is loud.
 MASKED = "quantisation masks amplitudes"
@@ -161,8 +162,8 @@ class Gaps:
         """Format as a clause."""
         if not self.count:
             return "no gaps"
-        gaps = counted(self.count, "gap")
-        return f"{gaps}, {self.total:.3g} s in all, {self.longest:.3g} s the longest"
+        lasts = f"{self.total:.3g} s in all, {self.longest:.3g} s the longest"
+        return f"{counted(self.count, 'gap')}, {lasts}"
 
 
 @dataclass(frozen=True)
@@ -244,9 +245,6 @@ def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
     elif reach.quiet_from is not None:
         quiet = "the level is below any encoder's noise: filtered or simulated"
         yield f"above {plain(reach.quiet_from)} Hz {quiet}"
-
-
-LONGEST = 60_000  # samples of an excerpt: a minute at 1 kHz
 
 
 def excerpt(run: Run) -> Run:

@@ -324,9 +324,6 @@ def _of_mujoco(path: Path, arrays: Arrays, roles: Mapping[str, str]) -> Iterator
             yield Entry(signal, "", f"{names[what]}[{6 * base}:{stop - base}]")
 
 
-NO_ARRAYS = "no numbers; of a timeseries of MATLAB or Simulink, save ts.Time and ts.Data"
-
-
 def _nothing(path: Path, arrays: Arrays, not_read: Sequence[str]) -> LogError:
     """Error of a file that is not known to hold motion: what it holds, and what to type."""
     if arrays and all(each.ndim == 1 for each in arrays.values()):
@@ -340,8 +337,9 @@ def _nothing(path: Path, arrays: Arrays, not_read: Sequence[str]) -> LogError:
     if not close and "obs" in name and (half := arrays[name].shape[1] // 2):
         example += f"[0:{half}] --map velocity={name}[{half}:{2 * half}]"
     shapes = listed([f"{n} ({', '.join(map(str, e.shape))})" for n, e in arrays.items()])
+    none = "no numbers; of a timeseries of MATLAB or Simulink, save ts.Time and ts.Data"
     problem = "the file holds no known joint positions or velocities; name them, such as"
-    return LogError(path, f"{problem} {example}; it has {shapes or NO_ARRAYS}")
+    return LogError(path, f"{problem} {example}; it has {shapes or none}")
 
 
 # NumPy's files

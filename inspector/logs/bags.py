@@ -391,8 +391,7 @@ def _intact(stream: BinaryIO, records: Iterator[T], bag: Bag) -> Iterator[T]:
 
 
 def _mcap(path: Path, bag: Bag) -> Iterator[Topic | Message]:
-    schemas: dict[int, str] = {}
-    channels: dict[int, str] = {}
+    schemas, channels = dict[int, str](), dict[int, str]()
     size = path.stat().st_size  # no record is longer than its file
     with path.open("rb") as stream:
         reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=size)

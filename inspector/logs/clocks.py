@@ -25,11 +25,10 @@ from noisemodel.run import (
     METHOD,
     SAMPLED,
     SOURCES,
-    base_velocity,
     continuous_quaternions,
     derived,
-    joint_velocity,
     resample,
+    with_velocities,
 )
 from noisemodel.runfile import either_way
 from noisemodel.types import Array, Indices, Mask, Real
@@ -51,6 +50,7 @@ DISAGREE = 0.1  # relative difference from which a rate of the values contradict
 LONGEST_DATES = 60.0  # longest step of stamps that are dates, in [s]
 SLOW = 0.02  # median step from which stamps in seconds may be in milliseconds, in [s]
 MOST_UNORDERED = 0.1  # share of samples out of order from which a log is several, or has no stamps
+SHORTER = 10  # fewest steps' worth of rounding that tells rounded stamps from a lost sample
 BLOCK = 500_000  # values that are interpolated at once, which takes about ten times their memory
 
 
@@ -210,9 +210,6 @@ def clocks_of(tracks: Sequence[Track]) -> list[Stamps]:
 def on_clocks(tracks: Sequence[Track], changed: Mapping[Stamps, Stamps]) -> list[Track]:
     """Tracks with other stamps in place of some."""
     return [replace(track, stamps=changed.get(track.stamps, track.stamps)) for track in tracks]
-
-
-SHORTER = 10  # fewest steps' worth of rounding that tells rounded stamps from a lost sample
 
 
 def even(stamps: Stamps) -> Stamps:
@@ -492,12 +489,9 @@ def without_hold(run: Run) -> Run:
 
     Velocities that were differentiated are so again, at that rate.
     """
-    again = {
-        name: source
-        for name, source in (*SOURCES.items(), ("base_velocity", "base_pose"))
-        if derived(run, name) == METHOD and getattr(run, source) is not None
-    }
-    hold, changed = jumps(getattr(run, again.get("velocity", "velocity")), run.mask)
+    again = [name for name in (*SOURCES, "base_velocity") if derived(run, name) == METHOD]
+    position = run.position if "velocity" in again else None
+    hold, changed = jumps(run.velocity if position is None else position, run.mask)
     count = round(hold)
     if count < 2 or abs(hold - count) > 1e-3:
         return run
@@ -519,7 +513,6 @@ def without_hold(run: Run) -> Run:
         return either_way([signal], shape, read, signal.dtype)
 
     fields: dict[str, Any] = {name: every(getattr(run, name)) for name in SAMPLED}
-    for name, source in again.items():
-        slope = joint_velocity if name in SOURCES else base_velocity
-        fields[name] = slope(fields["time"], fields[source], fields["valid"])
+    kept = {name: each for name, each in fields.items() if each is not None and name not in again}
+    fields |= {name: each for name, each in with_velocities(kept)[0].items() if name in again}
     return replace(run, **fields, stages={name: every(each) for name, each in run.stages.items()})

@@ -17,18 +17,17 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs import arrays
 from inspector.logs.mapping import Log, LogReader, ReadOptions, errors_of
-from inspector.logs.names import EPISODES as EPISODE_NAMES
-from inspector.logs.names import TIMES, listed
+from inspector.logs.names import EPISODES, TIMES, listed
 from inspector.text import counted
 from noisemodel.runfile import check_unpacked
 
-EPISODES = "data"  # the group that holds the episodes of robomimic and Isaac Lab
+HOME = "data"  # the group that holds the episodes of robomimic and Isaac Lab
 # Names of episodes in a file without that group: Minari's, ManiSkill's and others.
 NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
 # Errors that h5py raises for damaged files.
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
 SMALL = 8 * 2**20  # bytes up to which a dataset is read whatever its name is
-NAMES = {*TIMES, *EPISODE_NAMES}
+NAMES = {*TIMES, *EPISODES}
 
 MATLAB = b"MATLAB 7.3"  # the first bytes of a file that MATLAB wrote
 REFERENCES = "#refs#"  # the group in which MATLAB keeps the cells and objects of a file
@@ -47,7 +46,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str, ...]]:
     """Name of the group with a group for each episode, empty without one, and their names."""
-    for home in (EPISODES, "/"):
+    for home in (HOME, "/"):
         group = _own(path, file.get(home), file)
         if isinstance(group, h5py.Group) and not is_matlab:
             groups = {
@@ -55,10 +54,10 @@ def _episodes(path: Path, file: Any, *, is_matlab: bool) -> tuple[str, tuple[str
                 for name, each in group.items()
                 if isinstance(each, h5py.Group)
             }
-            if found := [n for n in groups.values() if home == EPISODES or NUMBERED.fullmatch(n)]:
+            if found := [n for n in groups.values() if home == HOME or NUMBERED.fullmatch(n)]:
                 found.sort(key=lambda name: [int(number) for number in re.findall(r"\d+", name)])
                 return home, tuple(found)
-    flags = {name: file.get(name) for name in EPISODE_NAMES}
+    flags = {name: file.get(name) for name in EPISODES}
     datasets = {name: each for name, each in flags.items() if isinstance(each, h5py.Dataset)}
     return "", tuple(arrays.episodes_of(_values(path, file, datasets)))
 
@@ -110,8 +109,7 @@ def _values(path: Path, file: Any, datasets: Mapping[str, Any]) -> dict[str, NDA
 def _wanted(group: Any, options: ReadOptions) -> tuple[dict[str, Any], list[str]]:
     """Numeric datasets that may hold motion, by name, and names of large unknown ones."""
     mapped = {entry.part()[0] for entry in options.entries}
-    found: dict[str, Any] = {}
-    left_out: list[str] = []
+    found, left_out = dict[str, Any](), list[str]()
     for name, each in _datasets(group, mapped).items():
         if each.dtype.kind not in "iufb" or each.attrs.get("MATLAB_class") == b"char":
             continue

@@ -516,9 +516,7 @@ def _signals_of(
     parts: dict[str, Track], time: Array, valid: Mask
 ) -> tuple[dict[str, Any], dict[str, str], list[str]]:
     """Signals of all joints, velocities differentiated where needed; what some lack is left out."""
-    signals: dict[str, Any] = {}
-    differentiated: dict[str, str] = {}
-    remarks: list[str] = []
+    signals, differentiated, remarks = dict[str, Any](), dict[str, str](), list[str]()
     for suffix, names in (("", "joint_names"), ("_desired", "desired_joint_names")):
         velocity, position = f"velocity{suffix}", f"position{suffix}"
         known = [parts[signal].joints for signal in (velocity, position) if signal in parts]

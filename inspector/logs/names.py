@@ -164,13 +164,8 @@ class Naming(NamedTuple):
         named = {column: what for column in columns if (what := column_signal(column))}
         bare, remark = _bare(columns, named, joints)
         known = named | bare
-        numbers = {
-            number
-            for column, (_, joint) in known.items()
-            if (number := number_of(joint)) is not None
-            and joint not in joints
-            and not without_unit(column)[0].endswith("]")
-        }
+        own = {what[1] for c, what in known.items() if not without_unit(c)[0].endswith("]")}
+        numbers = [n for joint in own - {*joints} if (n := number_of(joint)) is not None]
         matches = filter(None, (_match(without_unit(column)[0]) for column in columns))
         words = {match["quantity"].lower() for match in matches if not any(_sides(match))}
         moves = any(signal.startswith(("position", "velocity")) for signal, _ in known.values())
