@@ -105,8 +105,8 @@ def _finite(path: Path, track: Track, remarks: list[str]) -> Track | None:
     infinite = np.argwhere(np.isinf(track.values))
     if len(infinite):
         sample, column = map(int, infinite[0])
-        value = track.values[sample, column]
-        raise track.fault(path, f"column {track.labels[column]!r} holds {value}", sample)
+        held = f"column {track.labels[column]!r} holds {track.values[sample, column]}"
+        raise track.fault(path, held, sample)
     empty = np.atleast_1d(lacking.all(axis=0))
     if empty.any():
         remarks.append(f"all nan, left out: {listed([*compress(track.labels, empty)])}")
@@ -248,8 +248,7 @@ def _in_si(
                 remarks.append(f"{name}: in {unit}, as it goes as far as the measured motion")
             degrees = unit == "degrees" if unit else degrees or track.quantity in also
         if degrees and open_.any():
-            values = np.where(open_, np.deg2rad(track.values), track.values)
-            track = replace(track, values=values)
+            track = replace(track, values=np.where(open_, np.deg2rad(track.values), track.values))
         if not units:
             _refuse_degrees(log.path, track, angular, kinds)
         if not beside:
