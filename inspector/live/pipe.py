@@ -216,7 +216,7 @@ class CsvReader:
         for kind, of_joints in places.items():
             factors = np.array([factor_of(header[place]) for place in of_joints])
             factors = np.array([float(UNITS[unit])]) if kind == "time" else factors
-            taken = [wanted.index(place) for place in of_joints]
+            taken = np.searchsorted(wanted, of_joints).tolist()
             beside = taken == list(range(taken[0], taken[0] + len(taken)))
             chosen = slice(taken[0], taken[-1] + 1) if beside else taken
             self._columns[kind] = chosen, None if (factors == 1.0).all() else factors
