@@ -230,8 +230,8 @@ def analyse(
 def _of_log(run: nm.Run) -> Iterator[str]:
     """What was left out of a run when its log was read, and its gaps, sentences."""
     told = run.meta.get("notes")
-    for each in told if isinstance(told, list) else ():
-        yield f"{printable(str(each))[:1].upper()}{printable(str(each))[1:]}."
+    for each in map(printable, map(str, told if isinstance(told, list) else ())):
+        yield f"{each[:1].upper()}{each[1:]}."
     if lost := gaps(run):
         seconds = sum(stop - start for start, stop in lost)
         many = counted(len(lost), "gap")

@@ -54,8 +54,9 @@ CHUNK_BYTES = 1 << 18  # bytes that are read at once, if there are so many
 MAX_LINE_BYTES = 1 << 24
 # Below this, reading waits for more: half of what a pipe holds by default.
 SMALL_CHUNK_BYTES = 1 << 15
-# Signals that end a stream and leave its file whole: a terminal that closes, Ctrl-C and `kill`.
-ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
+# Signals that end a stream and leave its file whole: Ctrl-C, `kill`, and a terminal that closes,
+# which Windows has not.
+ENDING = [signal.SIGINT, signal.SIGTERM, *filter(None, [getattr(signal, "SIGHUP", None)])]
 GATHER = 0.02  # how long rows wait for more, in [s]: less than half of a session's batch
 EXPECTED = "expected a CSV header and rows, or a JSON object per line"
 
@@ -154,9 +155,10 @@ def interruptible(items: Iterator[Item]) -> Iterator[Iterator[Item]]:
                 waits = False
             yield item
 
-    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN  # by `nohup`
-    ending = ENDING[1:] if ignored else ENDING
-    before = {each: signal.signal(each, press) for each in ending}
+    before = {each: signal.getsignal(each) for each in ENDING}
+    for each, handler in before.items():
+        if each == signal.SIGINT or handler != signal.SIG_IGN:  # `nohup` has others ignored
+            signal.signal(each, press)
     try:
         yield handed_out()
     finally:
